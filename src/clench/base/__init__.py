@@ -1,0 +1,1 @@
+"""Errors, poses, tolerances and array types: what every layer may use."""

@@ -1,0 +1,175 @@
+"""Rigid poses in three dimensions, immutable, with quaternions in `wxyz` order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import CommandError
+from .tolerances import QUATERNION_NORM
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Pose:
+    """Map coordinates of one frame to another: `p_a = T_a_b.apply(p_b)`.
+
+    Args:
+        position: origin of frame `b` in frame `a` [m], shape (3,).
+        wxyz: unit quaternion, scalar first, shape (4,); normalised when off by less than 1e-3.
+
+    Raises:
+        CommandError: wrong length, not finite, or a norm off by more than 1e-3.
+    """
+
+    wxyz_xyz: FloatArray
+
+    def __init__(
+        self,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        *,
+        key: str = "pose",
+    ) -> None:
+        xyz = _vector(position, 3, f"{key}.position", "[x, y, z] in metres")
+        quaternion = _vector(wxyz, 4, f"{key}.wxyz", "[w, x, y, z]")
+        norm = float(np.linalg.norm(quaternion))
+        if abs(norm - 1.0) > QUATERNION_NORM:
+            raise CommandError(f"{key}.wxyz: expected a unit quaternion [w, x, y, z], got norm {norm:.6g}.")
+        data = np.concatenate([quaternion / norm, xyz])
+        data.flags.writeable = False
+        object.__setattr__(self, "wxyz_xyz", data)
+
+    @classmethod
+    def identity(cls) -> Pose:
+        """Return the pose that changes nothing."""
+        return cls()
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Pose:
+        """Make a pose from a homogeneous matrix, shape (4, 4)."""
+        m = np.asarray(matrix, dtype=np.float64)
+        return cls(m[:3, 3], quaternion_from_rotation(m[:3, :3]))
+
+    @property
+    def position(self) -> FloatArray:
+        """Origin of the inner frame [m], shape (3,)."""
+        return self.wxyz_xyz[4:]
+
+    @property
+    def wxyz(self) -> FloatArray:
+        """Unit quaternion, scalar first, shape (4,)."""
+        return self.wxyz_xyz[:4]
+
+    @property
+    def rotation(self) -> FloatArray:
+        """Rotation matrix, shape (3, 3)."""
+        w, x, y, z = self.wxyz
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Homogeneous matrix, shape (4, 4)."""
+        m = np.eye(4)
+        m[:3, :3] = self.rotation
+        m[:3, 3] = self.position
+        return m
+
+    def inverse(self) -> Pose:
+        """Return the pose that maps back."""
+        return Pose.from_matrix(invert(self.matrix))
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """Compose: `T_a_c = T_a_b @ T_b_c`."""
+        return Pose.from_matrix(self.matrix @ other.matrix)
+
+    def apply(self, points: ArrayLike) -> FloatArray:
+        """Map points, shape (..., 3) [m]."""
+        p = np.asarray(points, dtype=np.float64)
+        return p @ self.rotation.T + self.position
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Pose) and bool(np.array_equal(self.wxyz_xyz, other.wxyz_xyz))
+
+    def __hash__(self) -> int:
+        return hash(self.wxyz_xyz.tobytes())
+
+    def __repr__(self) -> str:
+        return f"Pose({self.position.tolist()}, wxyz={self.wxyz.tolist()})"
+
+    def to_dict(self) -> dict[str, list[float]]:
+        """Return the form used in files: `position` and `wxyz`."""
+        return {"position": self.position.tolist(), "wxyz": self.wxyz.tolist()}
+
+    @classmethod
+    def from_dict(cls, data: Any, key: str = "pose") -> Pose:
+        """Read the form used in files.
+
+        Raises:
+            CommandError: not an object, or unknown, missing or malformed keys.
+        """
+        if not isinstance(data, dict):
+            raise CommandError(f"{key}: expected an object with 'position' and 'wxyz', got {type(data).__name__}.")
+        unknown = sorted(set(data) - {"position", "wxyz"})
+        if unknown:
+            raise CommandError(f"{key}.{unknown[0]}: unknown key; expected 'position' and 'wxyz'.")
+        if "position" not in data:
+            raise CommandError(f"{key}.position: missing; expected [x, y, z] in metres.")
+        return cls(data["position"], data.get("wxyz", (1.0, 0.0, 0.0, 0.0)), key=key)
+
+
+def invert(matrix: FloatArray) -> FloatArray:
+    """Invert a rigid homogeneous matrix, shape (4, 4)."""
+    m = np.eye(4)
+    m[:3, :3] = matrix[:3, :3].T
+    m[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
+    return m
+
+
+def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
+    """Return the rotation matrix about a unit axis by an angle [rad] (Rodrigues), shape (3, 3)."""
+    x, y, z = axis
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+
+
+def quaternion_from_rotation(rotation: FloatArray) -> FloatArray:
+    """Return the unit quaternion `wxyz` of a rotation matrix, with w >= 0 (Shepperd's method)."""
+    m = rotation
+    trace = float(np.trace(m))
+    candidates = np.array([trace, m[0, 0], m[1, 1], m[2, 2]])
+    i = int(np.argmax(candidates))
+    if i == 0:
+        q = np.array([1 + trace, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+    else:
+        a, b, c = (i - 1), i % 3, (i + 1) % 3
+        q = np.empty(4)
+        q[0] = m[c, b] - m[b, c]
+        q[1 + a] = 1 + m[a, a] - m[b, b] - m[c, c]
+        q[1 + b] = m[a, b] + m[b, a]
+        q[1 + c] = m[a, c] + m[c, a]
+    q /= np.linalg.norm(q)
+    return -q if q[0] < 0 else q
+
+
+def _vector(value: ArrayLike | Sequence[object], length: int, key: str, expected: str) -> FloatArray:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CommandError(f"{key}: expected {expected}, got {value!r}.") from None
+    if array.shape != (length,):
+        raise CommandError(f"{key}: expected {length} numbers {expected}, got {value!r}.")
+    if not np.isfinite(array).all():
+        raise CommandError(f"{key}: expected finite numbers {expected}, got {array.tolist()}.")
+    return array

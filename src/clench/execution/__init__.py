@@ -1,0 +1,1 @@
+"""Sending a solution to a hand: trajectories, and a simulated hand."""

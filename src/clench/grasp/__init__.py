@@ -1,0 +1,1 @@
+"""The method, one file per step: planes, sections, contacts, candidates, feasibility, choice."""

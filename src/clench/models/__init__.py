@@ -1,0 +1,1 @@
+"""The three inputs: hand, object and command."""

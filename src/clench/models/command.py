@@ -1,0 +1,71 @@
+"""The command: the wrist pose, the posture, and what is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from clench.base.pose import FloatArray, Pose
+
+from .hand.hand import Hand
+from .shapes import CollisionSource
+
+
+class ClosingOrder(StrEnum):
+    """Name the order in which joints close (METHOD.md section 4)."""
+
+    PROXIMAL_FIRST = "proximal-first"
+    """one degree of freedom after another, from the palm outwards (the patent)"""
+
+
+@dataclass(frozen=True)
+class GraspCommand:
+    """Say where the hand is, how it is preshaped and what is asked for.
+
+    Args:
+        hand_pose: `T_world_palm`, or the pose of `root_link` when that is named.
+        root_link: the link that `hand_pose` places; None is the palm.
+        object_pose: `T_world_object`; None keeps the object's own.
+        preshape: angles [rad] by joint name: posture joints, and open values of closing joints.
+        fingers: names of the fingers that close, in order; None is all.
+        order, rounds: closing order, and how often it is gone through.
+        planes: number of curl planes per finger.
+        full_width: also compute the set that closes over all planes at once.
+        yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
+        open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
+        collision_source: geometry of the hand; None is the hand's default.
+        criteria: weights by criterion name; None is the default calibration. A path names a calibration file.
+        seed: recorded with the result; nothing random depends on it.
+    """
+
+    hand_pose: Pose
+    root_link: str | None = None
+    object_pose: Pose | None = None
+    preshape: Mapping[str, float] = field(default_factory=dict)
+    fingers: tuple[str, ...] | None = None
+    order: ClosingOrder = ClosingOrder.PROXIMAL_FIRST
+    rounds: int = 1
+    planes: int = 5
+    full_width: bool = True
+    yaw_grid: tuple[float, ...] = (0.0,)
+    open_variants: tuple[float, ...] = (0.0,)
+    collision_source: CollisionSource | None = None
+    criteria: Mapping[str, float] | Path | None = None
+    seed: int | None = None
+
+    @classmethod
+    def from_posture(cls, hand: Hand, q: FloatArray | Mapping[str, float], hand_pose: Pose) -> GraspCommand:
+        """Decompose a whole posture: posture joints are kept, closing joints are solved anew (METHOD.md section 1).
+
+        Args:
+            hand: the hand. q: all joint angles [rad], by name or in model order, shape (J,).
+            hand_pose: `T_world_palm`.
+
+        Raises:
+            CommandError: wrong length or not finite. UnknownNameError: no such joint.
+        """
+        from .decomposition import command_from_posture
+
+        return command_from_posture(hand, q, hand_pose)

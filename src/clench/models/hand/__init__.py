@@ -1,0 +1,1 @@
+"""Hands, read from URDF or MJCF and understood."""

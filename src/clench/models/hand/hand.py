@@ -1,0 +1,264 @@
+"""The hand: links, joints, coupling, fingers and roles, as read from a model and understood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+
+from clench.base.errors import CommandError, UnknownNameError
+from clench.base.pose import FloatArray, rotation_about
+from clench.models.shapes import CollisionSource, Shape
+
+
+class JointRole(StrEnum):
+    """Name what a joint does in a grasp (METHOD.md section 1)."""
+
+    CLOSING = "closing"
+    """moves its finger in curl planes; its angle is solved for"""
+    POSTURE = "posture"
+    """abduction, opposition and the like; its angle comes from the command"""
+    UPSTREAM = "upstream"
+    """between the model's root and the palm (wrist, arm); never closes, set by the preshape"""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Describe a revolute joint; angles are the model's own [rad].
+
+    Args:
+        name: as in the model.
+        axis: unit axis in the frame of the link it moves, shape (3,).
+        anchor: a point on the axis in the frame of the link it moves [m], shape (3,).
+        lower, upper: limits [rad].
+        reference: the angle [rad] at which `Link.T_parent_link` holds.
+        velocity: limit [rad/s], or None when the model gives none.
+        effort: limit [Nm], or None when the model gives none.
+        role, role_reason: what it does in a grasp, and why that was concluded.
+        direction: +1 when its angle grows while the finger closes, else -1.
+        direction_reason: why.
+        open_value: angle [rad] of the open finger; `open_reason` says why.
+    """
+
+    name: str
+    axis: FloatArray
+    anchor: FloatArray
+    lower: float
+    upper: float
+    reference: float = 0.0
+    velocity: float | None = None
+    effort: float | None = None
+    role: JointRole = JointRole.POSTURE
+    role_reason: str = ""
+    direction: int = 1
+    direction_reason: str = ""
+    open_value: float = 0.0
+    open_reason: str = ""
+
+
+@dataclass(frozen=True)
+class Link:
+    """Describe a rigid link.
+
+    Args:
+        name: as in the model.
+        parent: index of the parent link, -1 for the root.
+        joint: index of the joint that moves it relative to the parent, -1 when fixed.
+        T_parent_link: pose in the parent at the joint's reference angle, shape (4, 4).
+        shapes: shapes in the link's frame for every collision source.
+        mass: [kg], 0 when the model gives none.
+        pad_indentation: how far its pad may be indented [m] (hand file).
+        friction: sliding friction of its surface, or None.
+    """
+
+    name: str
+    parent: int
+    joint: int
+    T_parent_link: FloatArray
+    shapes: Mapping[CollisionSource, tuple[Shape, ...]]
+    mass: float = 0.0
+    pad_indentation: float = 0.0
+    friction: float | None = None
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Tie a follower to its leader: `q_follower = ratio * q_leader + offset`, each inside its limits.
+
+    Args:
+        leader, follower: joint indices.
+        ratio: [-]. offset: [rad].
+        breakaway: the follower goes on when the leader is blocked.
+        reason: the element of the model or hand file that says so.
+    """
+
+    leader: int
+    follower: int
+    ratio: float
+    offset: float
+    breakaway: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Finger:
+    """Describe a finger: a serial chain of revolute joints from the palm to the tip.
+
+    Args:
+        name: short name, e.g. ``"index"``.
+        links: indices of the links that move with the finger's own joints, palm side first, tip last;
+            links fixed to these are included.
+        joints: indices of its own joints, palm side first.
+        is_thumb: whether it opposes the others.
+        tip_link: index of the most distal link that has a shape.
+    """
+
+    name: str
+    links: tuple[int, ...]
+    joints: tuple[int, ...]
+    is_thumb: bool
+    tip_link: int
+
+
+@dataclass(frozen=True)
+class Hand:
+    """Hold a hand that was read from a model file and understood.
+
+    Links are sorted so that parents come first. Palm-frame quantities are at the reference posture.
+
+    Args:
+        name: the model's name. path: the file, or None for a built-in hand.
+        links, joints, couplings, fingers: see their types.
+        palm: index of the palm link.
+        fixed_links: indices of links that no finger moves (palm included) and that objects can hit.
+        allowed_pairs: link index pairs that may overlap (adjacent, excluded, overlapping at reference), sorted.
+        palm_center: centroid of the finger bases in the palm frame [m]; palm_normal: mean closing direction
+            of the tips, unit.
+        default_source: the collision source used unless a command names one.
+        warnings: sentences about what looks wrong.
+        spec_xml: MJCF text that MuJoCo compiles, with `assets`, for simulation.
+    """
+
+    name: str
+    path: Path | None
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    couplings: tuple[Coupling, ...]
+    fingers: tuple[Finger, ...]
+    palm: int
+    fixed_links: tuple[int, ...]
+    allowed_pairs: tuple[tuple[int, int], ...]
+    palm_center: FloatArray
+    palm_normal: FloatArray
+    default_source: CollisionSource = CollisionSource.ENGINE
+    warnings: tuple[str, ...] = ()
+    spec_xml: str = ""
+    assets: Mapping[str, bytes] = field(default_factory=dict)
+
+    @classmethod
+    def load(
+        cls,
+        model: str | Path,
+        *,
+        hand_file: str | Path | None = None,
+        palm: str | None = None,
+        collision_source: CollisionSource | str | None = None,
+    ) -> Hand:
+        """Read a hand by built-in name or from a `.urdf` / `.xml` / `.mjcf` file.
+
+        Args:
+            model: a built-in name (``"robonaut2"``) or a path.
+            hand_file: TOML overrides; by default `<model>.hand.toml` beside the model when it exists.
+            palm: the palm link's name, to pick a hand inside a whole robot.
+            collision_source: which geometry is meant unless a command says otherwise.
+
+        Raises:
+            FileError: missing, unreadable or malformed file. HandError: unsupported or contradictory model.
+            UnknownNameError: no such link, joint or built-in hand.
+        """
+        from .loading import load_hand
+
+        return load_hand(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of all joints, in model order."""
+        return tuple(j.name for j in self.joints)
+
+    def joint_index(self, name: str) -> int:
+        """Return the index of a joint.
+
+        Raises:
+            UnknownNameError: no such joint.
+        """
+        try:
+            return self.joint_names.index(name)
+        except ValueError:
+            raise UnknownNameError("joint", name, f"hand '{self.name}'", self.joint_names) from None
+
+    def finger(self, name: str) -> Finger:
+        """Return a finger by name.
+
+        Raises:
+            UnknownNameError: no such finger.
+        """
+        for finger in self.fingers:
+            if finger.name == name:
+                return finger
+        raise UnknownNameError("finger", name, f"hand '{self.name}'", [f.name for f in self.fingers])
+
+    def link_index(self, name: str) -> int:
+        """Return the index of a link.
+
+        Raises:
+            UnknownNameError: no such link.
+        """
+        names = [link.name for link in self.links]
+        try:
+            return names.index(name)
+        except ValueError:
+            raise UnknownNameError("link", name, f"hand '{self.name}'", names) from None
+
+    def open_angles(self) -> FloatArray:
+        """Return the open posture of all joints [rad], shape (J,); couplings hold."""
+        return self.coupled(np.array([j.open_value for j in self.joints]))
+
+    def coupled(self, q: FloatArray) -> FloatArray:
+        """Return a posture whose followers obey their couplings, each inside its limits, shape (J,) [rad]."""
+        q = np.array(q, dtype=np.float64)
+        for c in self.couplings:
+            j = self.joints[c.follower]
+            q[c.follower] = min(max(c.ratio * q[c.leader] + c.offset, j.lower), j.upper)
+        return q
+
+    def link_poses(self, q: FloatArray) -> FloatArray:
+        """Return `T_palm_link` of every link at a posture, shape (L, 4, 4).
+
+        Args:
+            q: angles of all joints [rad], shape (J,).
+        """
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape != (len(self.joints),):
+            raise CommandError(f"posture: expected {len(self.joints)} angles, got shape {q.shape}.")
+        poses = np.empty((len(self.links), 4, 4))
+        for i, link in enumerate(self.links):
+            local = link.T_parent_link
+            if link.joint >= 0:
+                local = local @ self.joint_motion(link.joint, float(q[link.joint]))
+            poses[i] = poses[link.parent] @ local if link.parent >= 0 else local
+        rotation = poses[self.palm][:3, :3].T
+        T_palm_root = np.eye(4)
+        T_palm_root[:3, :3] = rotation
+        T_palm_root[:3, 3] = -rotation @ poses[self.palm][:3, 3]
+        return T_palm_root @ poses
+
+    def joint_motion(self, joint: int, angle: float) -> FloatArray:
+        """Return the motion of a joint in the frame of the link it moves, shape (4, 4)."""
+        j = self.joints[joint]
+        m = np.eye(4)
+        m[:3, :3] = rotation_about(j.axis, angle - j.reference)
+        m[:3, 3] = j.anchor - m[:3, :3] @ j.anchor
+        return m

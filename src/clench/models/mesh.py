@@ -1,0 +1,43 @@
+"""Triangle meshes as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clench.base.pose import FloatArray, Pose
+
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class TriangleMesh:
+    """Hold vertices [m], shape (V, 3), and triangles, shape (T, 3), counter-clockwise seen from outside."""
+
+    vertices: FloatArray
+    triangles: IntArray
+
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
+        v = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+        t = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+        v.flags.writeable = False
+        t.flags.writeable = False
+        object.__setattr__(self, "vertices", v)
+        object.__setattr__(self, "triangles", t)
+
+    def transformed(self, pose: Pose) -> TriangleMesh:
+        """Return the mesh with its vertices mapped by a pose."""
+        return TriangleMesh(pose.apply(self.vertices), self.triangles)
+
+    @staticmethod
+    def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
+        """Return one mesh that holds the triangles of several."""
+        if not meshes:
+            return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+        starts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+        return TriangleMesh(
+            np.vstack([m.vertices for m in meshes]),
+            np.vstack([m.triangles + start for m, start in zip(meshes, starts, strict=False)]),
+        )

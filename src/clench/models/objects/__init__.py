@@ -1,0 +1,1 @@
+"""Objects, read from meshes or made from shapes, and checked."""

@@ -1,0 +1,199 @@
+"""The solution: what was computed, judged and chosen, as immutable values (schema `clench.solution/1`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from clench.base.pose import FloatArray, Pose
+
+
+class SolutionStatus(StrEnum):
+    """Name the answers of a solve."""
+
+    GRASP = "grasp"
+    """every finger asked for touches, or a thumb and at least one finger that opposes it"""
+    PARTIAL = "partial"
+    """some fingers touch"""
+    NO_CONTACT = "no_contact"
+    """no finger touches"""
+    BLOCKED = "blocked"
+    """palm, a fixed link or every finger overlaps the object before anything moves"""
+
+
+class FingerStatus(StrEnum):
+    """Name how a finger ended."""
+
+    TOUCH = "touch"
+    LIMIT = "limit"
+    """every closing joint reached its limit without touching"""
+    BLOCKED = "blocked"
+    """a link of the finger overlaps the object before anything moves"""
+    NO_MOTION = "no_motion"
+    """no closing joint can move"""
+
+
+class ContactKind(StrEnum):
+    """Name the touching features, link side first."""
+
+    SIDE = "side"
+    """side of the link on a vertex of the object (the tangent case of the patent)"""
+    TIP = "tip"
+    """rounded end of the link's outline on the object"""
+    EDGE = "edge"
+    """corner of the link's outline on the object"""
+    FACE = "face"
+    VERTEX = "vertex"
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Describe where a link touches; positions and normals in the world frame.
+
+    Args:
+        finger, link: names. body: the touched body of the object.
+        stops_joint: the joint whose motion this contact stopped, or None.
+        plane: index of the curl plane, offset: its place along the family's y axis [m]; None at full width.
+        kind: see `ContactKind`. passed: a later motion opened it by more than 1 µm.
+        position: [m], shape (3,). normal: unit, out of the object, shape (3,).
+        gap: distance left at the final posture [m].
+        curve_angle: tangent angle of the object's perimeter curve [rad]; link_angle: sum of the joint angles [rad].
+    """
+
+    finger: str
+    link: str
+    body: str
+    stops_joint: str | None
+    plane: int | None
+    offset: float | None
+    kind: ContactKind
+    passed: bool
+    position: FloatArray
+    normal: FloatArray
+    gap: float
+    curve_angle: float | None
+    link_angle: float | None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Hold one alternative set of a finger: contacts and joint angles on one plane, or over the full width.
+
+    Args:
+        plane: index of the curl plane, None for the full width; offset: its place [m].
+        order: closing order. posture: index of the posture alternative (0 = as commanded).
+        joint_angles: of the finger's joints [rad], by name.
+        status, reason: how it ended.
+        feasible: whether it and its path penetrate nothing; None when not checked.
+        penetration: largest depth over its final posture [m]; None when not checked.
+        scores: criterion name to value. contacts: in stage order.
+    """
+
+    plane: int | None
+    offset: float | None
+    order: str
+    posture: int
+    joint_angles: Mapping[str, float]
+    status: FingerStatus
+    reason: str
+    feasible: bool | None
+    penetration: float | None
+    scores: Mapping[str, float]
+    contacts: tuple[Contact, ...]
+
+
+@dataclass(frozen=True)
+class FingerResult:
+    """Hold a finger's alternatives and the chosen one."""
+
+    name: str
+    status: FingerStatus
+    reason: str
+    chosen: int
+    candidates: tuple[Candidate, ...]
+
+
+@dataclass(frozen=True)
+class GraspSolution:
+    """Hold the answer of `clench.solve`; `to_dict` gives the documented JSON form.
+
+    Args:
+        hand, object: names. hand_model, object_model: what to load to execute it again (path or built-in name).
+        status, reason: the answer; `reason` has at least ``"code"`` and ``"text"``.
+        hand_pose: `T_world_palm`; object_pose: `T_world_object`.
+        decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
+        joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
+        max_penetration: over the whole width and all links [m], None when not computed.
+    """
+
+    clench_version: str
+    hand: str
+    object: str
+    hand_model: str
+    object_model: str
+    geometry_hash: str
+    seed: int | None
+    status: SolutionStatus
+    reason: Mapping[str, Any]
+    hand_pose: Pose
+    object_pose: Pose
+    decomposition: Mapping[str, Mapping[str, float]]
+    joint_angles: Mapping[str, float]
+    open_angles: Mapping[str, float]
+    certified: bool
+    collision_source: str
+    object_collision_source: str
+    max_penetration: float | None
+    fingers: Mapping[str, FingerResult]
+    contacts: tuple[Contact, ...]
+    quality: Mapping[str, Any] | None = None
+    squeeze: Mapping[str, Any] | None = None
+    pregrasp: Mapping[str, float] | None = None
+    timing: Mapping[str, float] = field(default_factory=dict)
+
+    def violations(self) -> tuple[str, ...]:
+        """Return a sentence for everything that makes the solution unfit to execute."""
+        from .judging import violations
+
+        return violations(self)
+
+    def is_valid(self) -> bool:
+        """Return whether there is no violation and the status is `grasp` or `partial`."""
+        return self.status in (SolutionStatus.GRASP, SolutionStatus.PARTIAL) and not self.violations()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the documented JSON form, schema `clench.solution/1`."""
+        from .documents import solution_to_dict
+
+        return solution_to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: Any, source: str = "solution") -> GraspSolution:
+        """Read the documented JSON form; `source` names it in messages.
+
+        Raises:
+            FileError: unknown schema, missing or malformed keys.
+        """
+        from .documents import solution_from_dict
+
+        return solution_from_dict(data, source)
+
+    def save(self, path: str | Path) -> None:
+        """Write the JSON form, atomically."""
+        from .documents import save_solution
+
+        save_solution(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> GraspSolution:
+        """Read a file written by `save`.
+
+        Raises:
+            FileError: missing, not JSON, or not a solution.
+        """
+        from .documents import load_solution
+
+        return load_solution(path)
