@@ -1,1 +1,127 @@
-"""Close a robot hand around a known object, in closed form, and carry it out."""
+"""Close a robot hand around a known object, in closed form, and carry it out.
+
+Names are imported when first used, so `import clench` stays quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from clench.base.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
+    from clench.base.pose import Pose
+    from clench.execution.executing import Actuator, execute
+    from clench.execution.report import ExecutionReport
+    from clench.execution.simulation import SimulatedHand
+    from clench.execution.trajectory import Trajectory, plan_trajectory
+    from clench.grasp.approach import approach_poses
+    from clench.grasp.criteria import Criterion
+    from clench.models.command import ClosingOrder, GraspCommand
+    from clench.models.command_file import load_command
+    from clench.models.hand.hand import Hand, JointRole
+    from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+    from clench.models.shapes import CollisionSource, ShapeKind
+    from clench.solve.controller import solve
+    from clench.solve.record import Record
+    from clench.solve.solution import (
+        Candidate,
+        Contact,
+        ContactKind,
+        FingerResult,
+        FingerStatus,
+        GraspSolution,
+        SolutionStatus,
+    )
+
+__version__ = "0.1.0"
+
+# One documented path per name: the module that defines it. A test holds this equal to `__all__`.
+_HOMES = {
+    "Actuator": "clench.execution.executing",
+    "Body": "clench.models.objects.grasp_object",
+    "BodyRole": "clench.models.objects.grasp_object",
+    "Candidate": "clench.solve.solution",
+    "ClenchError": "clench.base.errors",
+    "ClosingOrder": "clench.models.command",
+    "CollisionSource": "clench.models.shapes",
+    "CommandError": "clench.base.errors",
+    "Contact": "clench.solve.solution",
+    "ContactKind": "clench.solve.solution",
+    "Criterion": "clench.grasp.criteria",
+    "ExecutionReport": "clench.execution.report",
+    "FileError": "clench.base.errors",
+    "FingerResult": "clench.solve.solution",
+    "FingerStatus": "clench.solve.solution",
+    "GraspCommand": "clench.models.command",
+    "GraspObject": "clench.models.objects.grasp_object",
+    "GraspSolution": "clench.solve.solution",
+    "Hand": "clench.models.hand.hand",
+    "HandError": "clench.base.errors",
+    "JointRole": "clench.models.hand.hand",
+    "ObjectError": "clench.base.errors",
+    "Pose": "clench.base.pose",
+    "Record": "clench.solve.record",
+    "ShapeKind": "clench.models.shapes",
+    "SimulatedHand": "clench.execution.simulation",
+    "SolutionStatus": "clench.solve.solution",
+    "Trajectory": "clench.execution.trajectory",
+    "UnknownNameError": "clench.base.errors",
+    "approach_poses": "clench.grasp.approach",
+    "execute": "clench.execution.executing",
+    "load_command": "clench.models.command_file",
+    "plan_trajectory": "clench.execution.trajectory",
+}
+
+__all__ = [
+    "Actuator",
+    "Body",
+    "BodyRole",
+    "Candidate",
+    "ClenchError",
+    "ClosingOrder",
+    "CollisionSource",
+    "CommandError",
+    "Contact",
+    "ContactKind",
+    "Criterion",
+    "ExecutionReport",
+    "FileError",
+    "FingerResult",
+    "FingerStatus",
+    "GraspCommand",
+    "GraspObject",
+    "GraspSolution",
+    "Hand",
+    "HandError",
+    "JointRole",
+    "ObjectError",
+    "Pose",
+    "Record",
+    "ShapeKind",
+    "SimulatedHand",
+    "SolutionStatus",
+    "Trajectory",
+    "UnknownNameError",
+    "__version__",
+    "approach_poses",
+    "execute",
+    "load_command",
+    "plan_trajectory",
+    "solve",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "solve":
+        # The layer of this name is a package, which importing any of its modules binds here; it is callable.
+        return importlib.import_module("clench.solve")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'clench' has no attribute {name!r}; it has: {', '.join(__all__)}")
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

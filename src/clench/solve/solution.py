@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from clench.base.pose import FloatArray, Pose
 
@@ -49,7 +51,7 @@ class ContactKind(StrEnum):
     VERTEX = "vertex"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contact:
     """Describe where a link touches; positions and normals in the world frame.
 
@@ -76,6 +78,16 @@ class Contact:
     gap: float
     curve_angle: float | None
     link_angle: float | None
+
+    def _key(self) -> tuple[object, ...]:
+        values = (getattr(self, f.name) for f in fields(self))
+        return tuple(tuple(v.tolist()) if isinstance(v, np.ndarray) else v for v in values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Contact) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
 
 
 @dataclass(frozen=True)
@@ -127,6 +139,7 @@ class GraspSolution:
         decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
         joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
         max_penetration: over the whole width and all links [m], None when not computed.
+        joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
 
     clench_version: str
@@ -153,6 +166,7 @@ class GraspSolution:
     squeeze: Mapping[str, Any] | None = None
     pregrasp: Mapping[str, float] | None = None
     timing: Mapping[str, float] = field(default_factory=dict)
+    joint_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""

@@ -1,0 +1,93 @@
+"""Read and write JSON files: complete or not there, and never with NaN."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from .errors import ClenchError, FileError
+
+
+def non_finite_path(value: Any, key: str = "") -> str | None:
+    """Return the path of the first number that is NaN or infinite, or None."""
+    if isinstance(value, float):
+        return None if math.isfinite(value) else key
+    if isinstance(value, dict):
+        found = (non_finite_path(v, f"{key}.{k}" if key else str(k)) for k, v in value.items())
+    elif isinstance(value, list):
+        found = (non_finite_path(v, f"{key}[{i}]") for i, v in enumerate(value))
+    else:
+        return None
+    return next((f for f in found if f is not None), None)
+
+
+def encode_document(document: dict[str, Any], name: str) -> bytes:
+    """Return any document of plain values as one line of UTF-8 JSON, refusing NaN and infinity.
+
+    Raises:
+        ClenchError: a number is not finite; the message names its key.
+    """
+    try:
+        return json.dumps(document, allow_nan=False, ensure_ascii=False).encode()
+    except ValueError:
+        where = f"{name}.{non_finite_path(document)}"
+        raise ClenchError(f"{where}: is not a finite number and cannot be written.") from None
+
+
+def read_json(path: str | Path) -> Any:
+    """Read a JSON file.
+
+    Raises:
+        FileError: missing, unreadable or not JSON.
+    """
+    try:
+        return msgspec.json.decode(Path(path).read_bytes())
+    except FileNotFoundError:
+        raise FileError(path, "no such file.") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise FileError(path, f"not JSON ({error}).") from None
+
+
+def write_json(path: str | Path, document: dict[str, Any], name: str) -> None:
+    """Write a document, indented, atomically.
+
+    Raises:
+        ClenchError: a number is not finite. FileError: the file cannot be written.
+    """
+    write_atomically(path, msgspec.json.format(encode_document(document, name), indent=2) + b"\n")
+
+
+def write_atomically(path: str | Path, content: bytes) -> None:
+    """Write a file through a temporary one beside it, so that readers see the old or the new, never a part.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    target = Path(path)
+    temporary: str | None = None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o666 & ~_umask())
+        Path(temporary).replace(target)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,346 @@
+"""Write and read solutions as documents of schema `clench.solution/1`.
+
+Keys are only ever added to the schema, so reading ignores keys it does not know and is strict about the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import msgspec
+import numpy as np
+
+from clench.base.errors import ClenchError, FileError
+from clench.base.json_files import encode_document, non_finite_path, read_json, write_json
+from clench.base.pose import Pose
+
+from .solution import (
+    Candidate,
+    Contact,
+    ContactKind,
+    FingerResult,
+    FingerStatus,
+    GraspSolution,
+    SolutionStatus,
+)
+
+SCHEMA = "clench.solution/1"
+
+_T = TypeVar("_T")
+_Vector = tuple[float, float, float]
+_Map = dict[str, Any]  # its values are converted one by one, so that messages name the key
+
+
+class _ContactForm(msgspec.Struct):
+    finger: str
+    link: str
+    stops_joint: str | None
+    plane: int | None
+    offset: float | None
+    kind: ContactKind
+    passed: bool
+    position: _Vector
+    normal: _Vector
+    gap: float
+    curve_angle: float | None
+    link_angle: float | None
+    body: str = ""
+
+
+class _CandidateForm(msgspec.Struct):
+    plane: int | None
+    offset: float | None
+    order: str
+    joint_angles: _Map
+    feasible: bool | None
+    penetration: float | None
+    scores: _Map
+    contacts: list[Any]
+    posture: int = 0
+    status: FingerStatus = FingerStatus.TOUCH
+    reason: str = ""
+
+
+class _FingerForm(msgspec.Struct):
+    status: FingerStatus
+    reason: str
+    chosen: int
+    candidates: list[Any]
+
+
+class _SolutionForm(msgspec.Struct):
+    clench_version: str
+    hand: str
+    object: str
+    geometry_hash: str
+    seed: int | None
+    status: SolutionStatus
+    reason: dict[str, Any]
+    hand_pose: Any
+    object_pose: Any
+    decomposition: _Map
+    joint_angles: _Map
+    certified: bool
+    collision_source: str
+    max_penetration: float | None
+    fingers: _Map
+    contacts: list[Any]
+    quality: dict[str, Any] | None
+    squeeze: dict[str, Any] | None
+    pregrasp: _Map | None
+    timing: _Map
+    hand_model: str = ""
+    object_model: str = ""
+    open_angles: _Map = {}
+    object_collision_source: str = "raw"
+    joint_limits: _Map = {}
+
+
+def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
+    """Return the documented JSON form; every number is a plain int or float."""
+    s = solution
+    return {
+        "schema": SCHEMA,
+        "clench_version": s.clench_version,
+        "hand": s.hand,
+        "object": s.object,
+        "hand_model": s.hand_model,
+        "object_model": s.object_model,
+        "geometry_hash": s.geometry_hash,
+        "seed": None if s.seed is None else int(s.seed),
+        "status": s.status.value,
+        "reason": _plain(s.reason),
+        "hand_pose": s.hand_pose.to_dict(),
+        "object_pose": s.object_pose.to_dict(),
+        "decomposition": {part: _numbers(angles) for part, angles in s.decomposition.items()},
+        "joint_angles": _numbers(s.joint_angles),
+        "open_angles": _numbers(s.open_angles),
+        "joint_limits": {name: [float(low), float(high)] for name, (low, high) in s.joint_limits.items()},
+        "certified": bool(s.certified),
+        "collision_source": str(s.collision_source),
+        "object_collision_source": str(s.object_collision_source),
+        "max_penetration": _number(s.max_penetration),
+        "fingers": {name: _finger_to_dict(finger) for name, finger in s.fingers.items()},
+        "contacts": [_contact_to_dict(c) for c in s.contacts],
+        "quality": _plain(s.quality),
+        "squeeze": _plain(s.squeeze),
+        "pregrasp": None if s.pregrasp is None else _numbers(s.pregrasp),
+        "timing": _numbers(s.timing),
+    }
+
+
+def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
+    """Read the documented JSON form; `source` names it in messages.
+
+    Raises:
+        FileError: another schema, or missing, malformed, contradictory or non-finite values, with the key's path.
+    """
+    if not isinstance(data, dict):
+        raise FileError(source, f"expected an object of schema '{SCHEMA}', got {type(data).__name__}.")
+    if data.get("schema") != SCHEMA:
+        raise FileError(source, f"schema: expected '{SCHEMA}', got {data.get('schema')!r}.")
+    bad = non_finite_path(data)
+    if bad is not None:
+        raise FileError(source, f"{bad}: expected a finite number.")
+    form = _convert(data, _SolutionForm, source, "")
+
+    def angles(value: Mapping[str, Any], key: str) -> dict[str, float]:
+        return {name: _convert(v, float, source, f"{key}.{name}") for name, v in value.items()}
+
+    for key in ("code", "text"):
+        if key not in form.reason:
+            raise FileError(source, f"reason.{key}: missing.")
+    return GraspSolution(
+        clench_version=form.clench_version,
+        hand=form.hand,
+        object=form.object,
+        hand_model=form.hand_model,
+        object_model=form.object_model,
+        geometry_hash=form.geometry_hash,
+        seed=form.seed,
+        status=form.status,
+        reason=form.reason,
+        hand_pose=_read_pose(form.hand_pose, source, "hand_pose"),
+        object_pose=_read_pose(form.object_pose, source, "object_pose"),
+        decomposition={
+            part: angles(_convert(v, _Map, source, f"decomposition.{part}"), f"decomposition.{part}")
+            for part, v in form.decomposition.items()
+        },
+        joint_angles=angles(form.joint_angles, "joint_angles"),
+        open_angles=angles(form.open_angles, "open_angles"),
+        certified=form.certified,
+        collision_source=form.collision_source,
+        object_collision_source=form.object_collision_source,
+        max_penetration=form.max_penetration,
+        fingers={name: _read_finger(name, v, source) for name, v in form.fingers.items()},
+        contacts=_read_contacts(form.contacts, source, "contacts"),
+        quality=form.quality,
+        squeeze=form.squeeze,
+        pregrasp=None if form.pregrasp is None else angles(form.pregrasp, "pregrasp"),
+        timing=angles(form.timing, "timing"),
+        joint_limits={
+            name: _convert(v, tuple[float, float], source, f"joint_limits.{name}")
+            for name, v in form.joint_limits.items()
+        },
+    )
+
+
+def solution_to_json(solution: GraspSolution) -> bytes:
+    """Return the document as one line of UTF-8 JSON.
+
+    Raises:
+        ClenchError: a number is not finite; the message names its key.
+    """
+    return encode_document(solution_to_dict(solution), "solution")
+
+
+def save_solution(solution: GraspSolution, path: str | Path) -> None:
+    """Write the document, indented; the file is complete or not there.
+
+    Raises:
+        ClenchError: a number is not finite. FileError: the file cannot be written.
+    """
+    write_json(path, solution_to_dict(solution), "solution")
+
+
+def load_solution(path: str | Path) -> GraspSolution:
+    """Read a file written by `save_solution`.
+
+    Raises:
+        FileError: missing, not JSON, or not a solution.
+    """
+    return solution_from_dict(read_json(path), str(path))
+
+
+def _contact_to_dict(c: Contact) -> dict[str, Any]:
+    return {
+        "finger": c.finger,
+        "link": c.link,
+        "body": c.body,
+        "stops_joint": c.stops_joint,
+        "plane": None if c.plane is None else int(c.plane),
+        "offset": _number(c.offset),
+        "kind": c.kind.value,
+        "passed": bool(c.passed),
+        "position": np.asarray(c.position, dtype=np.float64).tolist(),
+        "normal": np.asarray(c.normal, dtype=np.float64).tolist(),
+        "gap": float(c.gap),
+        "curve_angle": _number(c.curve_angle),
+        "link_angle": _number(c.link_angle),
+    }
+
+
+def _candidate_to_dict(c: Candidate) -> dict[str, Any]:
+    return {
+        "plane": None if c.plane is None else int(c.plane),
+        "offset": _number(c.offset),
+        "order": str(c.order),
+        "posture": int(c.posture),
+        "joint_angles": _numbers(c.joint_angles),
+        "status": c.status.value,
+        "reason": c.reason,
+        "feasible": None if c.feasible is None else bool(c.feasible),
+        "penetration": _number(c.penetration),
+        "scores": _numbers(c.scores),
+        "contacts": [_contact_to_dict(contact) for contact in c.contacts],
+    }
+
+
+def _finger_to_dict(f: FingerResult) -> dict[str, Any]:
+    return {
+        "status": f.status.value,
+        "reason": f.reason,
+        "chosen": int(f.chosen),
+        "candidates": [_candidate_to_dict(c) for c in f.candidates],
+    }
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _numbers(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: float(v) for name, v in values.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Return a free-form value (reason, quality) with arrays, tuples and NumPy numbers as JSON knows them."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Pose):
+        return value.to_dict()
+    return value
+
+
+def _read_finger(name: str, data: Any, source: str) -> FingerResult:
+    key = f"fingers.{name}"
+    form = _convert(data, _FingerForm, source, key)
+    if form.candidates and not 0 <= form.chosen < len(form.candidates):
+        last = len(form.candidates) - 1
+        raise FileError(source, f"{key}.chosen: expected the index of a candidate, 0 to {last}, got {form.chosen}.")
+    candidates = [_read_candidate(c, source, f"{key}.candidates[{i}]") for i, c in enumerate(form.candidates)]
+    return FingerResult(name, form.status, form.reason, form.chosen, tuple(candidates))
+
+
+def _read_candidate(data: Any, source: str, key: str) -> Candidate:
+    form = _convert(data, _CandidateForm, source, key)
+
+    def numbers(values: Mapping[str, Any], part: str) -> dict[str, float]:
+        return {name: _convert(v, float, source, f"{key}.{part}.{name}") for name, v in values.items()}
+
+    return Candidate(
+        plane=form.plane,
+        offset=form.offset,
+        order=form.order,
+        posture=form.posture,
+        joint_angles=numbers(form.joint_angles, "joint_angles"),
+        status=form.status,
+        reason=form.reason,
+        feasible=form.feasible,
+        penetration=form.penetration,
+        scores=numbers(form.scores, "scores"),
+        contacts=_read_contacts(form.contacts, source, f"{key}.contacts"),
+    )
+
+
+def _read_contacts(data: list[Any], source: str, key: str) -> tuple[Contact, ...]:
+    forms = [_convert(c, _ContactForm, source, f"{key}[{i}]") for i, c in enumerate(data)]
+    return tuple(
+        Contact(**{**msgspec.structs.asdict(f), "position": np.array(f.position), "normal": np.array(f.normal)})
+        for f in forms
+    )
+
+
+def _read_pose(data: Any, source: str, key: str) -> Pose:
+    try:
+        pose = Pose.from_dict(data, key)
+    except ClenchError as error:
+        raise FileError(source, str(error)) from None
+    written = np.array(data.get("wxyz", pose.wxyz), dtype=np.float64)
+    if np.allclose(written, pose.wxyz, rtol=0.0, atol=4e-16):
+        # Normalising a unit quaternion again may change its last bit: keep what was written.
+        exact = np.concatenate([written, pose.position])
+        exact.flags.writeable = False
+        object.__setattr__(pose, "wxyz_xyz", exact)
+    return pose
+
+
+def _convert(value: Any, kind: type[_T], source: str, key: str) -> _T:
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        _refuse(str(error), source, key)
+
+
+def _refuse(message: str, source: str, key: str) -> NoReturn:
+    """Turn "Expected `float`, got `str` - at `$.gap`" into a sentence that starts with the whole key."""
+    problem, _, place = message.partition(" - at `$")
+    path = (key + place.rstrip("`")).lstrip(".")
+    problem = problem[:1].lower() + problem[1:].replace("`", "'")
+    raise FileError(source, f"{path}: {problem}." if path else f"{problem}.")

@@ -1,0 +1,237 @@
+"""The record: every solve, all its sets and its choice, in one SQLite file."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from clench.base.errors import FileError, UnknownNameError
+
+from .documents import solution_from_dict, solution_to_json
+from .solution import FingerStatus, GraspSolution, SolutionStatus
+
+#: Marks a SQLite file as a record ("clch").
+APPLICATION_ID = 0x636C6368
+#: Version of the tables below; raised when they change, with a step that carries old files over.
+SCHEMA_VERSION = 1
+
+_TABLES = """
+CREATE TABLE solves (
+    id INTEGER PRIMARY KEY,
+    time TEXT NOT NULL,
+    hand TEXT NOT NULL,
+    object TEXT NOT NULL,
+    status TEXT NOT NULL,
+    seed INTEGER,
+    geometry_hash TEXT NOT NULL,
+    touching_fingers INTEGER NOT NULL,
+    document BLOB NOT NULL
+);
+CREATE INDEX solves_by_names ON solves (hand, object, status);
+CREATE INDEX solves_by_geometry ON solves (geometry_hash, seed);
+"""
+_INSERT = """
+INSERT INTO solves (time, hand, object, status, seed, geometry_hash, touching_fingers, document)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?)
+"""
+_COLUMNS = ("id", "time", "hand", "object", "status", "seed", "geometry_hash", "touching_fingers")
+_Row = tuple[str, str, str, str, int | None, str, int, bytes]
+
+
+@dataclass(frozen=True)
+class RecordEntry:
+    """Describe one recorded solve without its document.
+
+    Args:
+        id: to read it with. time: when it was appended (UTC, ISO 8601).
+        hand, object, status, seed, geometry_hash: as in the solution.
+        touching_fingers: how many fingers touch.
+    """
+
+    id: int
+    time: str
+    hand: str
+    object: str
+    status: SolutionStatus
+    seed: int | None
+    geometry_hash: str
+    touching_fingers: int
+
+
+class Record:
+    """Append solutions to a SQLite file and read them back; a context manager.
+
+    Writes are atomic, and readers in other processes never wait for a writer (write-ahead log).
+
+    Args:
+        path: the file; made when missing.
+
+    Raises:
+        FileError: the file cannot be opened, is no record, is damaged, or was written by a newer version.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not self.path.parent.is_dir():
+            raise FileError(path, f"cannot be opened (no folder '{self.path.parent}').")
+        with self._clear_errors():
+            self._connection = sqlite3.connect(self.path, timeout=30.0, isolation_level=None)
+            try:
+                self._prepare()
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def append(self, solution: GraspSolution) -> int:
+        """Add one solution and return its id."""
+        return self.extend([solution])[0]
+
+    def extend(self, solutions: Iterable[GraspSolution]) -> list[int]:
+        """Add many solutions in one transaction, all or none, and return their ids in order.
+
+        Raises:
+            ClenchError: a solution has a number that is not finite. FileError: the file cannot be written.
+        """
+        time = datetime.now(UTC).isoformat(timespec="microseconds")
+        with self._clear_errors(), self._transaction() as cursor:
+            ids = []
+            for solution in solutions:
+                cursor.execute(_INSERT, _row(solution, time))
+                ids.append(cursor.lastrowid or 0)
+            return ids
+
+    def read(self, entry_id: int) -> GraspSolution:
+        """Return a recorded solution, equal to the one that was appended.
+
+        Raises:
+            UnknownNameError: no such id. FileError: the file is damaged.
+        """
+        with self._clear_errors():
+            row = self._connection.execute("SELECT document FROM solves WHERE id = ?", (entry_id,)).fetchone()
+            if row is None:
+                known = self._connection.execute("SELECT min(id), max(id) FROM solves").fetchone()
+                listed = [] if known[0] is None else [f"{known[0]} to {known[1]}"]
+                raise UnknownNameError("solve", str(entry_id), f"record '{self.path}'", listed)
+        source = f"{self.path}, solve {entry_id}"
+        try:
+            data = msgspec.json.decode(row[0])
+        except msgspec.DecodeError as error:
+            raise FileError(source, f"the document is damaged ({error}).") from None
+        return solution_from_dict(data, source)
+
+    def find(
+        self,
+        *,
+        hand: str | None = None,
+        object: str | None = None,
+        status: SolutionStatus | str | None = None,
+        geometry_hash: str | None = None,
+        seed: int | None = None,
+        limit: int | None = None,
+    ) -> list[RecordEntry]:
+        """Return the entries that match everything given, newest first.
+
+        Raises:
+            UnknownNameError: no such status.
+        """
+        if status is not None and status not in list(SolutionStatus):
+            raise UnknownNameError("status", str(status), "solutions", [s.value for s in SolutionStatus])
+        wanted = {"hand": hand, "object": object, "status": status, "geometry_hash": geometry_hash, "seed": seed}
+        given = {column: value for column, value in wanted.items() if value is not None}
+        condition = " AND ".join(f"{column} = ?" for column in given) or "1"
+        query = f"SELECT {', '.join(_COLUMNS)} FROM solves WHERE {condition} ORDER BY id DESC LIMIT ?"
+        values = [*(str(v) if isinstance(v, str) else v for v in given.values()), -1 if limit is None else limit]
+        with self._clear_errors():
+            rows = self._connection.execute(query, values).fetchall()
+        return [
+            RecordEntry(**{**dict(zip(_COLUMNS, row, strict=True)), "status": SolutionStatus(row[4])}) for row in rows
+        ]
+
+    def __len__(self) -> int:
+        with self._clear_errors():
+            return int(self._connection.execute("SELECT count(*) FROM solves").fetchone()[0])
+
+    def close(self) -> None:
+        """Close the file; the record cannot be used any more."""
+        self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _prepare(self) -> None:
+        """Make the tables in a new file; refuse a file that is not ours."""
+        c = self._connection
+        (identity,) = c.execute("PRAGMA application_id").fetchone()
+        (version,) = c.execute("PRAGMA user_version").fetchone()
+        (objects,) = c.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if identity == 0 and objects == 0:
+            c.execute("PRAGMA journal_mode = WAL")
+            with self._transaction() as cursor:
+                # Another process may have made the tables since; then there is nothing left to do.
+                if cursor.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0:
+                    for statement in filter(str.strip, _TABLES.split(";")):
+                        cursor.execute(statement)
+                    cursor.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+                    cursor.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        elif identity != APPLICATION_ID:
+            raise FileError(self.path, "a SQLite file of another program, not a record of solves.")
+        elif version > SCHEMA_VERSION:
+            raise FileError(self.path, f"a record of version {version}; this program reads up to {SCHEMA_VERSION}.")
+        c.execute("PRAGMA journal_mode = WAL")
+        c.execute("PRAGMA synchronous = NORMAL")
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Cursor]:
+        cursor = self._connection.cursor()
+        cursor.execute("BEGIN IMMEDIATE")
+        try:
+            yield cursor
+            cursor.execute("COMMIT")
+        except BaseException:
+            if self._connection.in_transaction:
+                cursor.execute("ROLLBACK")
+            raise
+
+    @contextmanager
+    def _clear_errors(self) -> Iterator[None]:
+        """Turn the database's errors into one sentence that names the file."""
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            text = str(error)
+            if "not a database" in text:
+                problem = "not a record of solves: the file is no SQLite database."
+            elif "malformed" in text or "corrupt" in text or "disk image" in text:
+                problem = "the record is damaged and cannot be read."
+            elif "closed" in text:
+                problem = "the record is closed."
+            else:
+                problem = f"the record cannot be used ({text})."
+            raise FileError(self.path, problem) from None
+
+
+def _row(solution: GraspSolution, time: str) -> _Row:
+    touching = sum(f.status is FingerStatus.TOUCH for f in solution.fingers.values())
+    return (
+        time,
+        solution.hand,
+        solution.object,
+        solution.status.value,
+        solution.seed,
+        solution.geometry_hash,
+        touching,
+        solution_to_json(solution),
+    )

@@ -1,0 +1,199 @@
+"""The shape of the software: layers, sizes and imports, read from the source."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "clench"
+LAYERS = ["base", "kernels", "models", "grasp", "solve", "execution", "apps"]
+HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "tyro", "rich", "PIL", "rclpy", "viser"}
+VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
+FILES = sorted(PACKAGE.rglob("*.py"))
+MAX_FILE_LINES = 400
+MAX_BODY_LINES = 60
+
+in_every_file = pytest.mark.parametrize("path", FILES, ids=[str(f.relative_to(PACKAGE)) for f in FILES])
+
+
+def module_name(path: Path) -> str:
+    parts = list(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported_modules(tree: ast.AST, path: Path) -> Iterator[tuple[int, str, tuple[str, ...]]]:
+    """Give line, absolute module and names of every import, wherever it stands."""
+    package = module_name(path).split(".")
+    if path.name != "__init__.py":
+        package = package[:-1]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name, ()
+        elif isinstance(node, ast.ImportFrom):
+            names = tuple(alias.name for alias in node.names)
+            above = package[: len(package) - node.level + 1] if node.level else []
+            yield node.lineno, ".".join([*above, *([node.module] if node.module else [])]), names
+
+
+def upward_imports(source: str, path: Path) -> list[str]:
+    """Name the imports that do not point to the same layer or one below."""
+    parts = module_name(path).split(".")
+    if len(parts) < 2:
+        return []
+    own = LAYERS.index(parts[1])
+    wrong = []
+    for line, module, names in imported_modules(ast.parse(source), path):
+        if module.split(".")[0] != "clench":
+            continue
+        if module == "clench":
+            targets = [n for n in names if n != "__version__"] or ([] if names else ["clench itself"])
+        else:
+            targets = [module.split(".")[1]]
+        wrong += [f"{path.name}:{line} imports {t}" for t in targets if t not in LAYERS or LAYERS.index(t) > own]
+    return wrong
+
+
+def module_level_imports(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Give imports that run when the module is loaded: not in functions, not for type checkers only."""
+    pending: list[ast.stmt] = list(tree.body)
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.lineno, ("." * node.level) + (node.module or "")
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            pending += node.orelse
+        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            pending += [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt)]
+
+
+def heavy_imports(source: str, path: Path) -> list[str]:
+    parts = module_name(path).split(".")
+    in_kernels = parts[1:2] == ["kernels"]
+    allowed = {"numba"} if in_kernels else set()
+    wrong = []
+    for line, module in module_level_imports(ast.parse(source)):
+        root = module.split(".")[0]
+        if (root in HEAVY and root not in allowed) or (module.startswith("clench.kernels") and not in_kernels):
+            wrong.append(f"{path.name}:{line} imports {module}")
+    return wrong
+
+
+def long_bodies(source: str, path: Path) -> list[str]:
+    wrong = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        body = node.body[1:] if ast.get_docstring(node, clean=False) is not None else node.body
+        lines = body[-1].end_lineno - body[0].lineno + 1 if body else 0
+        if lines > MAX_BODY_LINES:
+            wrong.append(f"{path.name}:{node.lineno} {node.name} has {lines} lines")
+    return wrong
+
+
+@in_every_file
+def test_imports_point_down(path: Path) -> None:
+    assert upward_imports(path.read_text(), path) == []
+
+
+@in_every_file
+def test_heavy_packages_are_imported_where_used(path: Path) -> None:
+    assert heavy_imports(path.read_text(), path) == []
+
+
+@in_every_file
+def test_sizes(path: Path) -> None:
+    source = path.read_text()
+    assert len(source.splitlines()) <= MAX_FILE_LINES
+    assert long_bodies(source, path) == []
+
+
+@in_every_file
+def test_names_say_something(path: Path) -> None:
+    assert not VAGUE & set(module_name(path).split("."))
+
+
+def test_every_folder_is_a_layer() -> None:
+    folders = {p.name for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"}
+    assert folders <= set(LAYERS)
+    assert {p.name for p in PACKAGE.glob("*.py")} == {"__init__.py"}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from clench.solve import solution",
+        "def f():\n    from clench.solve.solution import GraspSolution",
+        "from ..solve.solution import GraspSolution",
+        "import clench.apps.cli.main",
+        "import clench",
+        "from clench import solve",
+        "from .. import solve",
+    ],
+)
+def test_the_layer_check_sees_an_upward_import(statement: str) -> None:
+    assert upward_imports(statement, PACKAGE / "grasp" / "x.py") != []
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from clench.base.pose import Pose",
+        "from ..models.mesh import TriangleMesh",
+        "from .planes import x",
+        "from clench import __version__",
+        "import numpy",
+    ],
+)
+def test_the_layer_check_lets_downward_imports_pass(statement: str) -> None:
+    assert upward_imports(statement, PACKAGE / "grasp" / "x.py") == []
+
+
+def test_the_other_checks_see_what_they_look_for() -> None:
+    path = PACKAGE / "grasp" / "x.py"
+    assert heavy_imports("import numba", path)
+    assert heavy_imports("if True:\n    import mujoco.viewer", path)
+    assert heavy_imports("class A:\n    from matplotlib import pyplot", path)
+    assert heavy_imports("from clench.kernels.contact import first", path)
+    assert not heavy_imports("import numba", PACKAGE / "kernels" / "x.py")
+    assert not heavy_imports("def f():\n    import mujoco", path)
+    assert not heavy_imports("if TYPE_CHECKING:\n    import mujoco", path)
+    long = "def f():\n    '''Doc.'''\n" + "    x = 1\n" * MAX_BODY_LINES
+    assert not long_bodies(long, path)
+    assert long_bodies(long + "    x = 1\n", path)
+
+
+def test_import_is_light_and_quick() -> None:
+    program = (
+        "import sys, time; t = time.perf_counter(); import clench; t = time.perf_counter() - t; "
+        f"print(t, sorted({HEAVY!r} & set(sys.modules)))"
+    )
+    runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True) for _ in "123"]
+    times, loaded = zip(*(r.stdout.strip().split(" ", 1) for r in runs), strict=True)
+    assert set(loaded) == {"[]"}
+    assert min(float(t) for t in times) <= 0.3
+
+
+def test_the_types_load_without_heavy_packages() -> None:
+    program = (
+        "import sys, clench as c; c.Hand, c.GraspObject, c.GraspCommand, c.GraspSolution, c.Record; "
+        f"print(sorted({HEAVY!r} & set(sys.modules)))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_version_is_the_packaged_one() -> None:
+    import clench
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert clench.__version__ == project["version"]
