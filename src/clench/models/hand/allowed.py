@@ -1,0 +1,118 @@
+"""List the pairs of links that may overlap: adjacent, excluded by the model, overlapping at the reference posture."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from clench.base.errors import UnknownNameError
+
+from .compiled import CompiledModel
+from .geometry import collides
+from .hand import Hand, Link
+from .hand_file import HandFile
+from .kinematics import Skeleton
+
+#: Links count as overlapping at the reference posture from this distance on [m].
+_TOUCH = 1e-6
+
+
+def allowed_pairs(
+    compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link, ...]
+) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of link indices that may overlap, sorted.
+
+    Args:
+        compiled: the model. skeleton: its kinematics. links: with shapes.
+    """
+    pairs = _adjacent(links) | _excluded(compiled, skeleton) | _overlapping(compiled, skeleton)
+    return tuple(sorted(pairs))
+
+
+def with_given_pairs(hand: Hand, overrides: HandFile) -> tuple[tuple[int, int], ...]:
+    """Return the hand's allowed pairs with those of the hand file.
+
+    Raises:
+        UnknownNameError: no such link.
+    """
+    names = [link.name for link in hand.links]
+    pairs = set(hand.allowed_pairs)
+    for pair in overrides.allowed_pairs:
+        for name in pair:
+            if name not in names:
+                raise UnknownNameError("link", name, f"hand '{hand.name}' (allowed_pairs in {overrides.path})", names)
+        pairs.add(_pair(*(names.index(name) for name in pair)))
+    return tuple(sorted(pairs))
+
+
+def _pair(a: int, b: int) -> tuple[int, int]:
+    return (a, b) if a < b else (b, a)
+
+
+def _adjacent(links: tuple[Link, ...]) -> set[tuple[int, int]]:
+    """Return pairs that are fixed to each other, and neighbours across one place of the chain.
+
+    Links fixed to each other are one piece; several joints at one place (links without geometry between) are
+    one neighbourhood.
+    """
+    piece: list[int] = []
+    for i, link in enumerate(links):
+        piece.append(i if link.joint >= 0 or link.parent < 0 else piece[link.parent])
+    solid = {p for p, link in zip(piece, links, strict=True) if any(link.shapes.values())}
+    up = {p: piece[links[p].parent] if links[p].parent >= 0 else -1 for p in set(piece)}
+
+    def neighbour(p: int) -> int:
+        p = up[p]
+        while p >= 0 and p not in solid:
+            p = up[p]
+        return p
+
+    return {
+        _pair(a, b)
+        for a, b in itertools.combinations(range(len(links)), 2)
+        if piece[a] == piece[b] or neighbour(piece[a]) == piece[b] or neighbour(piece[b]) == piece[a]
+    }
+
+
+def _excluded(compiled: CompiledModel, skeleton: Skeleton) -> set[tuple[int, int]]:
+    """Return pairs that the model excludes, by name or by its collision masks."""
+    m = compiled.model
+    link = skeleton.link_of_body
+    pairs = set()
+    for signature in m.exclude_signature:
+        a, b = int(signature) >> 16, int(signature) & 0xFFFF
+        if a in link and b in link:
+            pairs.add(_pair(link[a], link[b]))
+    masks = {}
+    for body in link:
+        geoms = range(int(m.body_geomadr[body]), int(m.body_geomadr[body]) + int(m.body_geomnum[body]))
+        solid = [g for g in geoms if collides(m, g)]
+        if solid:
+            masks[body] = (
+                int(np.bitwise_or.reduce(m.geom_contype[solid])),
+                int(np.bitwise_or.reduce(m.geom_conaffinity[solid])),
+            )
+    for (a, (type_a, affinity_a)), (b, (type_b, affinity_b)) in itertools.combinations(masks.items(), 2):
+        if not (type_a & affinity_b) and not (type_b & affinity_a):
+            pairs.add(_pair(link[a], link[b]))
+    return pairs
+
+
+def _overlapping(compiled: CompiledModel, skeleton: Skeleton) -> set[tuple[int, int]]:
+    """Return pairs that MuJoCo finds in contact at the reference posture."""
+    import mujoco
+
+    m = compiled.model
+    data = mujoco.MjData(m)
+    mujoco.mj_kinematics(m, data)
+    mujoco.mj_collision(m, data)
+    link = skeleton.link_of_body
+    pairs = set()
+    for contact in data.contact:
+        if contact.dist > _TOUCH:
+            continue
+        a, b = (int(m.geom_bodyid[g]) for g in contact.geom)
+        if a in link and b in link and a != b:
+            pairs.add(_pair(link[a], link[b]))
+    return pairs

@@ -1,0 +1,148 @@
+"""Compile a model text with MuJoCo, prune what is not the hand, and refuse closed loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from clench.base.errors import FileError, HandError
+
+from .model_files import ModelText
+
+
+@dataclass(frozen=True)
+class CompiledModel:
+    """Hold MuJoCo's spec and compiled model of a hand, and the text that gives it.
+
+    Args:
+        spec: `mujoco.MjSpec`. model: `mujoco.MjModel`.
+        xml: text that compiles to the same model with the assets of the model text.
+        label: how to name the model in messages.
+    """
+
+    spec: Any
+    model: Any
+    xml: str
+    label: str
+
+    def body_name(self, body: int) -> str:
+        """Return a body's name, or one made from its number."""
+        return str(self.model.body(body).name) or f"body{body}"
+
+    def joint_name(self, joint: int) -> str:
+        """Return a joint's name, or one made from its body's."""
+        m = self.model
+        body = int(m.jnt_bodyid[joint])
+        number = joint - int(m.body_jntadr[body])
+        made = f"{self.body_name(body)}_joint{number if number else ''}"
+        return str(m.joint(joint).name) or made
+
+
+def compile_model(text: ModelText) -> CompiledModel:
+    """Compile a model.
+
+    Raises:
+        FileError: MuJoCo refuses it; its reason is passed on.
+    """
+    import mujoco
+
+    try:
+        spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.assets))
+    except ValueError as error:
+        raise FileError(text.label, f"MuJoCo cannot read it: {_first_lines(error)}") from None
+    try:
+        return CompiledModel(spec, spec.compile(), text.xml, text.label)
+    except ValueError as error:
+        if "volume" not in str(error):
+            raise FileError(text.label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
+    # Flat or open meshes have no volume to take a mass from; their surface does as well.
+    for mesh in spec.meshes:
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    return _recompiled(spec, text.label)
+
+
+def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
+    """Return the model without the bodies that are not kept; their subtrees go with them."""
+    m = compiled.model
+    gone = [b for b in range(1, m.nbody) if b not in kept and (int(m.body_parentid[b]) in kept or m.body_parentid[b] == 0)]
+    if not gone:
+        return compiled
+    spec = compiled.spec
+    bodies = list(spec.bodies)
+    for body in gone:
+        spec.delete(bodies[body])
+    for key in list(spec.keys):
+        spec.delete(key)
+    return _recompiled(spec, compiled.label)
+
+
+def collide_visuals(compiled: CompiledModel, bodies: set[int]) -> CompiledModel:
+    """Return the model in which the drawn geometry of some bodies collides."""
+    if not bodies:
+        return compiled
+    for body in bodies:
+        for geom in list(compiled.spec.bodies)[body].geoms:
+            geom.contype = 1
+            geom.conaffinity = 1
+    return _recompiled(compiled.spec, compiled.label)
+
+
+def refuse_loops(compiled: CompiledModel, palm: int | None) -> None:
+    """Refuse closed kinematic loops.
+
+    Args:
+        compiled: the model.
+        palm: body of the palm; only loops that hold something below it matter. None: any loop matters.
+
+    Raises:
+        HandError: a `connect` or `weld` ties two bodies of the hand.
+    """
+    import mujoco
+
+    m = compiled.model
+    loops = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+    for e in range(m.neq):
+        if m.eq_type[e] not in loops:
+            continue
+        ends = [_body_of(m, int(m.eq_objtype[e]), int(i)) for i in (m.eq_obj1id[e], m.eq_obj2id[e])]
+        if palm is None:
+            closes = min(ends) > 0 and m.body_rootid[ends[0]] == m.body_rootid[ends[1]]
+        else:
+            closes = any(_moves_below(m, body, palm) for body in ends)
+        if closes:
+            kind = "connect" if m.eq_type[e] == loops[0] else "weld"
+            first, second = (compiled.body_name(b) for b in ends)
+            raise HandError(
+                f"{compiled.label}: bodies '{first}' and '{second}' close a kinematic loop (<{kind}>); "
+                "clench closes fingers that are serial chains of revolute joints. "
+                "Model the linkage as coupled joints instead (joint equality or URDF mimic)."
+            )
+
+
+def _body_of(model: Any, kind: int, index: int) -> int:
+    import mujoco
+
+    if kind == mujoco.mjtObj.mjOBJ_SITE:
+        return int(model.site_bodyid[index])
+    return index
+
+
+def _moves_below(model: Any, body: int, palm: int) -> bool:
+    """Return whether some joint below the palm moves a body."""
+    moved = False
+    while body > 0 and body != palm:
+        moved = moved or model.body_jntnum[body] > 0
+        body = int(model.body_parentid[body])
+    return moved and body == palm
+
+
+def _recompiled(spec: Any, label: str) -> CompiledModel:
+    try:
+        model = spec.compile()
+        return CompiledModel(spec, model, spec.to_xml(), label)
+    except ValueError as error:
+        raise FileError(label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
+
+
+def _first_lines(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]

@@ -1,0 +1,157 @@
+"""Split what hangs on the palm into fingers: serial chains of revolute joints from the palm to the tip."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clench.base.errors import FileError, HandError, UnknownNameError
+from clench.base.pose import FloatArray
+
+from .finger_names import names_thumb, place_names, short_names
+from .hand import Finger, Hand, Link
+from .hand_file import FingerOverride, HandFile
+
+#: A finger is a thumb when its likeness to the others is so much lower than theirs to each other [-].
+_THUMB_UNLIKE = 0.6
+
+
+def own_chains(hand: Hand) -> list[tuple[int, ...]]:
+    """Return the own joints of every finger, palm side first; a joint that several fingers share is nobody's.
+
+    Args:
+        hand: links, joints and palm are used.
+    """
+    paths = {i: _joints_from_palm(hand, i) for i in range(len(hand.links))}
+    chains = {path for path in paths.values() if path}
+    leaves = sorted(c for c in chains if not any(o != c and o[: len(c)] == c for o in chains))
+    own = []
+    for chain in leaves:
+        others = {j for c in leaves if c != chain for j in c}
+        own.append(tuple(j for j in chain if j not in others))
+    return sorted(own)
+
+
+def find_fingers(hand: Hand, overrides: HandFile) -> tuple[Finger, ...]:
+    """Return the fingers, named where joints and links tell; thumbs by name only.
+
+    Raises:
+        UnknownNameError, FileError: the hand file names what does not exist.
+    """
+    chains = own_chains(hand)
+    given = {name: o for name, o in overrides.fingers.items() if o.joints is not None}
+    if given:
+        named = {name: _given_chain(hand, name, o, overrides) for name, o in given.items()}
+        taken = {j for chain in named.values() for j in chain}
+        chains = [c for c in (tuple(j for j in chain if j not in taken) for chain in chains) if c]
+    else:
+        named = {}
+    links = [_links_of(hand, chain) for chain in chains]
+    names = short_names(
+        [[hand.joints[j].name for j in chain] for chain in chains],
+        [[hand.links[i].name for i in members] for members in links],
+    )
+    fingers = [_finger(hand, name, chain) for name, chain in zip(names, chains, strict=True) if name not in named]
+    fingers += [_finger(hand, name, chain) for name, chain in named.items()]
+    return tuple(sorted(fingers, key=lambda f: f.joints[0]))
+
+
+def find_thumb(fingers: tuple[Finger, ...], stretch: FloatArray, closing: FloatArray) -> int | None:
+    """Return the finger that opposes the others, or None when all are alike or one cannot tell.
+
+    Args:
+        fingers: a name that says thumb decides.
+        stretch: unit vectors from base to tip, shape (F, 3). closing: unit closing directions of the tips, (F, 3).
+    """
+    named = [i for i, f in enumerate(fingers) if f.is_thumb]
+    if named or len(fingers) < 3:
+        return named[0] if named else None
+    likeness = stretch @ stretch.T + closing @ closing.T
+    np.fill_diagonal(likeness, 0.0)
+    n = len(fingers)
+    to_others = likeness.sum(axis=1) / (n - 1)
+    thumb = int(np.argmin(to_others))
+    rest = [i for i in range(n) if i != thumb]
+    among = likeness[np.ix_(rest, rest)].sum() / max(1, (n - 1) * (n - 2))
+    return thumb if among - to_others[thumb] > _THUMB_UNLIKE else None
+
+
+def name_fingers(hand: Hand, thumb: int | None, bases: FloatArray, overrides: HandFile) -> tuple[Finger, ...]:
+    """Return the fingers with the names that were missing, the thumb, and what the hand file says.
+
+    Args:
+        hand: with fingers. thumb: its index. bases: anchor of every finger's first joint, shape (F, 3).
+
+    Raises:
+        UnknownNameError: the hand file names a finger or link that does not exist.
+    """
+    distances = [0.0 if thumb is None else float(np.linalg.norm(b - bases[thumb])) for b in bases]
+    names = place_names(distances, thumb, [f.name for f in hand.fingers])
+    for name in overrides.fingers:
+        if name not in names:
+            raise UnknownNameError("finger", name, f"hand '{hand.name}' (named by {overrides.path})", names)
+    fingers = []
+    for i, (name, finger) in enumerate(zip(names, hand.fingers, strict=True)):
+        override = overrides.fingers.get(name, FingerOverride())
+        is_thumb = i == thumb if override.thumb is None else override.thumb
+        tip = finger.tip_link if override.tip is None else hand.link_index(override.tip)
+        if tip not in finger.links:
+            links = ", ".join(hand.links[k].name for k in finger.links)
+            raise FileError(
+                overrides.path, f"fingers.{name}.tip: link '{override.tip}' is not in this finger. Links: {links}."
+            )
+        fingers.append(Finger(name, finger.links, finger.joints, is_thumb, tip))
+    return tuple(fingers)
+
+
+def fixed_links(links: tuple[Link, ...], fingers: tuple[Finger, ...], palm: int) -> tuple[int, ...]:
+    """Return the links that no finger moves and that an object can hit; the palm is always one."""
+    moved = {i for f in fingers for i in f.links}
+    return tuple(i for i, link in enumerate(links) if i not in moved and (i == palm or any(link.shapes.values())))
+
+
+def _joints_from_palm(hand: Hand, link: int) -> tuple[int, ...]:
+    """Return the joints between the palm and a link below it; empty elsewhere."""
+    joints: list[int] = []
+    while link != hand.palm:
+        if link < 0:
+            return ()
+        if hand.links[link].joint >= 0:
+            joints.append(hand.links[link].joint)
+        link = hand.links[link].parent
+    return tuple(joints[::-1])
+
+
+def _links_of(hand: Hand, chain: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the links whose nearest joint is one of the chain."""
+    own = set(chain)
+    found = []
+    for i in range(len(hand.links)):
+        path = _joints_from_palm(hand, i)
+        if path and path[-1] in own:
+            found.append(i)
+    return tuple(found)
+
+
+def _finger(hand: Hand, name: str, chain: tuple[int, ...]) -> Finger:
+    links = _links_of(hand, chain)
+    with_shape = [i for i in links if any(hand.links[i].shapes.values())]
+    if not with_shape:
+        joints = ", ".join(f"'{hand.joints[j].name}'" for j in chain)
+        raise HandError(f"{hand.name}: no link moved by the joints {joints} has any geometry.")
+    return Finger(name, links, chain, names_thumb(name), with_shape[-1])
+
+
+def _given_chain(hand: Hand, name: str, override: FingerOverride, overrides: HandFile) -> tuple[int, ...]:
+    """Return the joint indices that a hand file lists, checked to be one chain below the palm."""
+    assert override.joints is not None
+    owner = f"hand '{hand.name}' (fingers.{name}.joints in {overrides.path})"
+    for joint in override.joints:
+        if joint not in hand.joint_names:
+            raise UnknownNameError("joint", joint, owner, hand.joint_names)
+    chain = tuple(hand.joint_index(joint) for joint in override.joints)
+    paths = [_joints_from_palm(hand, i) for i in range(len(hand.links))]
+    if not any(tuple(j for j in path if j in chain) == chain for path in paths):
+        raise FileError(
+            overrides.path, f"fingers.{name}.joints: expected one chain of joints below the palm, palm side first."
+        )
+    return chain

@@ -1,0 +1,243 @@
+"""Read the hand file: TOML that overrides what was found in a model, validated with the same care."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from clench.base.errors import FileError
+from clench.models.shapes import CollisionSource
+
+from .hand import JointRole
+
+
+@dataclass(frozen=True)
+class FingerOverride:
+    """Override a finger: its own joints (palm side first), its tip link, whether it is a thumb."""
+
+    joints: tuple[str, ...] | None = None
+    tip: str | None = None
+    thumb: bool | None = None
+
+
+@dataclass(frozen=True)
+class JointOverride:
+    """Override a joint: role, direction, open value [rad], and whom it follows (`""`: nobody)."""
+
+    role: JointRole | None = None
+    direction: int | None = None
+    open_value: float | None = None
+    follows: str | None = None
+    ratio: float = 1.0
+    offset: float = 0.0
+    breakaway: bool = False
+
+
+@dataclass(frozen=True)
+class LinkOverride:
+    """Override a link: pad indentation [m], sliding friction [-]."""
+
+    pad_indentation: float = 0.0
+    friction: float | None = None
+
+
+@dataclass(frozen=True)
+class TendonMap:
+    """State tendon tensions: torques of `joints` are `moment_arms` [m], one row a joint, times tensions [N]."""
+
+    joints: tuple[str, ...]
+    moment_arms: tuple[tuple[float, ...], ...]
+    t_min: float = 0.0
+    t_max: float = math.inf
+
+
+@dataclass(frozen=True)
+class HandFile:
+    """Hold what a hand file says; empty when there is none.
+
+    Args:
+        path: the file, or None.
+        palm, collision_source: see `Hand.load`.
+        fingers, joints, links: overrides by name. allowed_pairs: names of links that may overlap.
+        tendons: see `TendonMap`.
+    """
+
+    path: Path | None = None
+    palm: str | None = None
+    collision_source: CollisionSource | None = None
+    fingers: Mapping[str, FingerOverride] = field(default_factory=dict)
+    joints: Mapping[str, JointOverride] = field(default_factory=dict)
+    links: Mapping[str, LinkOverride] = field(default_factory=dict)
+    allowed_pairs: tuple[tuple[str, str], ...] = ()
+    tendons: TendonMap | None = None
+
+
+def find_hand_file(model: Path | None, hand_file: str | Path | None) -> HandFile:
+    """Read the named hand file, or `<model>.hand.toml` beside the model when it exists.
+
+    Raises:
+        FileError: missing or malformed, with the key.
+    """
+    if hand_file is not None:
+        return read_hand_file(Path(hand_file))
+    if model is not None:
+        for name in (f"{model.stem}.hand.toml", f"{model.name}.hand.toml"):
+            if (model.parent / name).is_file():
+                return read_hand_file(model.parent / name)
+    return HandFile()
+
+
+def read_hand_file(path: Path) -> HandFile:
+    """Read and validate a hand file; names of links and joints are checked against the model later.
+
+    Raises:
+        FileError: missing, not TOML, an unknown key or a value of another kind, with the key.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileError(path, f"no hand file can be read here ({error.strerror}).") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileError(path, f"not TOML: {error}.") from None
+    top = _Table(path, "", data)
+    top.allow("palm", "collision_source", "fingers", "joints", "links", "allowed_pairs", "tendons")
+    source = top.choice("collision_source", [str(s) for s in CollisionSource])
+    return HandFile(
+        path=path,
+        palm=top.text("palm"),
+        collision_source=None if source is None else CollisionSource(source),
+        fingers={name: _finger(table) for name, table in top.tables("fingers")},
+        joints={name: _joint(table) for name, table in top.tables("joints")},
+        links={name: _link(table) for name, table in top.tables("links")},
+        allowed_pairs=_pairs(top),
+        tendons=_tendons(top),
+    )
+
+
+def _finger(table: _Table) -> FingerOverride:
+    table.allow("joints", "tip", "thumb")
+    return FingerOverride(joints=table.texts("joints"), tip=table.text("tip"), thumb=table.flag("thumb"))
+
+
+def _joint(table: _Table) -> JointOverride:
+    table.allow("role", "direction", "open", "follows", "ratio", "offset", "breakaway")
+    role = table.choice("role", ["closing", "posture"])
+    direction = table.number("direction")
+    if direction is not None and direction not in (1.0, -1.0):
+        raise table.error("direction", "1 or -1", table.data["direction"])
+    follows = table.text("follows")
+    for key in ("ratio", "offset", "breakaway"):
+        if key in table.data and not follows:
+            raise FileError(table.path, f"{table.key(key)}: has a meaning only together with 'follows'.")
+    ratio = table.number("ratio")
+    if ratio == 0.0:
+        raise table.error("ratio", "a number other than 0", 0.0)
+    return JointOverride(
+        role=None if role is None else JointRole(role),
+        direction=None if direction is None else int(direction),
+        open_value=table.number("open"),
+        follows=follows,
+        ratio=1.0 if ratio is None else ratio,
+        offset=table.number("offset") or 0.0,
+        breakaway=table.flag("breakaway") or False,
+    )
+
+
+def _link(table: _Table) -> LinkOverride:
+    table.allow("pad_indentation", "friction")
+    values = {key: table.number(key) for key in ("pad_indentation", "friction")}
+    for key, value in values.items():
+        if value is not None and value < 0.0:
+            raise table.error(key, "a number of at least 0", value)
+    return LinkOverride(values["pad_indentation"] or 0.0, values["friction"])
+
+
+def _pairs(top: _Table) -> tuple[tuple[str, str], ...]:
+    value = top.data.get("allowed_pairs", [])
+    ok = isinstance(value, list) and all(
+        isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair) for pair in value
+    )
+    if not ok:
+        raise top.error("allowed_pairs", 'a list of pairs of link names, e.g. [["a", "b"]]', value)
+    return tuple((a, b) for a, b in value)
+
+
+def _tendons(top: _Table) -> TendonMap | None:
+    if "tendons" not in top.data:
+        return None
+    table = _Table(top.path, "tendons", top.data["tendons"])
+    table.allow("joints", "moment_arms", "t_min", "t_max")
+    joints = table.texts("joints") or ()
+    rows = table.data.get("moment_arms")
+    width = len(rows[0]) if isinstance(rows, list) and rows and isinstance(rows[0], list) else 0
+    ok = isinstance(rows, list) and len(rows) == len(joints) > 0 and width > 0
+    if not ok or not all(isinstance(r, list) and len(r) == width and all(_is_number(x) for x in r) for r in rows or []):
+        raise table.error("moment_arms", f"{len(joints)} rows (one a joint) of equally many numbers [m]", rows)
+    low, high = table.number("t_min") or 0.0, table.number("t_max")
+    arms = tuple(tuple(float(x) for x in row) for row in rows or [])
+    return TendonMap(joints, arms, low, math.inf if high is None else high)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Read typed values of one TOML table; every message names file and key."""
+
+    path: Path
+    prefix: str
+    data: Any
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.data, dict):
+            raise FileError(self.path, f"{self.prefix}: expected a table [{self.prefix}], got {self.data!r}.")
+
+    def key(self, name: str) -> str:
+        return f"{self.prefix}.{name}" if self.prefix else name
+
+    def error(self, name: str, expected: str, value: object) -> FileError:
+        return FileError(self.path, f"{self.key(name)}: expected {expected}, got {value!r}.")
+
+    def allow(self, *names: str) -> None:
+        for name in self.data:
+            if name not in names:
+                raise FileError(self.path, f"{self.key(name)}: unknown key; expected one of {', '.join(names)}.")
+
+    def tables(self, name: str) -> list[tuple[str, _Table]]:
+        inner = _Table(self.path, name, self.data.get(name, {}))
+        return [(k, _Table(self.path, f"{name}.{k}", v)) for k, v in inner.data.items()]
+
+    def text(self, name: str) -> str | None:
+        return self._typed(name, "a text in quotes", lambda v: isinstance(v, str))
+
+    def flag(self, name: str) -> bool | None:
+        return self._typed(name, "true or false", lambda v: isinstance(v, bool))
+
+    def texts(self, name: str) -> tuple[str, ...] | None:
+        def check(value: Any) -> bool:
+            return isinstance(value, list) and len(value) > 0 and all(isinstance(v, str) for v in value)
+
+        value = self._typed(name, "a list of names", check)
+        return None if value is None else tuple(value)
+
+    def number(self, name: str) -> float | None:
+        value = self._typed(name, "a finite number", _is_number)
+        return None if value is None else float(value)
+
+    def choice(self, name: str, allowed: list[str]) -> str | None:
+        value = self.text(name)
+        if value is not None and value not in allowed:
+            raise self.error(name, f"one of {', '.join(allowed)}", value)
+        return value
+
+    def _typed(self, name: str, expected: str, check: Callable[[Any], bool]) -> Any:
+        value = self.data.get(name)
+        if name in self.data and not check(value):
+            raise self.error(name, expected, value)
+        return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,200 @@
+"""Load a hand: read the model, understand it, apply the hand file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from clench.base.errors import FileError, UnknownNameError
+from clench.base.pose import FloatArray
+from clench.models.shapes import CollisionSource
+
+from .allowed import allowed_pairs, with_given_pairs
+from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
+from .coupling import FoundCouplings, Relation, find_couplings, flatten
+from .finger_geometry import finger_line, tip_motion
+from .fingers import find_fingers, find_thumb, fixed_links, name_fingers
+from .geometry import ShapeReader, bodies_without_collision
+from .hand import Hand, JointRole, Link
+from .hand_file import HandFile, LinkOverride, find_hand_file
+from .kinematics import Skeleton, build_skeleton
+from .model_files import ModelText, read_model
+from .palm import find_palm, hand_bodies
+from .roles import assign_roles
+
+#: Tips whose mean closing direction is shorter oppose each other: the palm faces along the fingers [-].
+_OPPOSED = 0.4
+
+
+def load_hand(
+    model: str | Path,
+    *,
+    hand_file: str | Path | None = None,
+    palm: str | None = None,
+    collision_source: CollisionSource | str | None = None,
+) -> Hand:
+    """Read a hand; arguments and errors as `Hand.load`.
+
+    Args:
+        model: built-in name or path. hand_file: TOML overrides. palm: the palm link's name.
+        collision_source: which geometry is meant unless a command says otherwise.
+    """
+    text = read_model(model)
+    overrides = find_hand_file(text.path, hand_file)
+    source = _source(collision_source, overrides)
+    compiled, palm_body, warnings = _hand_alone(text, palm or overrides.palm)
+    bodies = hand_bodies(compiled.model, palm_body)
+    skeleton = build_skeleton(compiled, bodies, palm_body, text.velocities)
+    found = _with_given_couplings(find_couplings(compiled, skeleton), skeleton, overrides, text.label)
+    reader = ShapeReader(compiled)
+    links = _links(skeleton, reader, overrides)
+    hand = Hand(
+        name=text.name,
+        path=text.path,
+        links=links,
+        joints=skeleton.joints,
+        couplings=found.couplings,
+        fingers=(),
+        palm=skeleton.link_of_body[palm_body],
+        fixed_links=(),
+        allowed_pairs=allowed_pairs(compiled, skeleton, links),
+        palm_center=np.zeros(3),
+        palm_normal=np.zeros(3),
+        default_source=source,
+        warnings=(*warnings, *skeleton.warnings, *found.warnings, *reader.warnings),
+        spec_xml=compiled.xml,
+        assets=text.assets,
+    )
+    return _understood(hand, overrides, found.held)
+
+
+def _hand_alone(text: ModelText, palm: str | None) -> tuple[CompiledModel, int, list[str]]:
+    """Compile a model, find its palm, leave out other limbs, and give bare links something to collide with."""
+    compiled = compile_model(text)
+    if palm is None:
+        refuse_loops(compiled, None)
+    body = find_palm(compiled, palm)
+    refuse_loops(compiled, body)
+    warnings: list[str] = []
+    kept = {0, *hand_bodies(compiled.model, body)}
+    if len(kept) < compiled.model.nbody and body != 0:
+        dropped = compiled.model.nbody - len(kept)
+        compiled = keep_bodies(compiled, kept)
+        body = sorted(kept).index(body)
+        warnings.append(f"{dropped} links that are neither the hand nor between it and the root are left out.")
+    bare = bodies_without_collision(compiled, hand_bodies(compiled.model, body), body)
+    if bare:
+        names = ", ".join(f"'{compiled.body_name(b)}'" for b in sorted(bare))
+        warnings.append(f"Links without collision geometry collide with what is drawn: {names}.")
+        compiled = collide_visuals(compiled, bare)
+    return compiled, body, warnings
+
+
+def _source(given: CollisionSource | str | None, overrides: HandFile) -> CollisionSource:
+    if given is None:
+        return overrides.collision_source or CollisionSource.ENGINE
+    names = [str(s) for s in CollisionSource]
+    if str(given) not in names:
+        raise UnknownNameError("collision source", str(given), "the collision sources", names)
+    return CollisionSource(given)
+
+
+def _links(skeleton: Skeleton, reader: ShapeReader, overrides: HandFile) -> tuple[Link, ...]:
+    names = [frame.name for frame in skeleton.frames]
+    for name in overrides.links:
+        if name not in names:
+            raise UnknownNameError("link", name, f"the model (links.{name} in {overrides.path})", names)
+    nothing: dict[CollisionSource, tuple[()]] = {source: () for source in CollisionSource}
+    links = []
+    for frame in skeleton.frames:
+        given = overrides.links.get(frame.name, LinkOverride())
+        links.append(
+            Link(
+                name=frame.name,
+                parent=frame.parent,
+                joint=frame.joint,
+                T_parent_link=frame.T_parent_link,
+                shapes=reader.shapes(frame.body) if frame.body >= 0 else nothing,
+                mass=frame.mass,
+                pad_indentation=given.pad_indentation,
+                friction=given.friction,
+            )
+        )
+    return tuple(links)
+
+
+def _with_given_couplings(
+    found: FoundCouplings, skeleton: Skeleton, overrides: HandFile, label: str
+) -> FoundCouplings:
+    """Return the couplings with those that the hand file adds, replaces or removes."""
+    names = [j.name for j in skeleton.joints]
+    given = {name: o for name, o in overrides.joints.items() if o.follows is not None}
+    if not given:
+        return found
+    relations = [
+        Relation(c.leader, c.follower, c.ratio, c.offset, c.reason, c.breakaway)
+        for c in found.couplings
+        if names[c.follower] not in given
+    ]
+    for name, o in given.items():
+        for joint in (name, o.follows):
+            if joint and joint not in names:
+                raise UnknownNameError("joint", joint, f"the model (joints.{name} in {overrides.path})", names)
+        if o.follows == name:
+            raise FileError(overrides.path, f"joints.{name}.follows: a joint cannot follow itself.")
+        if o.follows:
+            leader, follower = names.index(o.follows), names.index(name)
+            relations.append(Relation(leader, follower, o.ratio, o.offset, "hand file", o.breakaway))
+    return replace(found, couplings=flatten(relations, names, label))
+
+
+def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> Hand:
+    """Return the hand with fingers, roles, thumb, fixed links and the palm's centre and normal."""
+    hand = replace(hand, fingers=find_fingers(hand, overrides))
+    hand = assign_roles(hand, overrides, held)
+    bases, stretch, closing = _directions(hand)
+    thumb = find_thumb(hand.fingers, stretch, closing)
+    fingers = name_fingers(hand, thumb, bases, overrides)
+    hand = replace(hand, fingers=fingers, fixed_links=fixed_links(hand.links, fingers, hand.palm))
+    return replace(
+        hand,
+        allowed_pairs=with_given_pairs(hand, overrides),
+        palm_center=bases.mean(axis=0),
+        palm_normal=_normal(hand, stretch, closing),
+    )
+
+
+def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return every finger's base [m], unit direction from base to tip, and unit closing direction of its tip, (F, 3)."""
+    q = hand.open_angles()
+    bases, stretch, closing = [], [], []
+    for finger in hand.fingers:
+        line = finger_line(hand, finger, q)
+        own = [hand.joints[j] for j in finger.joints]
+        rates = np.array([j.direction if j.role is JointRole.CLOSING else 0.0 for j in own], dtype=np.float64)
+        bases.append(line.anchors[0])
+        stretch.append(_unit(line.tip - line.anchors[0]))
+        closing.append(_unit(tip_motion(line, rates)))
+    return np.array(bases), np.array(stretch), np.array(closing)
+
+
+def _normal(hand: Hand, stretch: FloatArray, closing: FloatArray) -> FloatArray:
+    """Return the palm's normal: the mean closing direction of the tips, without the thumb where others remain.
+
+    Fingers that close towards each other (claws, grippers) have no common side: their palm faces along them.
+    """
+    others = [i for i, f in enumerate(hand.fingers) if not f.is_thumb]
+    thumbs = [i for i, f in enumerate(hand.fingers) if f.is_thumb]
+    mean = closing[others].mean(axis=0) if others else closing.mean(axis=0)
+    opposed = bool(others) and any(_unit(mean) @ closing[i] < -0.5 for i in thumbs)
+    if np.linalg.norm(mean) < _OPPOSED or opposed:
+        mean = stretch.mean(axis=0)
+    return _unit(mean)
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    norm = float(np.linalg.norm(v))
+    return v / norm if norm > 0.0 else np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,93 @@
+"""Read mesh files of hand models as bytes that MuJoCo understands (OBJ, STL, MSH; others are converted)."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+
+from clench.base.errors import FileError
+
+_NATIVE = (".obj", ".stl", ".msh")
+#: MuJoCo refuses larger STL files; OBJ has no such limit.
+_STL_FACES = 200_000
+
+
+class MeshStore:
+    """Collect files under short keys, each file once.
+
+    Args:
+        model: the model file that names them, for messages.
+    """
+
+    def __init__(self, model: Path) -> None:
+        self.model = model
+        self.assets: dict[str, bytes] = {}
+        self._keys: dict[Path, str] = {}
+
+    def add(self, named: str, candidates: Iterable[Path], owner: str, *, is_mesh: bool = True) -> str:
+        """Read the first candidate that exists and return its key.
+
+        Args:
+            named: the file as the model writes it. candidates: places to look.
+            owner: the element that names it, for messages.
+            is_mesh: convert formats that MuJoCo does not read.
+
+        Raises:
+            FileError: none exists, or it cannot be converted.
+        """
+        places = list(candidates)
+        file = next((p for p in places if p.is_file()), None)
+        if file is None:
+            looked = ", ".join(str(p) for p in places[:3])
+            kind = "mesh" if is_mesh else "file"
+            raise FileError(self.model, f"{kind} '{named}' of {owner} is missing; looked for {looked}.")
+        file = file.resolve()
+        if file not in self._keys:
+            data = file.read_bytes()
+            suffix = file.suffix.lower()
+            if is_mesh:
+                data, suffix = self._native(data, suffix, file, owner)
+            stem = re.sub(r"[^A-Za-z0-9_.-]", "_", file.stem)
+            key = f"{stem}{suffix}"
+            if key in self.assets:
+                key = f"{stem}_{len(self.assets)}{suffix}"
+            self.assets[key] = data
+            self._keys[file] = key
+        return self._keys[file]
+
+    def _native(self, data: bytes, suffix: str, file: Path, owner: str) -> tuple[bytes, str]:
+        if not data:
+            raise FileError(self.model, f"mesh '{file.name}' of {owner} is empty.")
+        if suffix in _NATIVE and not (suffix == ".stl" and _unreadable_stl(data)):
+            return data, suffix
+        try:
+            return _as_obj(data, suffix), ".obj"
+        except Exception as error:
+            raise FileError(self.model, f"mesh '{file.name}' of {owner} cannot be read ({error}).") from None
+
+
+def _unreadable_stl(data: bytes) -> bool:
+    """Return whether MuJoCo would refuse an STL file: text form, or too many faces."""
+    if len(data) < 84:
+        return True
+    faces = int(struct.unpack("<I", data[80:84])[0])
+    return len(data) != 84 + 50 * faces or faces > _STL_FACES
+
+
+def _as_obj(data: bytes, suffix: str) -> bytes:
+    """Convert a mesh file of any kind that trimesh reads; scene transforms are applied."""
+    import io
+
+    import numpy as np
+    import trimesh
+
+    loaded = trimesh.load(io.BytesIO(data), file_type=suffix.lstrip("."), process=False)
+    mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise ValueError("it holds no triangles")
+    out = io.StringIO()
+    np.savetxt(out, mesh.vertices, fmt="v %.17g %.17g %.17g")
+    np.savetxt(out, mesh.faces + 1, fmt="f %d %d %d")
+    return out.getvalue().encode()

@@ -1,0 +1,159 @@
+"""Find a hand's model file and make it self-contained: one XML text and the bytes of every file it names."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from clench.base.errors import FileError, UnknownNameError
+
+from .mesh_files import MeshStore
+
+_BUILTIN = Path(__file__).parent / "builtin"
+_SUFFIXES = (".urdf", ".xml", ".mjcf")
+
+
+@dataclass(frozen=True)
+class ModelText:
+    """Hold a model that needs no other file.
+
+    Args:
+        name: of the model.
+        path: the file, None for a built-in hand.
+        label: how to name it in messages.
+        xml: MJCF or URDF text that MuJoCo compiles with `assets`.
+        assets: bytes of meshes and textures by the key that the text uses.
+        is_urdf: which of the two formats the file has.
+        velocities: velocity limits [rad/s] by joint name (URDF; MuJoCo drops them).
+    """
+
+    name: str
+    path: Path | None
+    label: str
+    xml: str
+    assets: Mapping[str, bytes]
+    is_urdf: bool
+    velocities: Mapping[str, float] = field(default_factory=dict)
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Return the names of the hands that the package brings along."""
+    return tuple(sorted(p.stem for p in _BUILTIN.glob("*.xml")))
+
+
+def find_model(model: str | Path) -> tuple[Path, bool]:
+    """Return the model's file, and whether it is a built-in one.
+
+    Raises:
+        UnknownNameError: neither a built-in name nor a path. FileError: no such file, or another kind of file.
+    """
+    path = Path(model)
+    if path.is_file():
+        if path.suffix.lower() not in _SUFFIXES:
+            raise FileError(model, f"expected a hand model ({', '.join(_SUFFIXES)}), got a '{path.suffix}' file.")
+        return path, False
+    if path.is_dir():
+        raise FileError(model, f"is a folder; expected a hand model file ({', '.join(_SUFFIXES)}).")
+    if isinstance(model, str) and model in builtin_names():
+        return _BUILTIN / f"{model}.xml", True
+    if path.suffix.lower() in _SUFFIXES or len(path.parts) > 1:
+        raise FileError(model, f"no such file; expected a hand model ({', '.join(_SUFFIXES)}) or a built-in name.")
+    raise UnknownNameError("hand", str(model), "the built-in hands, and no such file exists", builtin_names())
+
+
+def read_model(model: str | Path) -> ModelText:
+    """Read a hand model and everything it names.
+
+    Args:
+        model: a built-in name or a path to URDF or MJCF.
+
+    Raises:
+        FileError: missing, unreadable or malformed file. UnknownNameError: no such built-in hand.
+    """
+    path, builtin = find_model(model)
+    root = _parse(path)
+    if root.tag == "robot":
+        from .urdf import prepare_urdf, velocity_limits
+
+        velocities = velocity_limits(root)
+        assets = prepare_urdf(root, path)
+    elif root.tag == "mujoco":
+        velocities = {}
+        assets = _prepare_mjcf(root, path)
+    else:
+        raise FileError(path, f"root element <{root.tag}>; expected <robot> (URDF) or <mujoco> (MJCF).")
+    name = root.get("name") or root.get("model") or path.stem
+    return ModelText(
+        name=path.stem if builtin else name,
+        path=None if builtin else path,
+        label=f"built-in hand '{path.stem}'" if builtin else str(path),
+        xml=ET.tostring(root, encoding="unicode"),
+        assets=assets,
+        is_urdf=root.tag == "robot",
+        velocities=velocities,
+    )
+
+
+def _parse(path: Path) -> ET.Element:
+    try:
+        return ET.fromstring(path.read_bytes())
+    except ET.ParseError as error:
+        raise FileError(path, f"not well-formed XML ({error}); expected URDF or MJCF.") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror}).") from None
+
+
+def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:
+    """Expand includes and rename every file of an MJCF tree to a key of the returned assets."""
+    _expand_includes(root, path, depth=0)
+    folders = _asset_folders(root)
+    store = MeshStore(path)
+    for element in root.iter():
+        file = element.get("file")
+        if file is None or element.tag not in ("mesh", "texture", "hfield", "skin"):
+            continue
+        if folders["strip"]:
+            file = Path(file).name
+        folder = folders["texture" if element.tag == "texture" else "mesh"]
+        owner = f"<{element.tag}> '{element.get('name', Path(file).stem)}'"
+        if element.tag == "mesh" and element.get("name") is None:
+            element.set("name", Path(file).stem)
+        key = store.add(file, [path.parent / folder / file], owner, is_mesh=element.tag == "mesh")
+        element.set("file", key)
+        element.attrib.pop("content_type", None)
+    return store.assets
+
+
+def _asset_folders(root: ET.Element) -> dict[str, str]:
+    """Read and remove the compiler's folder settings, which the renamed files no longer need."""
+    folders = {"mesh": "", "texture": "", "strip": ""}
+    for compiler in root.iter("compiler"):
+        both = compiler.attrib.pop("assetdir", None)
+        mesh = compiler.attrib.pop("meshdir", both)
+        texture = compiler.attrib.pop("texturedir", both)
+        strip = compiler.attrib.pop("strippath", None)
+        folders["mesh"] = folders["mesh"] if mesh is None else mesh
+        folders["texture"] = folders["texture"] if texture is None else texture
+        folders["strip"] = folders["strip"] if strip is None else strip.replace("false", "")
+    return folders
+
+
+def _expand_includes(element: ET.Element, main: Path, depth: int) -> None:
+    """Replace `<include file=…/>` by the children of the included root, as MuJoCo does."""
+    if depth > 20:
+        raise FileError(main, "includes are nested more than 20 deep; a file seems to include itself.")
+    for child in list(element):
+        if child.tag != "include":
+            _expand_includes(child, main, depth)
+            continue
+        file = main.parent / child.get("file", "")
+        if not file.is_file():
+            raise FileError(main, f"included file '{child.get('file', '')}' is missing; looked for {file}.")
+        included = _parse(file)
+        _expand_includes(included, main, depth + 1)
+        place = list(element).index(child)
+        element.remove(child)
+        for offset, grandchild in enumerate(list(included)):
+            element.insert(place + offset, grandchild)
