@@ -14,7 +14,7 @@ import pytest
 from clench.base.errors import ClenchError, FileError, UnknownNameError
 from clench.solve.record import SCHEMA_VERSION, Record
 from clench.solve.solution import GraspSolution, SolutionStatus
-from conftest import make_solution
+from handmade import make_solution
 
 
 def test_append_and_read_back_equal(tmp_path: Path, solution: GraspSolution) -> None:

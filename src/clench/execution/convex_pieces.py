@@ -1,0 +1,118 @@
+"""Convex pieces that stand for a mesh in simulation, computed once and kept in the user's cache folder."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import sys
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from clench.base.errors import ObjectError
+from clench.base.json_files import write_atomically
+from clench.base.pose import FloatArray
+from clench.models.mesh import TriangleMesh
+
+#: A mesh whose volume misses its hull's by less than this fraction is convex [-].
+CONVEX_FRACTION = 1e-4
+#: Settings of the decomposition: largest concavity of a piece as a fraction of the mesh's size, then effort.
+SETTINGS = {"threshold": 0.04, "mcts_iterations": 60, "mcts_nodes": 15, "resolution": 1000, "seed": 0}
+#: Number of the method below: part of the cache's keys, raised when results change.
+METHOD = 1
+
+
+def convex_pieces(mesh: TriangleMesh, name: str, *, show_progress: bool = False) -> tuple[FloatArray, ...]:
+    """Return the vertices of convex pieces that approximate a mesh, each of shape (V, 3) [m].
+
+    A convex mesh is its own hull. Any other is decomposed by CoACD, which takes seconds to minutes: the pieces are kept in
+    the cache folder under the hash of the geometry.
+
+    Raises:
+        ObjectError: the mesh is flat, so that no solid piece exists.
+    """
+    hull, share = hull_of(mesh.vertices, name), _volume(mesh)
+    if abs(share - hull[1]) <= CONVEX_FRACTION * hull[1]:
+        return (hull[0],)
+    key = hashlib.sha256(f"{METHOD} {SETTINGS}".encode())
+    key.update(mesh.vertices.tobytes())
+    key.update(mesh.triangles.tobytes())
+    file = cache_folder() / "pieces" / f"{key.hexdigest()[:32]}.npz"
+    pieces = _cached(file)
+    if pieces is None:
+        pieces = _decomposed(mesh, name, show_progress)
+        _keep(file, pieces)
+    return pieces
+
+
+def hull_of(vertices: FloatArray, name: str) -> tuple[FloatArray, float]:
+    """Return the corners of the convex hull, shape (V, 3) [m], and its volume [m³].
+
+    Raises:
+        ObjectError: the points lie in one plane.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(vertices)
+    except QhullError:
+        raise ObjectError(f"Body '{name}' is flat: simulation needs a solid shape.") from None
+    return np.asarray(vertices[hull.vertices]), float(hull.volume)
+
+
+def cache_folder() -> Path:
+    """Return the user's cache folder for this program: `CLENCH_CACHE_DIR`, else the platform's."""
+    named = os.environ.get("CLENCH_CACHE_DIR")
+    if named:
+        return Path(named)
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "clench"
+
+
+def _volume(mesh: TriangleMesh) -> float:
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] - mesh.vertices.mean(axis=0) for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def _decomposed(mesh: TriangleMesh, name: str, show_progress: bool) -> tuple[FloatArray, ...]:
+    import coacd
+
+    coacd.set_log_level("error")
+    model = coacd.Mesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
+    if show_progress:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+            progress.add_task(f"Convex pieces of '{name}' (kept for the next time)", total=None)
+            parts = coacd.run_coacd(model, **SETTINGS)
+    else:
+        parts = coacd.run_coacd(model, **SETTINGS)
+    return tuple(np.asarray(vertices, dtype=np.float64) for vertices, _ in parts)
+
+
+def _cached(file: Path) -> tuple[FloatArray, ...] | None:
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            return tuple(data[f"piece_{i}"] for i in range(len(data.files)))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None  # missing or damaged: computed again
+
+
+def _keep(file: Path, pieces: tuple[FloatArray, ...]) -> None:
+    content = io.BytesIO()
+    np.savez(content, **{f"piece_{i}": piece for i, piece in enumerate(pieces)})  # type: ignore[arg-type]
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(file, content.getvalue())
+    except (OSError, ValueError):
+        return  # a cache that cannot be written costs time, nothing else

@@ -1,0 +1,247 @@
+"""A MuJoCo scene: the hand fixed in space at its palm, every joint on a servo, and the object fixed in front of it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from clench.base.errors import HandError
+from clench.base.pose import FloatArray, Pose, invert
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import Body, GraspObject
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
+
+from .convex_pieces import convex_pieces, hull_of
+
+PREFIX = "hand/"
+BASE = "hand base"
+TIMESTEP = 0.002
+#: Bandwidth of the servos [rad/s]: fast beside the motion, slow beside the time step.
+SERVO_BANDWIDTH = 100.0
+#: Least inertia that a servo moves [kg m²], for links whose model gives next to none.
+ARMATURE = 1e-3
+#: Elements of a hand's model that would compete with the servos, and settings that the scene makes.
+_REPLACED = ("actuator", "sensor", "tendon", "equality", "keyframe", "option", "size", "statistic", "visual")
+_ALL_BITS = 0x7FFFFFFF
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Hold a compiled scene and where things are in it.
+
+    Args:
+        model: the compiled `mujoco.MjModel`.
+        qpos: address of every joint of the hand, in the hand's order, shape (J,).
+        link_bodies: body of every link, -1 when the simulation merged it into another, shape (L,).
+        link_geoms: colliding geoms of every link.
+        object_geoms: geoms of the object and its obstacles.
+        approximated: names of the bodies whose simulated shape is only near the object's.
+    """
+
+    model: Any
+    qpos: FloatArray
+    link_bodies: tuple[int, ...]
+    link_geoms: tuple[tuple[int, ...], ...]
+    object_geoms: tuple[int, ...]
+    approximated: tuple[str, ...]
+
+
+def build_scene(hand: Hand, obj: GraspObject, hand_pose: Pose, q: FloatArray, *, show_progress: bool = False) -> Scene:
+    """Place a hand and an object in a scene without gravity.
+
+    The model's own actuators, tendons, equalities and sensors are left out: every joint has a position servo of
+    `SERVO_BANDWIDTH`, within its effort limit, and coupling holds because trajectories obey it. Joint friction, springs
+    and damping are left out too: the servos are ideal, so differences come from contact alone.
+
+    Args:
+        hand: the hand.
+        obj: the object, at its pose.
+        hand_pose: `T_world_palm`.
+        q: posture [rad], shape (J,), at which the palm is placed (matters when a wrist is upstream of it).
+        show_progress: show a bar while convex pieces are computed.
+
+    Raises:
+        HandError: the hand cannot be simulated. ObjectError: the object has a flat body.
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    spec.option.gravity = np.zeros(3)
+    spec.option.timestep = TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    _add_hand(spec, hand)
+    approximated = _add_object(spec, obj, show_progress)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise HandError(f"Hand '{hand.name}' and object '{obj.name}' cannot be simulated: {error}.") from None
+    scene = _located(model, hand, approximated)
+    _tune(scene, hand)
+    _place(scene, hand, hand_pose, q)
+    return scene
+
+
+def _add_hand(spec: Any, hand: Hand) -> None:
+    import mujoco
+
+    if not hand.spec_xml:
+        raise HandError(f"Hand '{hand.name}' has no model that can be simulated.")
+    child = mujoco.MjSpec.from_string(_without_replaced(hand.spec_xml), assets=dict(hand.assets))
+    for joint in list(child.joints):
+        if joint.type == mujoco.mjtJoint.mjJNT_FREE:
+            child.delete(joint)
+    base = spec.worldbody.add_body(name=BASE)
+    spec.attach(child, frame=base.add_frame(), prefix=PREFIX)
+    bodies = {body.name for body in spec.bodies}
+    for a, b in hand.allowed_pairs:
+        names = PREFIX + hand.links[a].name, PREFIX + hand.links[b].name
+        if a != b and bodies.issuperset(names):
+            spec.add_exclude(bodyname1=names[0], bodyname2=names[1])
+    joints = {joint.name for joint in spec.joints}
+    for joint in hand.joints:
+        if PREFIX + joint.name not in joints:
+            raise HandError(f"Joint '{joint.name}' of hand '{hand.name}' is missing in the model that is simulated.")
+        actuator = spec.add_actuator(
+            name=f"servo {joint.name}", target=PREFIX + joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
+        actuator.set_to_position(kp=1.0, kv=0.0)
+        if joint.effort:
+            actuator.forcelimited = True
+            actuator.forcerange = [-joint.effort, joint.effort]
+
+
+def _without_replaced(xml: str) -> str:
+    root = ET.fromstring(xml)
+    for tag in _REPLACED:
+        for element in root.findall(tag):
+            root.remove(element)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _add_object(spec: Any, obj: GraspObject, show_progress: bool) -> tuple[str, ...]:
+    """Add the object's bodies, fixed; return the names of those whose shape is approximated."""
+    base = spec.worldbody.add_body(name="object", pos=obj.pose.position, quat=obj.pose.wxyz)
+    approximated = []
+    for number, body in enumerate(obj.bodies):
+        pieces = _pieces(body, obj.collision_source, show_progress)
+        count = sum(len(vertices) for vertices in pieces.values())
+        for i, (shape, hulls) in enumerate(pieces.items()):
+            for k, vertices in enumerate(hulls):
+                _add_hull(spec, base, f"object {number} {i} {k}", vertices)
+            if not hulls:
+                _add_primitive(base, body.shapes[shape], f"object {number} {i}")
+        if count > sum(1 for hulls in pieces.values() if hulls):
+            approximated.append(body.name)
+    return tuple(approximated)
+
+
+def _pieces(body: Body, source: CollisionSource, show_progress: bool) -> dict[int, tuple[FloatArray, ...]]:
+    """Return the convex hulls of every shape, by its index; none for shapes that the engine knows."""
+    if body.pieces:
+        return {0: tuple(piece.vertices for piece in body.pieces)}
+    found: dict[int, tuple[FloatArray, ...]] = {}
+    for i, shape in enumerate(body.shapes):
+        if shape.kind is not ShapeKind.MESH:
+            found[i] = ()
+            continue
+        mesh = shape.to_mesh()
+        if source is CollisionSource.ENGINE:
+            found[i] = (hull_of(mesh.vertices, body.name)[0],)
+        else:
+            found[i] = convex_pieces(mesh, body.name, show_progress=show_progress)
+    return found
+
+
+def _add_hull(spec: Any, base: Any, name: str, vertices: FloatArray) -> None:
+    import mujoco
+
+    spec.add_mesh(name=name, uservert=np.ascontiguousarray(vertices).ravel())
+    base.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **_surface())
+
+
+def _add_primitive(base: Any, shape: Shape, name: str) -> None:
+    import mujoco
+
+    kinds = {
+        ShapeKind.SPHERE: mujoco.mjtGeom.mjGEOM_SPHERE,
+        ShapeKind.CAPSULE: mujoco.mjtGeom.mjGEOM_CAPSULE,
+        ShapeKind.CYLINDER: mujoco.mjtGeom.mjGEOM_CYLINDER,
+        ShapeKind.BOX: mujoco.mjtGeom.mjGEOM_BOX,
+        ShapeKind.ELLIPSOID: mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    }
+    place = {"pos": shape.pose.position, "quat": shape.pose.wxyz}
+    base.add_geom(name=name, type=kinds[shape.kind], size=np.array(shape.size), **place, **_surface())
+
+
+def _surface() -> dict[str, Any]:
+    """Return how the object's geoms touch: anything that touches at all, as stiffly as the time step allows."""
+    return {"contype": _ALL_BITS, "conaffinity": _ALL_BITS, "priority": 1, "solref": [2 * TIMESTEP, 1.0]}
+
+
+def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
+    import mujoco
+
+    def index(kind: Any, name: str) -> int:
+        return int(mujoco.mj_name2id(model, kind, name))
+
+    bodies = tuple(index(mujoco.mjtObj.mjOBJ_BODY, PREFIX + link.name) for link in hand.links)
+    joints = [index(mujoco.mjtObj.mjOBJ_JOINT, PREFIX + joint.name) for joint in hand.joints]
+    colliding = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    owner = model.geom_bodyid
+    object_body = index(mujoco.mjtObj.mjOBJ_BODY, "object")
+    return Scene(
+        model=model,
+        qpos=model.jnt_qposadr[joints],
+        link_bodies=bodies,
+        link_geoms=tuple(tuple(np.flatnonzero(colliding & (owner == b)).tolist()) if b >= 0 else () for b in bodies),
+        object_geoms=tuple(np.flatnonzero(owner == object_body).tolist()),
+        approximated=approximated,
+    )
+
+
+def _tune(scene: Scene, hand: Hand) -> None:
+    """Give every servo the same bandwidth, critically damped, and take passive forces away."""
+    import mujoco
+
+    model = scene.model
+    model.dof_armature[:] = np.maximum(model.dof_armature, ARMATURE)
+    model.dof_damping[:] = 0.0
+    model.dof_frictionloss[:] = 0.0
+    model.jnt_stiffness[:] = 0.0
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    for i in range(len(hand.joints)):
+        inertia = float(model.dof_M0[model.jnt_dofadr[model.actuator_trnid[i, 0]]])
+        stiffness = SERVO_BANDWIDTH**2 * inertia
+        model.actuator_gainprm[i, 0] = stiffness
+        model.actuator_biasprm[i, :3] = 0.0, -stiffness, -2.0 * SERVO_BANDWIDTH * inertia
+
+
+def _place(scene: Scene, hand: Hand, hand_pose: Pose, q: FloatArray) -> None:
+    """Move the hand's base so that the palm is at its pose when the hand has the given posture."""
+    import mujoco
+
+    model = scene.model
+    palm = scene.link_bodies[hand.palm]
+    if palm < 0:
+        raise HandError(f"Palm '{hand.links[hand.palm].name}' of hand '{hand.name}' is missing in the simulated model.")
+    data = mujoco.MjData(model)
+    data.qpos[scene.qpos] = q
+    mujoco.mj_kinematics(model, data)
+    T_base_palm = body_pose(data, palm)
+    T_world_base = Pose.from_matrix(hand_pose.matrix @ invert(T_base_palm))
+    base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, BASE)
+    model.body_pos[base] = T_world_base.position
+    model.body_quat[base] = T_world_base.wxyz
+
+
+def body_pose(data: Any, body: int) -> FloatArray:
+    """Return the pose of a body in the world, shape (4, 4)."""
+    T = np.eye(4)
+    T[:3, :3] = data.xmat[body].reshape(3, 3)
+    T[:3, 3] = data.xpos[body]
+    return T

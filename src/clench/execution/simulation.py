@@ -1,0 +1,204 @@
+"""A simulated hand (MuJoCo): opens, closes to the computed angles, and tells what it reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from clench.base.pose import FloatArray, Pose
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.solution import Contact, FingerStatus, GraspSolution
+
+from .report import ContactReached, ExecutionReport, JointReached
+from .scene import TIMESTEP, Scene, body_pose, build_scene
+from .trajectory import Trajectory, posture
+
+#: How long the hand stands still after the motion [s], so that the servos settle.
+SETTLING = 0.4
+#: How often touches are looked for [s].
+WATCH_INTERVAL = 0.02
+
+
+class SimulatedHand:
+    """Move a hand in simulation, with the palm fixed and the object held in place.
+
+    The simulated object is made of convex pieces and its contacts are a little soft, so angles and contacts are reached
+    up to tolerances, which the report names.
+
+    Args:
+        hand: the hand.
+        obj: the object; the solution says where it is.
+        angle_tolerance: largest difference to the computed angles that counts as reached [rad].
+        contact_tolerance: largest distance that counts as touching [m].
+        show_progress: show a bar while convex pieces are computed.
+        on_step: called with time [s], joint angles [rad] in model order, shape (J,), whenever touches are looked for.
+    """
+
+    name = "simulated"
+
+    def __init__(
+        self,
+        hand: Hand,
+        obj: GraspObject,
+        *,
+        angle_tolerance: float = 0.02,
+        contact_tolerance: float = 0.001,
+        show_progress: bool = False,
+        on_step: Callable[[float, FloatArray], None] | None = None,
+    ) -> None:
+        self._hand = hand
+        self.obj = obj
+        self.angle_tolerance = angle_tolerance
+        self.contact_tolerance = contact_tolerance
+        self.show_progress = show_progress
+        self.on_step = on_step
+
+    @property
+    def hand(self) -> Hand:
+        """The hand that it moves."""
+        return self._hand
+
+    def carry_out(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
+        """Open, follow the trajectory, stand still for a moment, and compare with the solution.
+
+        Raises:
+            HandError: the hand cannot be simulated. ObjectError: the object cannot. CommandError: the solution is
+                of another hand.
+        """
+        computed = posture(solution.joint_angles, self.hand, "joint_angles")
+        obj = self.obj.posed(solution.object_pose)
+        start = trajectory.positions[0]
+        scene = build_scene(self.hand, obj, solution.hand_pose, start, show_progress=self.show_progress)
+        data, first_touch = self._run(scene, trajectory)
+        reached = np.array(data.qpos[scene.qpos])
+        joints = {
+            name: JointReached(float(c), float(r))
+            for name, c, r in zip(self.hand.joint_names, computed, reached, strict=True)
+        }
+        T_palm_link = self.hand.link_poses(computed)
+        contacts = tuple(
+            self._contact(scene, data, c, solution.hand_pose, T_palm_link) for c in solution.contacts if not c.passed
+        )
+        touched = tuple(
+            link.name
+            for i, link in enumerate(self.hand.links)
+            if nearest(scene, data, i, self.contact_tolerance)[0] <= self.contact_tolerance
+        )
+        error = float(np.abs(reached - computed).max(initial=0.0))
+        success, reason = self._judge(solution, joints, contacts, error)
+        return ExecutionReport(
+            actuator=self.name,
+            success=success,
+            reason=reason,
+            joints=joints,
+            contacts=contacts,
+            touched_links=touched,
+            first_touch=first_touch,
+            duration=float(data.time),
+            largest_angle_error=error,
+            angle_tolerance=self.angle_tolerance,
+            contact_tolerance=self.contact_tolerance,
+            notes=_notes(scene, solution),
+        )
+
+    def _run(self, scene: Scene, trajectory: Trajectory) -> tuple[Any, dict[str, float | None]]:
+        """Simulate the motion; return the final state and when each finger first touched."""
+        import mujoco
+
+        data = mujoco.MjData(scene.model)
+        data.qpos[scene.qpos] = trajectory.positions[0]
+        data.ctrl[:] = trajectory.positions[0]
+        mujoco.mj_forward(scene.model, data)
+        first: dict[str, float | None] = {finger.name: None for finger in self.hand.fingers}
+        every = round(WATCH_INTERVAL / TIMESTEP)
+        for step in range(int(np.ceil((trajectory.duration + SETTLING) / TIMESTEP)) + 1):
+            if step % every == 0:
+                self._watch(scene, data, first)
+            data.ctrl[:] = trajectory.at(data.time)
+            mujoco.mj_step(scene.model, data)
+        mujoco.mj_forward(scene.model, data)
+        self._watch(scene, data, first)
+        return data, first
+
+    def _watch(self, scene: Scene, data: Any, first: dict[str, float | None]) -> None:
+        if self.on_step is not None:
+            self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
+        for finger in self.hand.fingers:
+            if first[finger.name] is None and any(
+                nearest(scene, data, link, self.contact_tolerance)[0] <= self.contact_tolerance for link in finger.links
+            ):
+                first[finger.name] = float(data.time)
+
+    def _contact(
+        self, scene: Scene, data: Any, contact: Contact, hand_pose: Pose, T_palm_link: FloatArray
+    ) -> ContactReached:
+        link = self.hand.link_index(contact.link)
+        gap, position = nearest(scene, data, link, np.inf)
+        T_world_computed = hand_pose.matrix @ T_palm_link[link]
+        p_link = np.linalg.inv(T_world_computed) @ np.append(contact.position, 1.0)
+        moved = (body_pose(data, scene.link_bodies[link]) @ p_link)[:3]
+        return ContactReached(
+            finger=contact.finger,
+            link=contact.link,
+            computed=np.array(contact.position),
+            position=position,
+            gap=gap,
+            displacement=float(np.linalg.norm(moved - contact.position)),
+            touches=gap <= self.contact_tolerance,
+        )
+
+    def _judge(
+        self,
+        solution: GraspSolution,
+        joints: dict[str, JointReached],
+        contacts: tuple[ContactReached, ...],
+        error: float,
+    ) -> tuple[bool, str]:
+        touching = {c.finger for c in contacts if c.touches}
+        wanted = [n for n, f in solution.fingers.items() if f.status is FingerStatus.TOUCH]
+        absent = [name for name in wanted if name not in touching]
+        if error > self.angle_tolerance:
+            worst = max(joints, key=lambda name: abs(joints[name].error))
+            far = f"joint '{worst}' is {error:.3g} rad from its computed angle"
+            return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad."
+        if absent:
+            return False, f"Finger '{absent[0]}' does not touch; tolerance {self.contact_tolerance:g} m."
+        return True, f"Every joint is within {error:.2g} rad of its computed angle, and {len(wanted)} fingers touch."
+
+
+def nearest(scene: Scene, data: Any, link: int, within: float) -> tuple[float, FloatArray]:
+    """Return the distance of a link to the object [m], negative for overlap, and the place [m], shape (3,).
+
+    The distance is infinite when the link has no geometry or is farther away than `within` [m].
+    """
+    import mujoco
+
+    model, best, place = scene.model, np.inf, np.zeros(3)
+    ends = np.zeros(6)
+    others = np.array(scene.object_geoms, dtype=np.int64)
+    for geom in scene.link_geoms[link]:
+        apart = np.linalg.norm(data.geom_xpos[others] - data.geom_xpos[geom], axis=1)
+        bound = apart - model.geom_rbound[others] - model.geom_rbound[geom]
+        for k in np.argsort(bound):
+            reach = min(best, within)
+            if bound[k] > reach:
+                break
+            distance = mujoco.mj_geomDistance(model, data, geom, int(others[k]), min(reach, 10.0) + 1e-6, ends)
+            if distance < min(best, within + 1e-6):
+                best, place = float(distance), (ends[:3] + ends[3:]) / 2.0
+    return best, place
+
+
+def _notes(scene: Scene, solution: GraspSolution) -> tuple[str, ...]:
+    notes = ["Contacts in the simulation are a little soft: links may overlap the object by some micrometres."]
+    if scene.approximated:
+        names = ", ".join(f"'{name}'" for name in scene.approximated)
+        notes.append(f"The simulated shape of {names} is made of convex pieces, which are near the true surface only.")
+    if solution.collision_source != "engine":
+        notes.append(
+            f"The solution is for the hand's '{solution.collision_source}' geometry, the simulation collides 'engine'."
+        )
+    return tuple(notes)

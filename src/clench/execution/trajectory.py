@@ -1,0 +1,288 @@
+"""Timed joint paths from the open hand to the touch, on which all fingers arrive together (METHOD.md section 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from clench.base.errors import CommandError, FileError
+from clench.base.json_files import non_finite_path, read_json, write_json
+from clench.base.pose import FloatArray
+from clench.models.command import ClosingOrder
+from clench.models.hand.hand import Hand, JointRole
+from clench.solve.solution import GraspSolution
+
+SCHEMA = "clench.trajectory/1"
+#: Speed of joints whose model gives no limit [rad/s].
+DEFAULT_SPEED = 2.0
+#: Way-points per stage; speed rises from zero and falls to zero within each.
+STAGE_STEPS = 8
+#: Joints that move less than this stand still [rad].
+STILL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Hold way-points of all joints; between two of them joints move at constant speed.
+
+    Args:
+        hand, object: names.
+        joints: names of all joints, in model order.
+        times: of the way-points [s], shape (N,), rising from 0.
+        positions: joint angles [rad], shape (N, J); the first is the open hand, the last the touch.
+        velocity_limits: of the joints [rad/s], shape (J,).
+    """
+
+    hand: str
+    object: str
+    joints: tuple[str, ...]
+    times: FloatArray
+    positions: FloatArray
+    velocity_limits: FloatArray
+
+    @property
+    def duration(self) -> float:
+        """Time from the open hand to the touch [s]."""
+        return float(self.times[-1])
+
+    def at(self, time: float) -> FloatArray:
+        """Return the angles at a time [s], shape (J,); before the start the first, after the end the last."""
+        return np.array([np.interp(time, self.times, column) for column in self.positions.T])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form, schema `clench.trajectory/1`."""
+        last = len(self.times) - 1
+        phases = ["open", *["closing"] * (last - 1), "touch"] if last else ["touch"]
+        return {
+            "schema": SCHEMA,
+            "hand": self.hand,
+            "object": self.object,
+            "joints": list(self.joints),
+            "velocity_limits": self.velocity_limits.tolist(),
+            "pregrasp": None,
+            "points": [
+                {"time": float(t), "phase": phase, "positions": q.tolist()}
+                for t, phase, q in zip(self.times, phases, self.positions, strict=True)
+            ],
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write the JSON form, atomically.
+
+        Raises:
+            ClenchError: a number is not finite. FileError: the file cannot be written.
+        """
+        write_json(path, self.to_dict(), "trajectory")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Trajectory:
+        """Read a file written by `save`.
+
+        Raises:
+            FileError: missing, not JSON, or not a trajectory; the message names the key.
+        """
+        return _read(read_json(path), str(path))
+
+
+def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) -> Trajectory:
+    """Time the path on which a solution was computed, so that all fingers touch at the same moment, slowly.
+
+    Every finger goes through its closing path joint by joint, as computed: a straight line in joint space could meet
+    the object before the contacts do. The slowest finger sets the duration, the others are slowed down to it. Posture
+    joints that differ between the open hand and the solution move first. Paths of other closing orders than
+    proximal-first are straight lines.
+
+    Args:
+        solution: the solution.
+        hand: the hand it was computed for.
+        speed: fraction of the velocity limits to use, above 0 and up to 1.
+
+    Raises:
+        CommandError: the solution is of another hand, lacks a joint, or `speed` is out of range.
+    """
+    if not 0.0 < speed <= 1.0:
+        raise CommandError(f"speed: expected a fraction above 0 and up to 1, got {speed}.")
+    start, end = (
+        posture(solution.open_angles, hand, "open_angles"),
+        posture(solution.joint_angles, hand, "joint_angles"),
+    )
+    limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
+    turned, opening = _preparation(hand, start, end)
+    timed = [
+        (_timed(list(_stages(solution, hand, f.name, f.joints, turned, end)), limits * speed)) for f in hand.fingers
+    ]
+    duration = max((times[-1] for times, _ in timed), default=0.0)
+    grid = np.unique(np.concatenate([np.zeros(1), *(_stretched(times, duration) for times, _ in timed)]))
+    positions = np.tile(turned, (len(grid), 1))
+    for finger, (times, path) in zip(hand.fingers, timed, strict=True):
+        for j in finger.joints:
+            if np.ptp(path[:, j]) > 0.0:
+                positions[:, j] = np.interp(grid, _stretched(times, duration), path[:, j])
+    positions[-1] = end
+    before, lead_in = _timed(opening, limits * speed)
+    return Trajectory(
+        hand=solution.hand,
+        object=solution.object,
+        joints=hand.joint_names,
+        times=np.concatenate([before[:-1], before[-1] + grid]),
+        positions=np.vstack([lead_in[:-1], positions]),
+        velocity_limits=limits,
+    )
+
+
+def posture(angles: Any, hand: Hand, key: str) -> FloatArray:
+    """Return named angles in model order, shape (J,) [rad].
+
+    Raises:
+        CommandError: a joint of the hand is missing, or a name is not one of its joints.
+    """
+    missing = [name for name in hand.joint_names if name not in angles]
+    extra = sorted(set(angles) - set(hand.joint_names))
+    if missing or extra:
+        problem = f"joint '{missing[0]}' is missing" if missing else f"'{extra[0]}' is no joint of it"
+        raise CommandError(f"{key}: the solution does not fit hand '{hand.name}': {problem}.")
+    return np.array([angles[name] for name in hand.joint_names], dtype=np.float64)
+
+
+def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
+    """Return the open posture after everything but the closing joints has moved, and the path there."""
+    in_fingers = {j for finger in hand.fingers for j in finger.joints}
+    first = [
+        j
+        for j, joint in enumerate(hand.joints)
+        if abs(end[j] - start[j]) > STILL and (joint.role is not JointRole.CLOSING or j not in in_fingers)
+    ]
+    turned = start.copy()
+    turned[first] = end[first]
+    return turned, [_eased(start, turned)] if first else [start[None]]
+
+
+def _stages(
+    solution: GraspSolution, hand: Hand, finger: str, joints: tuple[int, ...], start: FloatArray, end: FloatArray
+) -> Iterator[FloatArray]:
+    """Yield the stages of a finger: way-points of all joints, shape (n, J), of which only the finger's move."""
+    q = start.copy()
+    yield q[None].copy()
+    order = next((c.order for c in _chosen(solution, finger)), ClosingOrder.PROXIMAL_FIRST)
+    if order != ClosingOrder.PROXIMAL_FIRST:
+        target = q.copy()
+        target[list(joints)] = end[list(joints)]
+        yield _eased(q, target)
+        return
+    followers = {c.follower for c in hand.couplings}
+    for leader in joints:
+        if leader in followers:
+            continue
+        group = [leader, *(j for j in _followers(hand, leader) if j in joints)]
+        path = _group_path(hand, group, q, end)
+        yield path
+        q = path[-1].copy()
+        # A follower that broke away went on alone after its leader was stopped.
+        target = q.copy()
+        target[group] = end[group]
+        if np.abs(target - q).max() > STILL:
+            yield _eased(q, target)
+            q = target
+    target = q.copy()
+    target[list(joints)] = end[list(joints)]
+    yield _eased(q, target)
+
+
+def _group_path(hand: Hand, group: list[int], start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return way-points on which a leader goes to its end and its followers obey their couplings, shape (n, J)."""
+    leader, followers = group[0], group[1:]
+    if abs(end[leader] - start[leader]) <= STILL:
+        return start[None].copy()
+    path = _eased(start, np.where(np.arange(len(start)) == leader, end, start))
+    offset = start[followers] - hand.coupled(start)[followers]
+    for k, s in enumerate(np.linspace(0.0, 1.0, len(path))):
+        path[k, followers] = hand.coupled(path[k])[followers] + (1.0 - s) * offset
+    return path
+
+
+def _followers(hand: Hand, leader: int) -> list[int]:
+    found: list[int] = []
+    for coupling in hand.couplings:
+        if coupling.leader == leader or coupling.leader in found:
+            found.append(coupling.follower)
+    return found
+
+
+def _chosen(solution: GraspSolution, finger: str) -> tuple[Any, ...]:
+    result = solution.fingers.get(finger)
+    if result is None or not 0 <= result.chosen < len(result.candidates):
+        return ()
+    return (result.candidates[result.chosen],)
+
+
+def _eased(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return way-points, evenly spaced in time, that leave and arrive slowly, shape (n, J)."""
+    s = np.linspace(0.0, 1.0, STAGE_STEPS + 1)[:, None]
+    path: FloatArray = start + (s * s * (3.0 - 2.0 * s)) * (end - start)
+    path[-1] = end
+    return path
+
+
+def _timed(stages: list[FloatArray], limits: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Join stages to one path, as fast as the limits allow; return times (n,) [s] and way-points (n, J)."""
+    times, path = [0.0], [stages[0][0]]
+    for stage in stages:
+        step = float((np.abs(np.diff(stage, axis=0)) / limits).max(initial=0.0))
+        if step == 0.0:
+            continue
+        times += [times[-1] + step * (k + 1) for k in range(len(stage) - 1)]
+        path += list(stage[1:])
+    return np.array(times), np.array(path)
+
+
+def _stretched(times: FloatArray, duration: float) -> FloatArray:
+    return times * (duration / times[-1]) if times[-1] > 0.0 else times
+
+
+class _PointForm(msgspec.Struct):
+    time: float
+    phase: str
+    positions: list[float]
+
+
+class _Form(msgspec.Struct):
+    hand: str
+    object: str
+    joints: list[str]
+    velocity_limits: list[float]
+    points: list[_PointForm]
+
+
+def _read(data: Any, source: str) -> Trajectory:
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise FileError(source, f"schema: expected '{SCHEMA}'.")
+    bad = non_finite_path(data)
+    if bad is not None:
+        raise FileError(source, f"{bad}: expected a finite number.")
+    try:
+        form = msgspec.convert(data, _Form)
+    except msgspec.ValidationError as error:
+        raise FileError(source, f"{str(error).replace('`', chr(39))}.") from None
+    count = len(form.joints)
+    if not form.points:
+        raise FileError(source, "points: expected at least one.")
+    if len(form.velocity_limits) != count:
+        raise FileError(source, f"velocity_limits: expected {count} numbers, got {len(form.velocity_limits)}.")
+    for i, point in enumerate(form.points):
+        if len(point.positions) != count:
+            raise FileError(source, f"points[{i}].positions: expected {count} angles, got {len(point.positions)}.")
+        if i and point.time <= form.points[i - 1].time:
+            raise FileError(source, f"points[{i}].time: expected more than {form.points[i - 1].time} s.")
+    return Trajectory(
+        hand=form.hand,
+        object=form.object,
+        joints=tuple(form.joints),
+        times=np.array([p.time for p in form.points]),
+        positions=np.array([p.positions for p in form.points]).reshape(len(form.points), count),
+        velocity_limits=np.array(form.velocity_limits),
+    )
