@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
+from typing import Any, NamedTuple
 
+from numpy.typing import ArrayLike
+
+from clench.base.errors import ObjectError
 from clench.base.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape
@@ -38,6 +43,27 @@ class Body:
     pieces: tuple[TriangleMesh, ...] = ()
     closed: bool = True
 
+    def moved(self, pose: Pose) -> Body:
+        """Return the body with all of its geometry mapped by a pose."""
+        shapes = tuple(replace(shape, pose=pose @ shape.pose) for shape in self.shapes)
+        return replace(self, shapes=shapes, pieces=tuple(piece.transformed(pose) for piece in self.pieces))
+
+
+class MeshPart(NamedTuple):
+    """Describe one mesh of an object that has several.
+
+    Args:
+        vertices: [m], shape (V, 3). triangles: shape (T, 3), counter-clockwise seen from outside.
+        pose: `T_object_mesh`, identity by default. role: graspable or obstacle.
+        name: for messages and contacts.
+    """
+
+    vertices: ArrayLike
+    triangles: ArrayLike
+    pose: Pose | None = None
+    role: BodyRole | str = BodyRole.GRASPABLE
+    name: str = ""
+
 
 @dataclass(frozen=True)
 class GraspObject:
@@ -59,6 +85,10 @@ class GraspObject:
     warnings: tuple[str, ...] = ()
     path: Path | None = None
 
+    def __post_init__(self) -> None:
+        if not any(body.role is BodyRole.GRASPABLE for body in self.bodies):
+            raise ObjectError(f"{self.name}: expected at least one graspable body, got obstacles only.")
+
     @classmethod
     def load(
         cls,
@@ -72,11 +102,12 @@ class GraspObject:
 
         Args:
             model: ``"mug"``, ``"bottle"``, ``"screwdriver"``, ``"ball"``; a path to obj, stl, ply, off or glb;
-                or ``"sphere:r=0.03"``, ``"cylinder:r=0.03,h=0.1"``, ``"capsule:r=0.02,h=0.1"``,
+                or ``"sphere:r=0.03"``, ``"cylinder:r=0.03,h=0.1"``, ``"capsule:r=0.02,h=0.1"`` (h: straight part),
                 ``"box:x=0.1,y=0.05,z=0.03"`` (full lengths), ``"ellipsoid:a=0.03,b=0.02,c=0.05"`` (semi-axes).
             scale: multiplies every length.
             pose: `T_world_object`, identity by default.
-            collision_source: `raw` (default), `engine` (the convex hull of every mesh) or `visual` (as raw).
+            collision_source: `raw` (default), `engine` (what a simulator collides: the convex pieces where known,
+                else the convex hull of every mesh) or `visual` (as raw).
 
         Raises:
             FileError: missing file, not a mesh. ObjectError: empty, NaN, bad parameter. UnknownNameError.
@@ -85,10 +116,70 @@ class GraspObject:
 
         return load_object(model, scale=scale, pose=pose, collision_source=collision_source)
 
+    @classmethod
+    def from_shape(
+        cls,
+        shape: Shape | str,
+        *,
+        name: str = "",
+        pose: Pose | None = None,
+        role: BodyRole | str = BodyRole.GRASPABLE,
+        collision_source: CollisionSource | str = CollisionSource.RAW,
+    ) -> GraspObject:
+        """Make an object of one shape, given as a `Shape` or as text like ``"box:x=0.1,y=0.05,z=0.03"``.
+
+        Raises:
+            ObjectError: sizes that are not positive, or a malformed mesh. UnknownNameError: no such shape.
+        """
+        from .loading import object_from_shape
+
+        return object_from_shape(shape, name=name, pose=pose, role=role, collision_source=collision_source)
+
+    @classmethod
+    def from_meshes(
+        cls,
+        parts: Iterable[MeshPart | tuple[Any, ...]],
+        *,
+        name: str = "object",
+        pose: Pose | None = None,
+        collision_source: CollisionSource | str = CollisionSource.RAW,
+    ) -> GraspObject:
+        """Make one object of several meshes, each with its pose and role.
+
+        Args:
+            parts: `MeshPart`, or tuples `(vertices, triangles, pose, role, name)` whose last three may be left out.
+            name: for messages and records. pose: `T_world_object`. collision_source: as in `load`.
+
+        Raises:
+            ObjectError: empty, NaN, an index out of range, no graspable part. UnknownNameError: no such role.
+        """
+        from .loading import object_from_meshes
+
+        return object_from_meshes(parts, name=name, pose=pose, collision_source=collision_source)
+
     def posed(self, pose: Pose) -> GraspObject:
         """Return the object at another `T_world_object`."""
         return replace(self, pose=pose)
 
     def with_body(self, body: Body) -> GraspObject:
-        """Return the object with one body more, e.g. an obstacle."""
+        """Return the object with one body more, e.g. an obstacle; see `table` for one."""
         return replace(self, bodies=(*self.bodies, body))
+
+    def with_object(
+        self, other: GraspObject, pose: Pose | None = None, role: BodyRole | str | None = None
+    ) -> GraspObject:
+        """Return the object with the bodies of another one.
+
+        Args:
+            other: its own `T_world_object` is not used.
+            pose: `T_object_other`, where the other stands in this object's frame; identity by default.
+            role: what its bodies are to the hand; None keeps their own.
+
+        Raises:
+            UnknownNameError: no such role.
+        """
+        from .loading import role_named
+
+        placed = (body.moved(pose) if pose else body for body in other.bodies)
+        added = tuple(replace(body, role=role_named(role)) if role else body for body in placed)
+        return replace(self, bodies=(*self.bodies, *added), warnings=(*self.warnings, *other.warnings))

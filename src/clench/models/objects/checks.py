@@ -1,0 +1,189 @@
+"""What is looked at before a mesh is used: numbers, degenerate triangles, holes, winding, units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clench.base.errors import ObjectError
+from clench.base.pose import FloatArray
+from clench.models.mesh import IntArray, TriangleMesh
+
+from .topology import components, edge_defects, parted, winding_number, without_flaps
+
+#: Objects larger than this probably have units of millimetres [m]; smaller than `SMALL`, something else is wrong.
+LARGE: Final = 2.0
+SMALL: Final = 1e-3
+#: A triangle is degenerate when its height is below this fraction of its longest side [-].
+DEGENERATE_HEIGHT: Final = 1e-10
+#: A component encloses nothing when its volume is below this fraction of its size cubed [-].
+NO_VOLUME: Final = 1e-12
+
+
+@dataclass(frozen=True)
+class CheckedMesh:
+    """Hold a mesh that is fit to use, whether it is closed and wound outwards, and what was found."""
+
+    mesh: TriangleMesh
+    closed: bool
+    warnings: tuple[str, ...]
+
+
+def check_mesh(vertices: ArrayLike, triangles: ArrayLike, name: str) -> CheckedMesh:
+    """Check the arrays of a mesh and repair what has one answer.
+
+    Degenerate and repeated triangles are dropped, parts that are wound inwards are turned. `closed` is true when every
+    edge has exactly two uses, in opposite directions, and every part of the surface is wound outwards.
+
+    Args:
+        vertices: [m], shape (V, 3). triangles: shape (T, 3). name: for messages.
+
+    Raises:
+        ObjectError: wrong shape, empty, not finite, an index out of range, only degenerate triangles.
+    """
+    points, faces = mesh_arrays(vertices, triangles, name)
+    warnings: list[str] = []
+    faces = _without_repeats(faces, name, warnings)
+    faces, closed = _manifold(faces, len(points), name, warnings)
+    used, index = np.unique(faces, return_inverse=True)
+    points, faces = points[used % len(points)], index.reshape(-1, 3).astype(np.int64)
+    if closed:
+        faces, closed = _wound_outwards(points, faces, name, warnings)
+    # Slivers with three different corners enclose nothing, so dropping them leaves the surface closed.
+    faces = _without_slivers(points, faces, name, warnings)
+    used, index = np.unique(faces, return_inverse=True)
+    return CheckedMesh(TriangleMesh(points[used], index.reshape(-1, 3)), closed, tuple(warnings))
+
+
+def unit_warnings(vertices: FloatArray, name: str) -> tuple[str, ...]:
+    """Return a sentence when the size of an object, shape (V, 3) [m], looks as if its units were others than metres."""
+    extent = float(np.ptp(vertices, axis=0).max())
+    if extent > LARGE:
+        return (f"{name} is {extent:.4g} m across: if its units are millimetres, load it with scale=0.001.",)
+    if extent < SMALL:
+        return (f"{name} is only {extent:.4g} m across: if its units are not metres, load it with another scale.",)
+    return ()
+
+
+def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[FloatArray, IntArray]:
+    """Return vertices (V, 3) and triangles (T, 3) as arrays of the right kind.
+
+    Raises:
+        ObjectError: wrong shape, empty, not finite, an index out of range.
+    """
+    try:
+        points = np.asarray(vertices, dtype=np.float64)
+        indices = np.asarray(triangles)
+        faces = indices.astype(np.int64)
+    except (TypeError, ValueError):
+        raise ObjectError(f"{name}: expected arrays of numbers for vertices (V, 3) and triangles (T, 3).") from None
+    if points.size == 0 or faces.size == 0:
+        missing = "vertices" if points.size == 0 else "triangles"
+        raise ObjectError(f"{name}: the mesh is empty, it has no {missing}.")
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ObjectError(f"{name}: expected vertices of shape (V, 3), got {points.shape}.")
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise ObjectError(f"{name}: expected triangles of shape (T, 3), got {faces.shape}.")
+    bad = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
+    if bad:
+        raise ObjectError(
+            f"{name}: {bad} of {len(points)} vertices are NaN or infinite; expected finite numbers in metres."
+        )
+    if not np.array_equal(indices, faces):
+        raise ObjectError(f"{name}: expected whole numbers as vertex indices of triangles.")
+    outside = (faces < 0) | (faces >= len(points))
+    if outside.any():
+        raise ObjectError(f"{name}: a triangle names vertex {faces[outside][0]}, but there are {len(points)} vertices.")
+    return points, faces
+
+
+def _without_repeats(faces: IntArray, name: str, warnings: list[str]) -> IntArray:
+    """Drop triangles that name a vertex twice, and all but one of those that are equal."""
+    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    if not distinct.all():
+        warnings.append(
+            f"{name}: dropped {_count(int(np.count_nonzero(~distinct)), 'triangle')} naming one vertex twice."
+        )
+        faces = faces[distinct]
+    if not len(faces):
+        raise ObjectError(f"{name}: every triangle is degenerate.")
+    start = np.argmin(faces, axis=1)
+    turned = np.take_along_axis(faces, (start[:, None] + np.arange(3)) % 3, axis=1)
+    _, first = np.unique(turned, axis=0, return_index=True)
+    if len(first) < len(faces):
+        warnings.append(f"{name}: dropped {_count(len(faces) - len(first), 'triangle')} repeating another one.")
+        faces = faces[np.sort(first)]
+    return faces
+
+
+def _without_slivers(points: FloatArray, faces: IntArray, name: str, warnings: list[str]) -> IntArray:
+    """Drop triangles without area, whose normal would be noise."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([np.linalg.norm(p - q, axis=1) for p, q in ((b, a), (c, b), (a, c))], axis=0)
+    fine = area2 > DEGENERATE_HEIGHT * longest**2
+    if not fine.any():
+        raise ObjectError(f"{name}: every triangle is degenerate.")
+    if not fine.all():
+        warnings.append(f"{name}: dropped {_count(int(np.count_nonzero(~fine)), 'triangle')} without area.")
+    kept: IntArray = faces[fine]
+    return kept
+
+
+def _manifold(faces: IntArray, vertices: int, name: str, warnings: list[str]) -> tuple[IntArray, bool]:
+    """Return triangles and whether the surface is closed; say what is wrong otherwise.
+
+    Edges with more than two uses have two harmless causes that are undone here: flaps (two triangles back to back, left
+    where rounding collapsed a short edge), and solids that share an edge, which get vertices of their own.
+    """
+    defects = edge_defects(faces)
+    if defects.crowded:
+        flat = without_flaps(faces)
+        for repaired in (flat, parted(faces, vertices), parted(flat, vertices)):
+            if len(repaired) and edge_defects(repaired).none:
+                if len(repaired) < len(faces):
+                    dropped = _count(len(faces) - len(repaired), "triangle")
+                    warnings.append(f"{name}: dropped {dropped} lying back to back.")
+                return repaired, True
+    consequence = "it is used as an open surface, from both sides."
+    if defects.holes:
+        edges = _count(defects.holes, "edge")
+        warnings.append(f"{name}: not watertight, {edges} with a triangle on one side only; {consequence}")
+    if defects.crowded:
+        warnings.append(f"{name}: {_count(defects.crowded, 'edge')} with more than two triangles; {consequence}")
+    if defects.twisted:
+        warnings.append(f"{name}: winding is inconsistent at {_count(defects.twisted, 'edge')}; {consequence}")
+    return faces, defects.none
+
+
+def _wound_outwards(points: FloatArray, faces: IntArray, name: str, warnings: list[str]) -> tuple[IntArray, bool]:
+    """Turn the components of a closed surface that are inside out; a component inside another one is a cavity."""
+    component = components(faces, len(points))
+    # About the middle of the bounding box, so that an object far from the origin loses no digits.
+    centered = points - (points.min(axis=0) + points.max(axis=0)) / 2.0
+    a, b, c = (centered[faces[:, k]] for k in range(3))
+    volume = np.bincount(component, weights=np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
+    size = float(np.ptp(points, axis=0).max())
+    if (np.abs(volume) < NO_VOLUME * size**3).any():
+        warnings.append(f"{name}: a part of its surface encloses no volume; it is used from both sides.")
+        return faces, False
+    faces = faces.copy()
+    turned = 0
+    for k in np.flatnonzero(volume < 0):
+        mine = component == k
+        others = ~mine & (volume[component] > 0)
+        inside = others.any() and winding_number(points[faces[mine][0]].mean(axis=0), points, faces[others]) > 0.5
+        if not inside:
+            faces[mine] = faces[mine][:, ::-1]
+            turned += 1
+    if turned:
+        what = "its triangles were" if turned == len(volume) else f"{turned} of its {len(volume)} parts were"
+        warnings.append(f"{name}: {what} wound inwards and have been turned.")
+    return faces, True
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

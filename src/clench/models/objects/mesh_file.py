@@ -1,0 +1,73 @@
+"""Mesh files, read through trimesh into plain arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clench.base.errors import FileError
+from clench.base.pose import FloatArray
+from clench.models.mesh import IntArray
+
+SUFFIXES: Final = (".obj", ".stl", ".ply", ".off", ".glb")
+
+
+def read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
+    """Read vertices (V, 3) and triangles (T, 3) of a mesh file, in the file's units; a scene becomes one mesh.
+
+    Vertices at one place are merged whatever their texture or normal, so that a closed surface is seen to be closed.
+
+    Raises:
+        FileError: missing, a directory, not one of `SUFFIXES`, not a mesh.
+    """
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        raise FileError(path, "is a directory; expected a mesh file.")
+    if not path.exists():
+        raise FileError(path, "no such file.")
+    if suffix not in SUFFIXES:
+        raise FileError(path, f"cannot read '{suffix or path.name}'; expected one of {', '.join(SUFFIXES)}.")
+    if path.stat().st_size == 0:
+        raise FileError(path, "the file is empty.")
+    loaded = _parse(path, suffix[1:])
+    vertices, triangles = np.asarray(loaded.vertices), np.asarray(getattr(loaded, "faces", ()))
+    if len(vertices) == 0:
+        raise FileError(path, f"not a mesh, nothing in it reads as {suffix[1:].upper()}.")
+    if len(triangles) == 0:
+        raise FileError(path, f"has {len(vertices)} points but no triangles.")
+    return merged(vertices, triangles)
+
+
+def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntArray]:
+    """Return a mesh whose vertices at one place (to 1e-8 of the largest coordinate) are one vertex.
+
+    Coordinates that are not finite and indices out of range are left for the check to report.
+    """
+    import trimesh
+
+    points, faces = np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int64)
+    if not np.isfinite(points).all() or faces.size == 0 or faces.min() < 0 or faces.max() >= len(points):
+        return points, faces
+    largest = float(np.abs(points).max(initial=0.0))
+    mesh = trimesh.Trimesh(points, faces, process=False, validate=False)
+    digits = 8 - int(np.floor(np.log10(largest))) if largest > 0 else 8
+    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=digits)
+    return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+
+
+def _parse(path: Path, file_type: str) -> Any:
+    """Return trimesh's mesh or point cloud; whatever its readers raise on garbage becomes one sentence."""
+    import trimesh
+
+    options: dict[str, Any] = {"skip_materials": True} if file_type == "obj" else {}
+    try:
+        loaded = trimesh.load(path, file_type=file_type, process=False, **options)
+        return loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
+    except Exception as error:
+        reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
+        raise FileError(path, f"not a readable {file_type.upper()} mesh ({reason}).") from None
