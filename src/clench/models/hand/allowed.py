@@ -18,9 +18,7 @@ from .kinematics import Skeleton
 _TOUCH = 1e-6
 
 
-def allowed_pairs(
-    compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link, ...]
-) -> tuple[tuple[int, int], ...]:
+def allowed_pairs(compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link, ...]) -> tuple[tuple[int, int], ...]:
     """Return the pairs of link indices that may overlap, sorted.
 
     Args:

@@ -64,7 +64,9 @@ def compile_model(text: ModelText) -> CompiledModel:
 def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
     """Return the model without the bodies that are not kept; their subtrees go with them."""
     m = compiled.model
-    gone = [b for b in range(1, m.nbody) if b not in kept and (int(m.body_parentid[b]) in kept or m.body_parentid[b] == 0)]
+    gone = [
+        b for b in range(1, m.nbody) if b not in kept and (int(m.body_parentid[b]) in kept or m.body_parentid[b] == 0)
+    ]
     if not gone:
         return compiled
     spec = compiled.spec
@@ -100,9 +102,9 @@ def refuse_loops(compiled: CompiledModel, palm: int | None) -> None:
     import mujoco
 
     m = compiled.model
-    loops = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+    connect, weld = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
     for e in range(m.neq):
-        if m.eq_type[e] not in loops:
+        if int(m.eq_type[e]) not in (connect, weld) or not m.eq_active0[e]:
             continue
         ends = [_body_of(m, int(m.eq_objtype[e]), int(i)) for i in (m.eq_obj1id[e], m.eq_obj2id[e])]
         if palm is None:
@@ -110,7 +112,7 @@ def refuse_loops(compiled: CompiledModel, palm: int | None) -> None:
         else:
             closes = any(_moves_below(m, body, palm) for body in ends)
         if closes:
-            kind = "connect" if m.eq_type[e] == loops[0] else "weld"
+            kind = "connect" if int(m.eq_type[e]) == connect else "weld"
             first, second = (compiled.body_name(b) for b in ends)
             raise HandError(
                 f"{compiled.label}: bodies '{first}' and '{second}' close a kinematic loop (<{kind}>); "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from .hand import Finger, Hand
 
 #: Shorter pieces of a finger tell no direction [m].
 _SHORT = 2e-3
+#: A piece before the first closing joint must be longer to tell where the finger is straight [m].
+_LEAD = 1e-2
 #: The farthest part of the last link that counts as its tip [-].
 _TIP_PART = 0.85
 
@@ -61,14 +64,14 @@ def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float 
         line: the finger. closing: positions of its closing joints in the chain, palm side first.
         axis: unit, shape (3,); positive bends turn about it.
 
-    None for the first joint, which no piece of the finger precedes, and where a piece is too short to tell.
+    None where a piece is too short to tell, and for a first joint that no piece of the finger precedes.
     """
     points = np.vstack([line.anchors[closing], line.tip])
     flat = points - np.outer(points @ axis, axis)
-    pieces = np.diff(flat, axis=0)
-    found: list[float | None] = [None]
-    for before, after in zip(pieces[:-1], pieces[1:], strict=True):
-        if min(np.linalg.norm(before), np.linalg.norm(after)) < _SHORT:
+    pieces = [_lead(line, closing[0], axis), *np.diff(flat, axis=0)]
+    found: list[float | None] = []
+    for before, after in itertools.pairwise(pieces):
+        if before is None or min(np.linalg.norm(before), np.linalg.norm(after)) < _SHORT:
             found.append(None)
             continue
         found.append(float(np.arctan2(np.cross(before, after) @ axis, before @ after)))
@@ -78,6 +81,20 @@ def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float 
 def tip_motion(line: FingerLine, rates: FloatArray) -> FloatArray:
     """Return the velocity of the tip [m/s] for joint rates [rad/s], shape (n,)."""
     return np.asarray(np.einsum("j,jk->k", rates, np.cross(line.axes, line.tip - line.anchors)))
+
+
+def _lead(line: FingerLine, first: int, axis: FloatArray) -> FloatArray | None:
+    """Return the piece of the finger before its first closing joint, across `axis` [m]; None when there is none.
+
+    It runs from the axis of an earlier joint; its share along that axis means nothing and is taken off.
+    """
+    for k in range(first - 1, -1, -1):
+        piece = line.anchors[first] - line.anchors[k]
+        piece = piece - line.axes[k] * (piece @ line.axes[k])
+        piece = piece - axis * (piece @ axis)
+        if np.linalg.norm(piece) >= _LEAD:
+            return np.asarray(piece)
+    return None
 
 
 def _joint_place(hand: Hand, link: int) -> FloatArray:

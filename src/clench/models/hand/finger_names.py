@@ -37,11 +37,11 @@ def short_names(joint_names: list[list[str]], link_names: list[list[str]]) -> li
     return [name if counts[name] == 1 else "" for name in found]
 
 
-def place_names(distances: list[float], thumb: int | None, taken: list[str]) -> list[str]:
-    """Fill in names by place: counted from the thumb, or by number.
+def place_names(places: list[float], thumb: int | None, taken: list[str]) -> list[str]:
+    """Fill in names by place: counted from the thumb's side, or by number.
 
     Args:
-        distances: of every finger's base from the thumb's [m]; not used without a thumb.
+        places: of every finger's base along the row of fingers, from the thumb's side [m]; not used without a thumb.
         thumb: index of the thumb, or None. taken: names found so far, empty where unknown.
     """
     names = list(taken)
@@ -51,7 +51,7 @@ def place_names(distances: list[float], thumb: int | None, taken: list[str]) -> 
         unknown.remove(thumb)
     others = [i for i in range(len(names)) if i != thumb]
     if thumb is not None and unknown == others and 2 <= len(others) <= len(_BY_PLACE):
-        for name, i in zip(_BY_PLACE, sorted(others, key=lambda i: distances[i]), strict=False):
+        for name, i in zip(_BY_PLACE, sorted(others, key=lambda i: places[i]), strict=False):
             names[i] = name
         return names
     for i in unknown:
@@ -71,13 +71,28 @@ def _common_words(names: list[str]) -> set[str]:
 
 def _beginnings(joint_names: list[list[str]]) -> list[str]:
     """Return the common beginning of every finger's joints, without what other fingers begin with too."""
-    own = [_common_prefix(names) if len(names) > 1 else "" for names in joint_names]
+    own = [_shared_beginning(names) for names in joint_names]
     result: list[str] = []
     for i, mine in enumerate(own):
         shared = max((len(_common_prefix([mine, other])) for k, other in enumerate(own) if k != i), default=0)
-        cut = max((mine.rfind(s, 0, shared) for s in "_/-. "), default=-1) + 1
+        cut = _word_start(mine, shared)
+        if not re.search("[A-Za-z]", mine[cut:]) and cut > 0:
+            cut = _word_start(mine, cut - 1)
         result.append(mine[cut:])
     return result
+
+
+def _shared_beginning(names: list[str]) -> str:
+    """Return what all names begin with, never half of a number; nothing when there is only one."""
+    prefix = _common_prefix(names) if len(names) > 1 else ""
+    if any(name[len(prefix) :][:1].isdigit() for name in names):
+        prefix = prefix.rstrip("0123456789")
+    return prefix
+
+
+def _word_start(name: str, place: int) -> int:
+    """Return where the word at a place of a name starts."""
+    return max(name.rfind(separator, 0, place) for separator in "_/-. ") + 1
 
 
 def _sound(beginning: str) -> list[str]:
@@ -88,10 +103,10 @@ def _sound(beginning: str) -> list[str]:
 
 
 def _link_word(finger: int, link_names: list[list[str]]) -> list[str]:
-    """Return a known word in at least half of a finger's links and in no other finger's."""
+    """Return the known word that most of a finger's links have and no other finger's."""
     others = {w for k, names in enumerate(link_names) if k != finger for n in names for w in _words(n)}
     counts = Counter(w for n in link_names[finger] for w in set(_words(n)) if w in _KNOWN and w not in others)
-    return [w for w, count in counts.most_common(1) if 2 * count >= len(link_names[finger])]
+    return [w for w, _ in counts.most_common(1)]
 
 
 def _common_prefix(names: list[str]) -> str:

@@ -75,17 +75,31 @@ def find_thumb(fingers: tuple[Finger, ...], stretch: FloatArray, closing: FloatA
     return thumb if among - to_others[thumb] > _THUMB_UNLIKE else None
 
 
-def name_fingers(hand: Hand, thumb: int | None, bases: FloatArray, overrides: HandFile) -> tuple[Finger, ...]:
+def row_places(bases: FloatArray, thumb: int | None, thumb_tip: FloatArray) -> list[float]:
+    """Return where every finger stands in the row of the fingers other than the thumb, from the thumb's side [m].
+
+    Args:
+        bases: anchor of every finger's first joint [m], shape (F, 3). thumb: its index. thumb_tip: its tip [m].
+    """
+    others = [i for i in range(len(bases)) if i != thumb]
+    if thumb is None or len(others) < 2:
+        return [0.0] * len(bases)
+    middle = bases[others].mean(axis=0)
+    row = np.linalg.svd(bases[others] - middle)[2][0]
+    towards_thumb = 1.0 if (thumb_tip - middle) @ row >= 0.0 else -1.0
+    return [float(-towards_thumb * (b - middle) @ row) for b in bases]
+
+
+def name_fingers(hand: Hand, thumb: int | None, places: list[float], overrides: HandFile) -> tuple[Finger, ...]:
     """Return the fingers with the names that were missing, the thumb, and what the hand file says.
 
     Args:
-        hand: with fingers. thumb: its index. bases: anchor of every finger's first joint, shape (F, 3).
+        hand: with fingers. thumb: its index. places: along the row of fingers, from the thumb's side [m].
 
     Raises:
         UnknownNameError: the hand file names a finger or link that does not exist.
     """
-    distances = [0.0 if thumb is None else float(np.linalg.norm(b - bases[thumb])) for b in bases]
-    names = place_names(distances, thumb, [f.name for f in hand.fingers])
+    names = place_names(places, thumb, [f.name for f in hand.fingers])
     for name in overrides.fingers:
         if name not in names:
             raise UnknownNameError("finger", name, f"hand '{hand.name}' (named by {overrides.path})", names)

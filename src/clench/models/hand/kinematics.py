@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,9 +51,7 @@ class Skeleton:
     warnings: tuple[str, ...]
 
 
-def build_skeleton(
-    compiled: CompiledModel, bodies: list[int], palm: int, velocities: Mapping[str, float]
-) -> Skeleton:
+def build_skeleton(compiled: CompiledModel, bodies: list[int], palm: int, velocities: Mapping[str, float]) -> Skeleton:
     """Read links and joints of the kept bodies.
 
     Args:
@@ -76,7 +74,7 @@ def build_skeleton(
         moving = _revolute_joints(compiled, body, palm, warnings)
         name = compiled.body_name(body)
         for k, j in enumerate(moving):
-            joints.append(_joint(compiled, j, efforts.get(j), velocities, warnings))
+            joints.append(_joint(compiled, j, efforts.get(j), velocities))
             joint_of_model[j] = len(joints) - 1
             last = k == len(moving) - 1
             link_name = name if last else f"{name}__{joints[-1].name}"
@@ -86,6 +84,7 @@ def build_skeleton(
         if not moving:
             frames.append(Frame(name, parent, -1, T, float(m.body_mass[body]), body))
         link_of_body[body] = len(frames) - 1
+    warnings += _doubtful_limits(compiled, joint_of_model, efforts)
     return Skeleton(tuple(frames), tuple(joints), link_of_body, joint_of_model, tuple(warnings))
 
 
@@ -115,20 +114,14 @@ def _revolute_joints(compiled: CompiledModel, body: int, palm: int, warnings: li
     return found
 
 
-def _joint(
-    compiled: CompiledModel, j: int, effort: float | None, velocities: Mapping[str, float], warnings: list[str]
-) -> Joint:
+def _joint(compiled: CompiledModel, j: int, effort: float | None, velocities: Mapping[str, float]) -> Joint:
     m = compiled.model
     name = compiled.joint_name(j)
     lower, upper = (float(x) for x in m.jnt_range[j])
     reference = float(m.qpos0[m.jnt_qposadr[j]])
     if not m.jnt_limited[j]:
         lower, upper = -np.pi, np.pi
-        warnings.append(f"Joint '{name}' has no limits; -pi to pi is taken.")
-    elif upper - lower > _FULL_TURN:
-        warnings.append(f"Joint '{name}' may turn {upper - lower:.3g} rad: its limits look like placeholders.")
     if effort is not None and effort > _EFFORT_PLACEHOLDER:
-        warnings.append(f"Joint '{name}' has an effort limit of {effort:.3g} Nm: taken as none.")
         effort = None
     axis = np.array(m.jnt_axis[j])
     return Joint(
@@ -141,6 +134,26 @@ def _joint(
         velocity=velocities.get(name),
         effort=effort,
     )
+
+
+def _doubtful_limits(compiled: CompiledModel, joints: Iterable[int], efforts: Mapping[int, float]) -> list[str]:
+    """Return a sentence for each kind of limit that is missing or looks like a placeholder."""
+    m = compiled.model
+    free, wide, strong = [], [], []
+    for j in joints:
+        name = f"'{compiled.joint_name(j)}'"
+        if not m.jnt_limited[j]:
+            free.append(name)
+        elif m.jnt_range[j, 1] - m.jnt_range[j, 0] > _FULL_TURN:
+            wide.append(name)
+        if efforts.get(j, 0.0) > _EFFORT_PLACEHOLDER:
+            strong.append(name)
+    found = (
+        (free, "no limits in the model; -pi to pi is taken"),
+        (wide, "may turn by more than a whole turn: the limits look like placeholders"),
+        (strong, f"effort limits above {_EFFORT_PLACEHOLDER:.0f} Nm look like placeholders; taken as none"),
+    )
+    return [f"Joints {', '.join(names)}: {text}." for names, text in found if names]
 
 
 def _efforts(model: Any) -> dict[int, float]:

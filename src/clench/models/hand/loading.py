@@ -16,7 +16,7 @@ from .allowed import allowed_pairs, with_given_pairs
 from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
 from .coupling import FoundCouplings, Relation, find_couplings, flatten
 from .finger_geometry import finger_line, tip_motion
-from .fingers import find_fingers, find_thumb, fixed_links, name_fingers
+from .fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
 from .geometry import ShapeReader, bodies_without_collision
 from .hand import Hand, JointRole, Link
 from .hand_file import HandFile, LinkOverride, find_hand_file
@@ -107,7 +107,7 @@ def _links(skeleton: Skeleton, reader: ShapeReader, overrides: HandFile) -> tupl
     for name in overrides.links:
         if name not in names:
             raise UnknownNameError("link", name, f"the model (links.{name} in {overrides.path})", names)
-    nothing: dict[CollisionSource, tuple[()]] = {source: () for source in CollisionSource}
+    nothing: dict[CollisionSource, tuple[()]] = dict.fromkeys(CollisionSource, ())
     links = []
     for frame in skeleton.frames:
         given = overrides.links.get(frame.name, LinkOverride())
@@ -126,9 +126,7 @@ def _links(skeleton: Skeleton, reader: ShapeReader, overrides: HandFile) -> tupl
     return tuple(links)
 
 
-def _with_given_couplings(
-    found: FoundCouplings, skeleton: Skeleton, overrides: HandFile, label: str
-) -> FoundCouplings:
+def _with_given_couplings(found: FoundCouplings, skeleton: Skeleton, overrides: HandFile, label: str) -> FoundCouplings:
     """Return the couplings with those that the hand file adds, replaces or removes."""
     names = [j.name for j in skeleton.joints]
     given = {name: o for name, o in overrides.joints.items() if o.follows is not None}
@@ -155,9 +153,10 @@ def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> H
     """Return the hand with fingers, roles, thumb, fixed links and the palm's centre and normal."""
     hand = replace(hand, fingers=find_fingers(hand, overrides))
     hand = assign_roles(hand, overrides, held)
-    bases, stretch, closing = _directions(hand)
+    bases, tips, stretch, closing = _directions(hand)
     thumb = find_thumb(hand.fingers, stretch, closing)
-    fingers = name_fingers(hand, thumb, bases, overrides)
+    places = row_places(bases, thumb, tips[thumb or 0])
+    fingers = name_fingers(hand, thumb, places, overrides)
     hand = replace(hand, fingers=fingers, fixed_links=fixed_links(hand.links, fingers, hand.palm))
     return replace(
         hand,
@@ -167,31 +166,41 @@ def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> H
     )
 
 
-def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return every finger's base [m], unit direction from base to tip, and unit closing direction of its tip, (F, 3)."""
+def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what every finger looks like when open, each of shape (F, 3).
+
+    Base (anchor of its first joint) and tip [m]; unit direction from its first closing joint to the tip; unit
+    direction in which the tip closes.
+    """
     q = hand.open_angles()
-    bases, stretch, closing = [], [], []
+    bases, tips, stretch, closing = [], [], [], []
     for finger in hand.fingers:
         line = finger_line(hand, finger, q)
         own = [hand.joints[j] for j in finger.joints]
         rates = np.array([j.direction if j.role is JointRole.CLOSING else 0.0 for j in own], dtype=np.float64)
         bases.append(line.anchors[0])
-        stretch.append(_unit(line.tip - line.anchors[0]))
+        tips.append(line.tip)
+        root = next((k for k, j in enumerate(own) if j.role is JointRole.CLOSING), 0)
+        stretch.append(_unit(line.tip - line.anchors[root]))
         closing.append(_unit(tip_motion(line, rates)))
-    return np.array(bases), np.array(stretch), np.array(closing)
+    return np.array(bases), np.array(tips), np.array(stretch), np.array(closing)
 
 
 def _normal(hand: Hand, stretch: FloatArray, closing: FloatArray) -> FloatArray:
     """Return the palm's normal: the mean closing direction of the tips, without the thumb where others remain.
 
+    A thumb that stretches out against the fingers counts as much as they do together (two fingers against one).
     Fingers that close towards each other (claws, grippers) have no common side: their palm faces along them.
     """
     others = [i for i, f in enumerate(hand.fingers) if not f.is_thumb]
     thumbs = [i for i, f in enumerate(hand.fingers) if f.is_thumb]
-    mean = closing[others].mean(axis=0) if others else closing.mean(axis=0)
-    opposed = bool(others) and any(_unit(mean) @ closing[i] < -0.5 for i in thumbs)
-    if np.linalg.norm(mean) < _OPPOSED or opposed:
-        mean = stretch.mean(axis=0)
+    groups = [group for group in (others, thumbs) if group]
+    mean = closing[groups[0]].mean(axis=0)
+    if len(groups) == 2 and stretch[others].mean(axis=0) @ stretch[thumbs].mean(axis=0) < -_OPPOSED:
+        mean = np.mean([closing[group].mean(axis=0) for group in groups], axis=0)
+    against = any(_unit(mean) @ closing[i] < -_OPPOSED for i in thumbs)
+    if np.linalg.norm(mean) < _OPPOSED or against:
+        mean = np.mean([stretch[group].mean(axis=0) for group in groups], axis=0)
     return _unit(mean)
 
 

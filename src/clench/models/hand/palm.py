@@ -35,7 +35,7 @@ def find_palm(compiled: CompiledModel, name: str | None) -> int:
         return candidates[0]
     listed = ", ".join(f"'{compiled.body_name(b)}'" for b in candidates)
     raise HandError(
-        f"{compiled.label}: several links carry two or more chains of joints ({listed}); name the palm (palm = \"…\")."
+        f'{compiled.label}: several links carry two or more chains of joints ({listed}); name the palm (palm = "…").'
     )
 
 

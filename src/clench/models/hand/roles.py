@@ -18,6 +18,8 @@ from .hand_file import HandFile, JointOverride
 
 #: A model's zero is taken as straight when the links say so within this [rad].
 _ZERO_TRUST = np.deg2rad(25.0)
+#: The angle in the model's reference posture is taken as straight when the links say so within this [rad].
+_REFERENCE_TRUST = np.deg2rad(10.0)
 #: Limits are equally far when their distances differ by less than this share of the range [-].
 _EQUALLY_FAR = 0.05
 #: How far the fingers are curled to see on which side they meet [rad].
@@ -128,9 +130,7 @@ def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) 
         override = overrides.joints.get(hand.joints[j].name, JointOverride())
         closing = angle <= CLOSING_ANGLE if override.role is None else override.role is JointRole.CLOSING
         reason = _role_reason(angle, k == mobile[-1], override.role)
-        joints[j] = replace(
-            joints[j], role=JointRole.CLOSING if closing else JointRole.POSTURE, role_reason=reason
-        )
+        joints[j] = replace(joints[j], role=JointRole.CLOSING if closing else JointRole.POSTURE, role_reason=reason)
         if closing:
             places.append(k)
             plan.closing.append(j)
@@ -155,7 +155,7 @@ def _role_reason(angle: float, most_distal: bool, given: JointRole | None) -> st
     if most_distal:
         return "the finger's most distal joint"
     degrees = np.rad2deg(angle)
-    return f"its axis is {degrees:.3g} deg from that of the finger's most distal joint"
+    return f"its axis is {degrees:.1f} deg from that of the finger's most distal joint"
 
 
 def _straight(joint: Joint, sign: int, bend: float | None) -> tuple[float, str]:
@@ -166,6 +166,8 @@ def _straight(joint: Joint, sign: int, bend: float | None) -> tuple[float, str]:
     degrees = np.rad2deg(stretched)
     if abs(stretched) <= _ZERO_TRUST:
         return 0.0, f"the model's zero (links in line at {degrees:.0f} deg)"
+    if abs(stretched - joint.reference) <= _REFERENCE_TRUST:
+        return joint.reference, f"the model's reference posture (links in line at {degrees:.0f} deg)"
     return stretched, f"links in line at {degrees:.0f} deg"
 
 
@@ -243,7 +245,9 @@ def _apply(plan: FingerPlan, joints: list[Joint], warnings: list[str]) -> None:
         )
     if len(turns) > 1:
         names = ", ".join(f"'{joints[j].name}'" for j in plan.closing)
-        warnings.append(f"Finger '{plan.finger.name}': its joints ({names}) close in opposite senses; check the limits.")
+        warnings.append(
+            f"Finger '{plan.finger.name}': its joints ({names}) close in opposite senses; check the limits."
+        )
 
 
 def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, warnings: list[str]) -> None:
@@ -256,9 +260,7 @@ def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, warnings: list
                     f"Joint '{follower.name}' follows closing joint '{leader.name}' though its axis is not parallel to "
                     "that of the finger's most distal joint."
                 )
-            follower = replace(
-                follower, role=leader.role, role_reason=f"follows {leader.role} joint '{leader.name}'"
-            )
+            follower = replace(follower, role=leader.role, role_reason=f"follows {leader.role} joint '{leader.name}'")
         direction = leader.direction * (1 if c.ratio > 0 else -1)
         if follower.role is JointRole.CLOSING:
             if direction != follower.direction and follower.name in overrides.joints:
