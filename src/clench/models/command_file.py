@@ -1,0 +1,269 @@
+"""Command files (JSON): read, written, and checked against a hand.
+
+Every complaint names the key by its path, as in ``c.json: preshape.index_yaw: expected a number in rad, got 'x'``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping
+from enum import StrEnum
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from clench.base.errors import CommandError, FileError
+from clench.base.pose import Pose
+
+from .command import ClosingOrder, GraspCommand
+from .hand.hand import Hand
+from .shapes import CollisionSource
+
+Choice = TypeVar("Choice", bound=StrEnum)
+
+#: A joint angle may pass a limit by this much [rad]: files round.
+LIMIT_TOLERANCE: Final = 1e-9
+
+KEYS: Final = (
+    *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "planes", "full_width"),
+    *("yaw_grid", "open_variants", "collision_source", "criteria", "seed"),
+)
+
+
+def load_command(path: str | Path) -> GraspCommand:
+    """Read a command file.
+
+    Raises:
+        FileError: missing, unreadable or not JSON. CommandError: unknown, missing or malformed key.
+    """
+    file = Path(path).expanduser()
+    try:
+        data = json.loads(file.read_bytes(), object_pairs_hook=_without_repeats)
+    except FileNotFoundError:
+        raise FileError(path, "no such file.") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
+    except CommandError as error:
+        raise CommandError(f"{path}: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise FileError(path, f"not JSON ({error}).") from None
+    return command_from_dict(data, str(path), folder=file.parent)
+
+
+def command_from_dict(data: Any, source: str = "command", folder: Path | None = None) -> GraspCommand:
+    """Read the form of a command file.
+
+    Args:
+        data: what JSON gives. source: names it in messages. folder: where a relative calibration file is looked for.
+
+    Raises:
+        CommandError: unknown, missing or malformed key.
+    """
+    try:
+        return _command(data, folder)
+    except CommandError as error:
+        raise CommandError(f"{source}: {error}") from None
+
+
+def command_to_dict(command: GraspCommand) -> dict[str, Any]:
+    """Return the form of a command file, without the keys that have their default."""
+    document: dict[str, Any] = {"hand_pose": command.hand_pose.to_dict()}
+    default = GraspCommand(command.hand_pose)
+    for key in KEYS[1:]:
+        value = getattr(command, key)
+        if value == getattr(default, key):
+            continue
+        if isinstance(value, Pose):
+            value = value.to_dict()
+        elif isinstance(value, Mapping):
+            value = dict(value)
+        elif isinstance(value, tuple):
+            value = list(value)
+        elif isinstance(value, (Path, StrEnum)):
+            value = str(value)
+        document[key] = value
+    return document
+
+
+def check_command(hand: Hand, command: GraspCommand) -> None:
+    """Check a command against a hand.
+
+    Raises:
+        UnknownNameError: a joint, finger or link that the hand does not have.
+        CommandError: an angle outside the joint's limits, a follower in the preshape, or a malformed value.
+    """
+    if command.root_link is not None:
+        _check_root_link(hand, command.root_link)
+    for name, angle in _weights(command.preshape, "preshape", "a number in rad").items():
+        check_angle(hand, hand.joint_index(name), angle, f"preshape.{name}")
+    for finger in _names(command.fingers, "fingers") or ():
+        hand.finger(finger)
+    _choice(command.order, ClosingOrder, "order")
+    _count(command.rounds, "rounds")
+    _count(command.planes, "planes")
+    _numbers(command.yaw_grid, "yaw_grid", "offsets in rad")
+    _numbers(command.open_variants, "open_variants", "offsets in rad")
+    if command.collision_source is not None:
+        _choice(command.collision_source, CollisionSource, "collision_source")
+    if isinstance(command.criteria, Mapping):
+        _weights(command.criteria, "criteria", "a weight")
+
+
+def check_angle(hand: Hand, joint: int, angle: float, key: str) -> None:
+    """Check that a command may set a joint to an angle [rad].
+
+    Raises:
+        CommandError: the joint follows another one, or the angle is outside its limits.
+    """
+    for coupling in hand.couplings:
+        if coupling.follower == joint:
+            leader = hand.joints[coupling.leader].name
+            raise CommandError(
+                f"{key}: this joint follows '{leader}' and has no angle of its own; set '{leader}' instead."
+            )
+    j = hand.joints[joint]
+    if not j.lower - LIMIT_TOLERANCE <= angle <= j.upper + LIMIT_TOLERANCE:
+        raise CommandError(f"{key}: {angle:.6g} rad is outside the joint's limits [{j.lower:.6g}, {j.upper:.6g}] rad.")
+
+
+def _check_root_link(hand: Hand, name: str) -> None:
+    link = hand.link_index(_text(name, "root_link"))
+    for finger in hand.fingers:
+        if link in finger.links:
+            palm = hand.links[hand.palm].name
+            raise CommandError(
+                f"root_link: '{name}' moves with finger '{finger.name}'; "
+                f"expected the palm '{palm}' or a link that carries it."
+            )
+
+
+def _command(data: Any, folder: Path | None) -> GraspCommand:
+    if not isinstance(data, dict):
+        raise CommandError(f"expected an object with at least 'hand_pose', got {_shown(data)}.")
+    for key in data:
+        if key not in KEYS:
+            close = difflib.get_close_matches(key, KEYS, n=1)
+            guess = f" did you mean '{close[0]}'?" if close else ""
+            raise CommandError(f"{key}: unknown key;{guess} expected one of {', '.join(KEYS)}.")
+    if "hand_pose" not in data:
+        raise CommandError("hand_pose: missing; expected {'position': [x, y, z], 'wxyz': [w, x, y, z]}.")
+    readers: dict[str, Callable[[Any, str], Any]] = {
+        "hand_pose": _pose,
+        "root_link": _text,
+        "object_pose": _pose,
+        "preshape": lambda v, key: _weights(v, key, "a number in rad"),
+        "fingers": _names,
+        "order": lambda v, key: _choice(v, ClosingOrder, key),
+        "rounds": _count,
+        "planes": _count,
+        "full_width": _flag,
+        "yaw_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
+        "open_variants": lambda v, key: _numbers(v, key, "offsets in rad"),
+        "collision_source": lambda v, key: _choice(v, CollisionSource, key),
+        "criteria": lambda v, key: _criteria(v, key, folder),
+        "seed": _whole,
+    }
+    # null stands for "not given" where the default is None.
+    nullable = ("root_link", "object_pose", "fingers", "collision_source", "criteria", "seed")
+    given = {key: value for key, value in data.items() if not (value is None and key in nullable)}
+    return GraspCommand(**{key: readers[key](value, key) for key, value in given.items()})
+
+
+def _pose(value: Any, key: str) -> Pose:
+    if isinstance(value, dict):
+        for part, what in (("position", "[x, y, z] in metres"), ("wxyz", "[w, x, y, z]")):
+            # Text that looks like a number, and true, would pass for numbers further down.
+            if part in value and not (isinstance(value[part], list) and all(map(_is_number, value[part]))):
+                raise CommandError(f"{key}.{part}: expected numbers {what}, got {_shown(value[part])}.")
+    return Pose.from_dict(value, key)
+
+
+def _text(value: Any, key: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise CommandError(f"{key}: expected a name, got {_shown(value)}.")
+    return value
+
+
+def _names(value: Any, key: str) -> tuple[str, ...] | None:
+    if value is None:
+        return None
+    if isinstance(value, str) or not isinstance(value, (list, tuple)) or not value:
+        raise CommandError(f"{key}: expected a list of at least one name, got {_shown(value)}.")
+    names = tuple(_text(name, f"{key}[{i}]") for i, name in enumerate(value))
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise CommandError(f"{key}[{i}]: '{name}' is named twice.")
+    return names
+
+
+def _weights(value: Any, key: str, what: str) -> dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise CommandError(f"{key}: expected an object of names with {what} each, got {_shown(value)}.")
+    return {str(name): _number(number, f"{key}.{name}", what) for name, number in value.items()}
+
+
+def _numbers(value: Any, key: str, what: str) -> tuple[float, ...]:
+    if not isinstance(value, (list, tuple)) or not value:
+        raise CommandError(f"{key}: expected a list of at least one number, {what}, got {_shown(value)}.")
+    return tuple(_number(v, f"{key}[{i}]", f"a number, {what}") for i, v in enumerate(value))
+
+
+def _number(value: Any, key: str, what: str) -> float:
+    if not _is_number(value):
+        raise CommandError(f"{key}: expected {what}, got {_shown(value)}.")
+    if not math.isfinite(value):
+        raise CommandError(f"{key}: expected {what} that is finite, got {value}.")
+    return float(value)
+
+
+def _whole(value: Any, key: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise CommandError(f"{key}: expected a whole number, got {_shown(value)}.")
+    return int(value)
+
+
+def _count(value: Any, key: str) -> int:
+    count = _whole(value, key)
+    if count < 1:
+        raise CommandError(f"{key}: expected at least 1, got {count}.")
+    return count
+
+
+def _flag(value: Any, key: str) -> bool:
+    if not isinstance(value, bool):
+        raise CommandError(f"{key}: expected true or false, got {_shown(value)}.")
+    return value
+
+
+def _choice(value: Any, choices: type[Choice], key: str) -> Choice:
+    if value not in list(choices):
+        listed = ", ".join(str(choice) for choice in choices)
+        raise CommandError(f"{key}: expected one of {listed}, got {_shown(value)}.")
+    return choices(value)
+
+
+def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | Path:
+    if isinstance(value, str):
+        path = Path(_text(value, key)).expanduser()
+        return path if folder is None else folder / path
+    return _weights(value, key, "a weight")
+
+
+def _without_repeats(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise CommandError(f"{key}: the key is given twice.")
+        found[key] = value
+    return found
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
