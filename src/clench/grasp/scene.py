@@ -1,0 +1,194 @@
+"""Pack an object once: every triangle in one tree in the object's frame, and the round shapes apart."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.pose import FloatArray, Pose
+from clench.models.hand.hand import Hand
+from clench.models.mesh import TriangleMesh
+from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
+
+if TYPE_CHECKING:
+    from clench.kernels.tree import MeshTree
+
+#: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
+TESSELLATION_FRACTION: Final = 5e-4
+#: ... and in metres.
+TESSELLATION_DEVIATION: Final = 2e-5
+#: Number of each kind of round shape in `RoundShapes.kind`.
+ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
+
+
+class RoundShapes(NamedTuple):
+    """Hold the round shapes of an object, whose sections are exact curves.
+
+    Args:
+        kind: `ROUND_KINDS`, shape (M,).
+        size: half sizes [m] as `ShapeKind` says, shape (M, 3).
+        T_object_shape: shape (M, 3, 4).
+        body: index of the body of each, shape (M,).
+    """
+
+    kind: NDArray[np.int32]
+    size: FloatArray
+    T_object_shape: FloatArray
+    body: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class PackedObject:
+    """Hold what the kernels read of an object, in its own frame; it never moves and never changes.
+
+    Args:
+        tree: triangles of meshes and boxes.
+        rounds: spheres, capsules, cylinders and ellipsoids.
+        full_tree: all shapes as triangles, round ones inscribed, off by `tessellation_deviation` at most.
+        closed: every body is watertight with outward normals, so one-sided tests are exact.
+        body_closed: the same for each body.
+        body_names, body_roles: of the bodies that `tree.body` and `rounds.body` number.
+        center: middle of the box around the graspable bodies [m], shape (3,).
+        radius: of the ball around `center` that holds everything [m].
+        geometry_hash: SHA-256 over the arrays, hexadecimal.
+    """
+
+    tree: MeshTree
+    rounds: RoundShapes
+    full_tree: MeshTree
+    closed: bool
+    body_closed: tuple[bool, ...]
+    body_names: tuple[str, ...]
+    body_roles: tuple[BodyRole, ...]
+    center: FloatArray
+    radius: float
+    geometry_hash: str
+
+
+def pack_object(obj: GraspObject) -> PackedObject:
+    """Pack an object's bodies for the kernels; the pose plays no part, and the same bodies are packed once."""
+    global _latest
+    latest = _latest
+    if latest[0] is obj.bodies and latest[1] == obj.collision_source and latest[2] is not None:
+        return latest[2]
+    packed = _pack(obj.bodies, CollisionSource(obj.collision_source))
+    _latest = (obj.bodies, obj.collision_source, packed)
+    return packed
+
+
+def tessellation_deviation(shape: Shape) -> float:
+    """Return how far the triangles of a shape may be off [m]; 0 for meshes and boxes, which are exact."""
+    if shape.kind in (ShapeKind.MESH, ShapeKind.BOX):
+        return 0.0
+    return min(TESSELLATION_DEVIATION, TESSELLATION_FRACTION * max(shape.size))
+
+
+def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
+    """Return a shape's triangles in its body's or link's frame; with `engine`, a mesh is its convex hull."""
+    if shape.kind is ShapeKind.MESH and source is CollisionSource.ENGINE:
+        from clench.models.tessellation import convex_hull
+
+        assert shape.mesh is not None
+        return convex_hull(shape.mesh).transformed(shape.pose)
+    return shape.to_mesh(tessellation_deviation(shape) or TESSELLATION_DEVIATION)
+
+
+def hash_hand(hand: Hand, source: CollisionSource) -> str:
+    """Return a SHA-256 over the hand's kinematics and its shapes of one collision source, hexadecimal."""
+    digest = hashlib.sha256()
+    digest.update(f"{hand.palm} {sorted(hand.fixed_links)}".encode())
+    for link in hand.links:
+        digest.update(f"|{link.parent} {link.joint} {link.pad_indentation!r}".encode())
+        digest.update(np.ascontiguousarray(link.T_parent_link, dtype=np.float64).tobytes())
+        for shape in link.shapes.get(source, ()):
+            _hash_shape(digest, shape)
+    for joint in hand.joints:
+        numbers = [*joint.axis, *joint.anchor, joint.lower, joint.upper, joint.reference]
+        digest.update(np.array(numbers, dtype=np.float64).tobytes())
+    for c in hand.couplings:
+        digest.update(f"|{c.leader} {c.follower} {c.ratio!r} {c.offset!r} {c.breakaway}".encode())
+    return digest.hexdigest()
+
+
+#: The object asked for last, found by identity: comparing bodies by value costs tens of microseconds. One tuple, so
+#: that threads that replace it at once see one or the other.
+_latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", None)
+
+
+@lru_cache(maxsize=64)
+def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
+    placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
+    flat = [(n, shape_mesh(s, source)) for n, s in placed if s.kind not in ROUND_KINDS]
+    curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
+    tree = _tree(flat)
+    full_tree = _tree(flat + curved) if curved else tree
+    graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
+    corners = full_tree.vertices[full_tree.triangles]
+    center = _middle(corners[np.isin(full_tree.body, graspable)].reshape(-1, 3))
+    # With `engine` every mesh became a convex hull, which is closed whatever the mesh was.
+    closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
+    return PackedObject(
+        tree=tree,
+        rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
+        full_tree=full_tree,
+        closed=all(closed),
+        body_closed=closed,
+        body_names=tuple(body.name for body in bodies),
+        body_roles=tuple(body.role for body in bodies),
+        center=center,
+        radius=float(np.linalg.norm(corners.reshape(-1, 3) - center, axis=1).max(initial=0.0)),
+        geometry_hash=_hash_bodies(bodies, source),
+    )
+
+
+def _tree(parts: list[tuple[int, TriangleMesh]]) -> MeshTree:
+    from clench.kernels.tree import build_tree
+
+    mesh = TriangleMesh.joined([part for _, part in parts])
+    numbers = np.array([n for n, _ in parts], dtype=np.int32)
+    return build_tree(mesh.vertices, mesh.triangles, np.repeat(numbers, [len(part.triangles) for _, part in parts]))
+
+
+def _rounds(placed: list[tuple[int, Shape]]) -> RoundShapes:
+    return RoundShapes(
+        np.array([ROUND_KINDS[s.kind] for _, s in placed], dtype=np.int32),
+        np.array([s.size for _, s in placed], dtype=np.float64).reshape(-1, 3),
+        np.array([_flat_matrix(s.pose) for _, s in placed], dtype=np.float64).reshape(-1, 3, 4),
+        np.array([n for n, _ in placed], dtype=np.int32),
+    )
+
+
+def _flat_matrix(pose: Pose) -> FloatArray:
+    return pose.matrix[:3]
+
+
+def _middle(points: FloatArray) -> FloatArray:
+    if len(points) == 0:
+        return np.zeros(3)
+    center: FloatArray = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return center
+
+
+def _hash_bodies(bodies: tuple[Body, ...], source: CollisionSource) -> str:
+    digest = hashlib.sha256()
+    for body in bodies:
+        digest.update(f"|{body.role} {source is CollisionSource.ENGINE}".encode())
+        for shape in body.shapes:
+            _hash_shape(digest, shape)
+    return digest.hexdigest()
+
+
+def _hash_shape(digest: hashlib._Hash, shape: Shape) -> None:
+    digest.update(f"/{shape.kind}".encode())
+    digest.update(np.array(shape.size, dtype=np.float64).tobytes())
+    digest.update(shape.pose.wxyz_xyz.tobytes())
+    if shape.mesh is not None:
+        digest.update(f"{shape.mesh.vertices.shape} {shape.mesh.triangles.shape}".encode())
+        digest.update(shape.mesh.vertices.tobytes())
+        digest.update(shape.mesh.triangles.tobytes())
