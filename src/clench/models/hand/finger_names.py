@@ -92,13 +92,13 @@ def _shared_beginning(names: list[str]) -> str:
 
 def _word_start(name: str, place: int) -> int:
     """Return where the word at a place of a name starts."""
-    return max(name.rfind(separator, 0, place) for separator in "_/-. ") + 1
+    return max(name.rfind(separator, 0, place) for separator in "_/-.: ") + 1
 
 
 def _sound(beginning: str) -> list[str]:
     """Return a common beginning as a name, when it is one: separators, a trailing J and digits taken off."""
-    name = beginning.strip("_/-. ")
-    name = re.sub(r"_?(j|joint)_?$", "", name, flags=re.IGNORECASE).strip("_/-. ").lower()
+    name = beginning.strip("_/-.: ")
+    name = re.sub(r"_?(j|joint)_?$", "", name, flags=re.IGNORECASE).strip("_/-.: ").lower()
     return [name] if re.search("[a-z]", name) and len(name) <= 12 else []
 
 

@@ -16,6 +16,8 @@ from .hand import Joint
 
 #: Ranges above a whole turn are placeholders, not limits [rad].
 _FULL_TURN = 2 * np.pi
+#: Hands whose joints all turn less are likely misread: 2 pi degrees [rad].
+_DEGREES_MISREAD = np.deg2rad(2 * np.pi)
 #: Efforts above this are placeholders for a finger [Nm].
 _EFFORT_PLACEHOLDER = 1e3
 
@@ -153,7 +155,14 @@ def _doubtful_limits(compiled: CompiledModel, joints: Iterable[int], efforts: Ma
         (wide, "may turn by more than a whole turn: the limits look like placeholders"),
         (strong, f"effort limits above {_EFFORT_PLACEHOLDER:.0f} Nm look like placeholders; taken as none"),
     )
-    return [f"Joints {', '.join(names)}: {text}." for names, text in found if names]
+    warnings = [f"Joints {', '.join(names)}: {text}." for names, text in found if names]
+    ranges = [float(np.ptp(m.jnt_range[j])) for j in joints if m.jnt_limited[j]]
+    if ranges and max(ranges) < _DEGREES_MISREAD:
+        warnings.append(
+            "No joint may turn by more than a few degrees: the limits look like radians read as degrees "
+            '(in MJCF, <compiler angle="radian"/>).'
+        )
+    return warnings
 
 
 def _efforts(model: Any) -> dict[int, float]:

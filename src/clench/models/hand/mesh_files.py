@@ -63,7 +63,7 @@ class MeshStore:
         if suffix in _NATIVE and not (suffix == ".stl" and _unreadable_stl(data)):
             return data, suffix
         try:
-            return _as_obj(data, suffix), ".obj"
+            return _converted(data, suffix)
         except Exception as error:
             raise FileError(self.model, f"mesh '{file.name}' of {owner} cannot be read ({error}).") from None
 
@@ -76,8 +76,11 @@ def _unreadable_stl(data: bytes) -> bool:
     return len(data) != 84 + 50 * faces or faces > _STL_FACES
 
 
-def _as_obj(data: bytes, suffix: str) -> bytes:
-    """Convert a mesh file of any kind that trimesh reads; scene transforms are applied."""
+def _converted(data: bytes, suffix: str) -> tuple[bytes, str]:
+    """Convert a mesh file of any kind that trimesh reads to STL or, when large, OBJ; scene transforms are applied.
+
+    MuJoCo keeps vertices in single precision, as STL does, and merges those that coincide.
+    """
     import io
 
     import numpy as np
@@ -87,7 +90,9 @@ def _as_obj(data: bytes, suffix: str) -> bytes:
     mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise ValueError("it holds no triangles")
+    if len(mesh.faces) <= _STL_FACES:
+        return bytes(trimesh.exchange.stl.export_stl(mesh)), ".stl"
     out = io.StringIO()
     np.savetxt(out, mesh.vertices, fmt="v %.17g %.17g %.17g")
     np.savetxt(out, mesh.faces + 1, fmt="f %d %d %d")
-    return out.getvalue().encode()
+    return out.getvalue().encode(), ".obj"

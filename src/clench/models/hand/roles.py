@@ -137,7 +137,7 @@ def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) 
             plan.signs.append(1 if line.axes[k] @ axis >= 0.0 else -1)
     bent = bends(line, places, axis) if places else []
     for n, j in enumerate(plan.closing):
-        straight, reason = _straight(hand.joints[j], plan.signs[n], bent[n])
+        straight, reason = _straight(hand.joints[j], plan.signs[n], bent[n], first=n == 0)
         plan.straight.append(straight)
         plan.straight_reason.append(reason)
         _vote(plan, n, hand.joints[j], overrides.joints.get(hand.joints[j].name, JointOverride()))
@@ -158,8 +158,11 @@ def _role_reason(angle: float, most_distal: bool, given: JointRole | None) -> st
     return f"its axis is {degrees:.1f} deg from that of the finger's most distal joint"
 
 
-def _straight(joint: Joint, sign: int, bend: float | None) -> tuple[float, str]:
-    """Return the angle at which a finger is straight at a joint [rad], and how that is known."""
+def _straight(joint: Joint, sign: int, bend: float | None, *, first: bool) -> tuple[float, str]:
+    """Return the angle at which a finger is straight at a joint [rad], and how that is known.
+
+    What precedes the first closing joint may be a metacarpal or a bracket of any shape: alone it decides nothing.
+    """
     if bend is None:
         return 0.0, "the model's zero (nothing in the finger tells)"
     stretched = joint.reference - sign * bend
@@ -168,6 +171,8 @@ def _straight(joint: Joint, sign: int, bend: float | None) -> tuple[float, str]:
         return 0.0, f"the model's zero (links in line at {degrees:.0f} deg)"
     if abs(stretched - joint.reference) <= _REFERENCE_TRUST:
         return joint.reference, f"the model's reference posture (links in line at {degrees:.0f} deg)"
+    if first:
+        return 0.0, f"the model's zero (what precedes it would be in line at {degrees:.0f} deg)"
     return stretched, f"links in line at {degrees:.0f} deg"
 
 
@@ -245,9 +250,7 @@ def _apply(plan: FingerPlan, joints: list[Joint], warnings: list[str]) -> None:
         )
     if len(turns) > 1:
         names = ", ".join(f"'{joints[j].name}'" for j in plan.closing)
-        warnings.append(
-            f"Finger '{plan.finger.name}': its joints ({names}) close in opposite senses; check the limits."
-        )
+        warnings.append(f"Joints {names} of one finger close in opposite senses; check the limits.")
 
 
 def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, warnings: list[str]) -> None:
