@@ -45,7 +45,7 @@ def tessellate(shape: Shape, deviation: float) -> TriangleMesh:
         assert shape.mesh is not None
         return shape.mesh
     a, b, _ = shape.size
-    if shape.kind in (ShapeKind.BOX, ShapeKind.ELLIPSOID) and not min(shape.size) > 0:
+    if shape.kind in (ShapeKind.BOX, ShapeKind.ELLIPSOID) and not all(v > 0 for v in shape.size):
         raise ObjectError(f"{shape.kind}: expected three half sizes above 0 m, got {shape.size}.")
     match shape.kind:
         case ShapeKind.BOX:
