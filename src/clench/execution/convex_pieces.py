@@ -20,7 +20,15 @@ from clench.models.mesh import TriangleMesh
 #: A mesh whose volume misses its hull's by less than this fraction is convex [-].
 CONVEX_FRACTION = 1e-4
 #: Settings of the decomposition: largest concavity of a piece as a fraction of the mesh's size, then effort.
-SETTINGS = {"threshold": 0.04, "mcts_iterations": 60, "mcts_nodes": 15, "resolution": 1000, "seed": 0}
+SETTINGS = {
+    "threshold": 0.05,
+    "preprocess_resolution": 30,
+    "resolution": 1000,
+    "mcts_iterations": 30,
+    "mcts_nodes": 10,
+    "mcts_max_depth": 2,
+    "seed": 0,
+}
 #: Number of the method below: part of the cache's keys, raised when results change.
 METHOD = 1
 
@@ -28,8 +36,8 @@ METHOD = 1
 def convex_pieces(mesh: TriangleMesh, name: str, *, show_progress: bool = False) -> tuple[FloatArray, ...]:
     """Return the vertices of convex pieces that approximate a mesh, each of shape (V, 3) [m].
 
-    A convex mesh is its own hull. Any other is decomposed by CoACD, which takes seconds to minutes: the pieces are kept in
-    the cache folder under the hash of the geometry.
+    A convex mesh is its own hull. Any other is decomposed by CoACD, which takes seconds to minutes: the pieces are kept
+    in the cache folder under the hash of the geometry.
 
     Raises:
         ObjectError: the mesh is flat, so that no solid piece exists.

@@ -1,0 +1,1 @@
+"""The command line: `clench demo | solve | hand | execute | record | bench`."""

@@ -1,0 +1,286 @@
+"""The commands; what a command needs is imported when it runs, so that `--help` is quick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from clench.base.errors import CommandError, FileError
+
+if TYPE_CHECKING:
+    from clench.base.pose import Pose
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+    from clench.solve.solution import GraspSolution
+
+# The values of the enumerations of the same names, written out so that the command line loads without NumPy.
+Source = Literal["engine", "raw", "visual"]
+Order = Literal["proximal-first"]
+Status = Literal["grasp", "partial", "no_contact", "blocked"]
+
+
+def demo(
+    *, out: Path = Path("clench_out"), hand: str = "robonaut2", object: str = "mug", seed: int = 0, json: bool = False
+) -> int:
+    """Do the main job on a built-in hand and object: solve, figures, simulated hold, record.
+
+    Args:
+        out: folder for the files.
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
+        seed: of the approach poses that are tried.
+        json: print the solution as one JSON document, and nothing else, on standard output.
+    """
+    from .demo import run_demo
+
+    return run_demo(hand, object, out, seed, json)
+
+
+def solve(
+    *,
+    hand: str,
+    object: str,
+    command: Path | None = None,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    scale: float = 1.0,
+    collision_source: Source | None = None,
+    planes: int | None = None,
+    order: Order | None = None,
+    seed: int = 0,
+    out: Path | None = None,
+    record: Path | None = None,
+    strict: bool = False,
+    json: bool = False,
+) -> int:
+    """Compute contacts and joint angles for one hand, object and command.
+
+    Args:
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
+        command: command file (JSON); without it the hand is placed at the first approach pose of --seed.
+        hand_file: TOML file that overrides what was found in the hand's model.
+        palm: name of the palm link, to pick a hand inside a whole robot.
+        scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        collision_source: geometry of the hand to solve for.
+        planes: curl planes per finger.
+        order: in which the joints close.
+        seed: of the approach pose; recorded with the result.
+        out: folder for solution.json, trajectory.json and figures.
+        record: SQLite record to append the solution to.
+        strict: exit with 1 unless the status is grasp.
+        json: print the solution as one JSON document on standard output.
+    """
+    from dataclasses import replace
+
+    import clench
+
+    from .printing import print_solution
+    from .results import print_json, write_results
+
+    the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
+    the_object = clench.GraspObject.load(object, scale=scale)
+    if command is not None:
+        the_command = clench.load_command(command)
+    else:
+        the_command = clench.GraspCommand(hand_pose=first_approach(the_hand, the_object, seed), seed=seed)
+    if planes is not None:
+        the_command = replace(the_command, planes=planes)
+    if order is not None:
+        the_command = replace(the_command, order=clench.ClosingOrder(order))
+    solution = clench.solve(the_hand, the_object, the_command)
+    solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
+    files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)
+    if record is not None:
+        with clench.Record(record) as recorded:
+            recorded.append(solution)
+        files.append(record)
+    if json:
+        print_json(solution.to_dict())
+    else:
+        print_solution(solution, [*the_hand.warnings, *the_object.warnings], files)
+    return exit_code(solution, strict)
+
+
+def hand(
+    model: str,
+    /,
+    *,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    collision_source: Source | None = None,
+    json: bool = False,
+) -> int:
+    """Show what was understood of a hand: fingers, roles, directions, coupling, warnings.
+
+    Args:
+        model: built-in name, or path to a .urdf or .xml file.
+        hand_file: TOML file that overrides what was found in the model.
+        palm: name of the palm link, to pick a hand inside a whole robot.
+        collision_source: geometry to use.
+        json: print one JSON document on standard output.
+    """
+    import clench
+    from clench.models.hand.report import describe_hand
+
+    from .printing import print_hand
+    from .results import print_json
+
+    report = describe_hand(clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source))
+    if json:
+        print_json(report.to_dict())
+    else:
+        print_hand(report)
+    return 0
+
+
+def execute(
+    solution: Path,
+    /,
+    *,
+    actuator: Literal["simulated"] = "simulated",
+    hand: str | None = None,
+    object: str | None = None,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    scale: float = 1.0,
+    speed: float = 1.0,
+    force: bool = False,
+    out: Path | None = None,
+    strict: bool = False,
+    json: bool = False,
+) -> int:
+    """Carry out a solution and report what was reached.
+
+    Args:
+        solution: file written by `clench solve --out` or `GraspSolution.save`.
+        actuator: what moves the hand.
+        hand: model of the hand; the one that the solution names by default.
+        object: model of the object; the one that the solution names by default.
+        hand_file: TOML file that was used to load the hand.
+        palm: palm link that was used to load the hand.
+        scale: that was used to load the object.
+        speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
+        force: carry out a solution that has violations, too.
+        out: file for the report (JSON).
+        strict: exit with 1 unless the solution's status is grasp.
+        json: print the report as one JSON document on standard output.
+    """
+    import clench
+
+    from .printing import print_report
+    from .results import print_json
+
+    the_solution = clench.GraspSolution.load(solution)
+    the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
+    the_object = clench.GraspObject.load(_named(object, the_solution.object_model, solution, "object"), scale=scale)
+    moved = clench.SimulatedHand(the_hand, the_object, show_progress=not json)
+    report = clench.execute(the_solution, moved, speed=speed, force=force)
+    if out is not None:
+        report.save(out)
+    if json:
+        print_json(report.to_dict())
+    else:
+        print_report(report)
+    return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
+
+
+def record(
+    path: Path,
+    /,
+    *,
+    id: int | None = None,
+    hand: str | None = None,
+    object: str | None = None,
+    status: Status | None = None,
+    limit: int = 20,
+    json: bool = False,
+) -> int:
+    """List a record of solves, newest first, or show one of them.
+
+    Args:
+        path: the record (SQLite file).
+        id: show the solution with this number.
+        hand: only solves of this hand.
+        object: only solves of this object.
+        status: only solves that ended so.
+        limit: how many to list.
+        json: print one JSON document on standard output.
+    """
+    from dataclasses import asdict
+
+    import clench
+
+    from .printing import print_entries, print_solution
+    from .results import print_json
+
+    if not path.is_file():
+        raise FileError(path, "no such record.")
+    with clench.Record(path) as recorded:
+        if id is not None:
+            solution = recorded.read(id)
+            if json:
+                print_json(solution.to_dict())
+            else:
+                print_solution(solution, [], [])
+            return 0
+        entries = recorded.find(hand=hand, object=object, status=status, limit=limit)
+        if json:
+            print_json({"schema": "clench.record/1", "solves": [asdict(entry) for entry in entries]})
+        else:
+            print_entries(entries, len(recorded))
+    return 0
+
+
+def bench(*arguments: str) -> int:
+    """Run a benchmark that checks its own answers, e.g. `clench bench solve`.
+
+    Args:
+        arguments: name of the benchmark and its options.
+    """
+    from clench.apps.bench.main import main
+
+    return int(main(list(arguments)))
+
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "demo": demo,
+    "solve": solve,
+    "hand": hand,
+    "execute": execute,
+    "record": record,
+    "bench": bench,
+}
+
+
+def exit_code(solution: GraspSolution, strict: bool) -> int:
+    """Return 0 for a grasp, or a partial one unless strict, else 1."""
+    good = ("grasp",) if strict else ("grasp", "partial")
+    return 0 if solution.status.value in good else 1
+
+
+def first_approach(hand: Hand, obj: GraspObject, seed: int) -> Pose:
+    """Return the first approach pose of a seed.
+
+    Raises:
+        CommandError: there is none.
+    """
+    import clench
+
+    poses = clench.approach_poses(hand, obj, 1, seed)
+    if not len(poses):
+        raise CommandError(f"No approach pose of hand '{hand.name}' on '{obj.name}' for seed {seed}; give --command.")
+    return poses[0]
+
+
+def loadable(model: str) -> str:
+    """Return a model's name, or the whole path when it is a file, so that it loads from anywhere."""
+    return str(Path(model).resolve()) if Path(model).is_file() else model
+
+
+def _named(given: str | None, recorded: str, solution: Path, what: str) -> str:
+    name = given or recorded
+    if not name:
+        raise FileError(solution, f"{what}_model: the solution does not name it; give --{what}.")
+    return name

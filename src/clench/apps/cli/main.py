@@ -1,0 +1,102 @@
+"""Entry point of the command line: choose the command, turn errors into one sentence and an exit code.
+
+Exit codes: 0 = grasp or partial, and executed where asked (`--strict`: grasp only); 1 = any other answer, or a failed
+execution; 2 = bad input; 70 = a mistake in this program.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+
+from clench import __version__
+from clench.base.errors import ClenchError, UnknownNameError
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERNAL = 70
+EXIT_INTERRUPTED = 130
+
+DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
+
+Exit codes: 0 = grasp or partial, and executed where asked (--strict: grasp only); 1 = any other answer, or a failed
+execution; 2 = bad input. Every command takes --json (one document on standard output) and --debug (tracebacks)."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        argv: the arguments after the program's name; those of the process by default.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in arguments
+    arguments = [a for a in arguments if a != "--debug"]
+    try:
+        return _run(arguments)
+    except ClenchError as error:
+        if debug:
+            raise
+        return _say(str(error), EXIT_BAD_INPUT)
+    except KeyboardInterrupt:
+        return _say("interrupted.", EXIT_INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has seen enough (`clench hand H | head`); what is buffered has nowhere to go.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if debug:
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        return _say(f"internal error ({what}); run again with --debug to see where.", EXIT_INTERNAL)
+
+
+def _run(arguments: list[str]) -> int:
+    from .commands import COMMANDS, bench
+
+    name, *rest = arguments or ["--help"]
+    if name == "--version":
+        sys.stdout.write(f"clench {__version__}\n")
+        return 0
+    if name in ("-h", "--help"):
+        sys.stdout.write(_overview(COMMANDS))
+        return 0
+    if name not in COMMANDS:
+        raise UnknownNameError("command", name, "clench", COMMANDS)
+    if name == "bench" and not {"-h", "--help"} & set(rest[:1]):
+        return bench(*rest)  # has options of its own
+    return _parse(name, COMMANDS[name], rest)()
+
+
+def _overview(commands: Mapping[str, Callable[..., int]]) -> str:
+    """Return the help of the whole program; written here because loading what reads options takes half a second."""
+    lines = [f"  {name:<10}{(command.__doc__ or '').splitlines()[0]}" for name, command in commands.items()]
+    listed = "\n".join(lines)
+    return f"usage: clench COMMAND ...\n\n{DESCRIPTION}\n\ncommands (clench COMMAND --help tells more):\n{listed}\n"
+
+
+def _parse(name: str, command: Callable[..., int], arguments: list[str]) -> Callable[[], int]:
+    """Return the call that the arguments ask for; a wrong argument gives exit code 2, `--help` gives 0."""
+    import tyro
+
+    @functools.wraps(command)
+    def call(*values: object, **options: object) -> Callable[[], int]:
+        # Deferred, so that the command's own errors are not taken for wrong arguments.
+        return functools.partial(command, *values, **options)
+
+    try:
+        return tyro.cli(
+            call,
+            prog=f"clench {name}",
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
+        )
+    except SystemExit as finished:
+        code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
+        return lambda: code
+
+
+def _say(sentence: str, code: int) -> int:
+    sys.stderr.write(f"clench: error: {sentence}\n")
+    return code

@@ -1,0 +1,143 @@
+"""Tables for people, on standard output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from clench.execution.report import ExecutionReport
+    from clench.models.hand.report import HandReport
+    from clench.solve.record import RecordEntry
+    from clench.solve.solution import FingerResult, GraspSolution
+
+
+def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequence[Path]) -> None:
+    """Print the answer: status, fingers, joint angles, violations, and where the files are."""
+    console = _console()
+    console.print(f"[bold]{solution.status.value}[/bold]: {_plain(solution.reason.get('text', ''))}")
+    table = _table(
+        f"{solution.hand} on {solution.object}", "finger", "status", "chosen", "touches with", "angles [deg]"
+    )
+    for name, finger in solution.fingers.items():
+        table.add_row(*map(_plain, _finger_row(name, finger, solution)))
+    console.print(table)
+    if solution.max_penetration is not None:
+        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm")
+    if "total" in solution.timing:
+        console.print(f"computed in {solution.timing['total'] * 1e3:.2f} ms")
+    _sentences(console, "violation", solution.violations())
+    _sentences(console, "warning", warnings)
+    _files(console, files)
+
+
+def print_hand(report: HandReport) -> None:
+    """Print what was understood of a hand."""
+    console = _console()
+    summary = _table(f"hand {report.name}", "", "")
+    for row in report.summary_rows():
+        summary.add_row(*map(_plain, row))
+    console.print(summary)
+    joints = _table("joints", "finger", "joint", "role", "closes", "open [deg]", "limits [deg]")
+    for joint in report.joint_rows():
+        joints.add_row(*map(_plain, joint[:-1]))
+    console.print(joints)
+    console.print("why:")
+    for joint in report.joint_rows():
+        console.print(f"  [bold]{_plain(joint[1])}[/bold]: {_plain(joint[-1])}", soft_wrap=True)
+    couplings = report.coupling_rows()
+    if couplings:
+        table = _table("coupled joints", "joint", "follows", "why")
+        for coupling in couplings:
+            table.add_row(*map(_plain, coupling))
+        console.print(table)
+    pairs = ", ".join(f"{a} - {b}" for a, b in report.allowed_pairs)
+    console.print(f"may overlap: {_plain(pairs) or 'none'}")
+    _sentences(console, "warning", report.warnings)
+
+
+def print_report(report: ExecutionReport) -> None:
+    """Print what an actuator reached."""
+    console = _console()
+    verdict = "[bold green]reached[/bold green]" if report.success else "[bold red]not reached[/bold red]"
+    console.print(f"{verdict}: {_plain(report.reason)}")
+    if report.joints:
+        table = _table(f"joints ({report.actuator} hand)", "joint", "computed [deg]", "reached [deg]", "error [deg]")
+        for name, joint in report.joints.items():
+            angles = (joint.computed, joint.reached, joint.error)
+            table.add_row(_plain(name), *(f"{np.rad2deg(a):.3f}" for a in angles))
+        console.print(table)
+    if report.contacts:
+        table = _table("contacts", "finger", "link", "gap [mm]", "moved from computed [mm]")
+        for c in report.contacts:
+            table.add_row(_plain(c.finger), _plain(c.link), _millimetres(c.gap), _millimetres(c.displacement))
+        console.print(table)
+    times = ", ".join(f"{n} {t:.2f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
+    if times:
+        console.print(f"first touch: {_plain(times)}")
+    _sentences(console, "note", report.notes)
+
+
+def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
+    """Print a list of recorded solves."""
+    console = _console()
+    table = _table(f"{len(entries)} of {total} solves", "id", "time", "hand", "object", "status", "touching", "seed")
+    for e in entries:
+        seed = "" if e.seed is None else str(e.seed)
+        row = (str(e.id), e.time[:19], e.hand, e.object, e.status.value, str(e.touching_fingers), seed)
+        table.add_row(*map(_plain, row))
+    console.print(table)
+
+
+def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tuple[str, ...]:
+    links = dict.fromkeys(c.link for c in solution.contacts if c.finger == name and not c.passed)
+    if not 0 <= finger.chosen < len(finger.candidates):
+        return name, finger.status.value, "", finger.reason, ""
+    chosen = finger.candidates[finger.chosen]
+    plane = "full width" if chosen.plane is None else f"plane {chosen.plane}"
+    angles = " ".join(f"{np.rad2deg(a):.1f}" for a in chosen.joint_angles.values())
+    return name, finger.status.value, plane, ", ".join(links) or finger.reason, angles
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=False)
+
+
+def _table(title: str, *columns: str) -> Table:
+    from rich.table import Table
+
+    table = Table(title=_plain(title), title_justify="left", show_header=any(columns))
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:
+    for sentence in sentences:
+        console.print(f"[yellow]{label}:[/yellow] {_plain(sentence)}")
+
+
+def _files(console: Console, files: Sequence[Path]) -> None:
+    if files:
+        console.print("files:")
+    for file in files:
+        console.print(f"  {_plain(file)}", soft_wrap=True)
+
+
+def _plain(text: Any) -> str:
+    """Return text in which square brackets are just that."""
+    from rich.markup import escape
+
+    return escape(str(text))
+
+
+def _millimetres(length: float) -> str:
+    return f"{length * 1e3:.3f}"

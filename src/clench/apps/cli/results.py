@@ -1,0 +1,54 @@
+"""What a command leaves behind: one JSON document on standard output, or files in a folder."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from clench.base.errors import FileError
+from clench.base.json_files import encode_document
+
+if TYPE_CHECKING:
+    from clench.models.command import GraspCommand
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+    from clench.solve.solution import GraspSolution
+
+
+def print_json(document: dict[str, Any]) -> None:
+    """Print one document, indented, on standard output."""
+    import msgspec
+
+    sys.stdout.write(msgspec.json.format(encode_document(document, "document"), indent=2).decode() + "\n")
+    sys.stdout.flush()
+
+
+def write_results(
+    hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, folder: Path
+) -> list[Path]:
+    """Write solution.json, trajectory.json and the figures; return their paths.
+
+    Raises:
+        FileError: the folder or a file cannot be written.
+    """
+    from clench.apps.figures import draw_solution
+    from clench.execution.trajectory import plan_trajectory
+
+    make_folder(folder)
+    solution.save(folder / "solution.json")
+    plan_trajectory(solution, hand).save(folder / "trajectory.json")
+    figures = draw_solution(hand, obj, command, solution, folder)
+    return [folder / "solution.json", folder / "trajectory.json", *figures]
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, with those above it.
+
+    Raises:
+        FileError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(folder, f"cannot be made a folder ({error.strerror or error}).") from None

@@ -1,0 +1,373 @@
+"""The command line: exit codes, one sentence for bad input, JSON that is only JSON."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import clench
+from clench.apps.cli import commands
+from clench.apps.cli.main import main
+from clench.base.errors import CommandError
+from clench.execution.report import ExecutionReport, JointReached
+from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.shapes import CollisionSource
+from clench.solve.record import Record
+from clench.solve.solution import GraspSolution, SolutionStatus
+from handmade import make_solution
+
+
+class FakeSolver:
+    """Stand in for loading and solving: remembers what it was asked, gives what it was told."""
+
+    def __init__(self) -> None:
+        self.answer = make_solution()
+        self.commands: list[GraspCommand] = []
+        self.loaded: list[tuple[object, ...]] = []
+
+    def load(self, *arguments: object, **options: object) -> SimpleNamespace:
+        self.loaded.append((*arguments, options))
+        return SimpleNamespace(name="pincer", warnings=("looks like [millimetres]",), open_angles=dict)
+
+    def solve(self, hand: object, obj: object, command: GraspCommand) -> GraspSolution:
+        self.commands.append(command)
+        return self.answer
+
+
+@pytest.fixture
+def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
+    fake = FakeSolver()
+    loader = SimpleNamespace(load=fake.load)
+    monkeypatch.setitem(vars(clench), "Hand", loader)
+    monkeypatch.setitem(vars(clench), "GraspObject", loader)
+    monkeypatch.setitem(vars(clench), "solve", fake.solve)
+    poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
+    monkeypatch.setitem(vars(clench), "approach_poses", lambda *_: poses)
+    return fake
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    def draw(hand: object, obj: object, command: object, solution: object, folder: Path) -> list[Path]:
+        (folder / "figure.png").write_bytes(b"x")
+        return [folder / "figure.png"]
+
+    monkeypatch.setitem(sys.modules, "clench.apps.figures", SimpleNamespace(draw_solution=draw))
+    monkeypatch.setattr("clench.execution.trajectory.plan_trajectory", lambda *_: SimpleNamespace(save=Path.touch))
+
+
+SOLVE = ["solve", "--hand", "pincer", "--object", "ball"]
+
+
+def test_help_is_quick_and_names_every_command() -> None:
+    program = "import sys; from clench.apps.cli.main import main; sys.exit(main(['--help']))"
+    runs = []
+    for _ in range(3):
+        start = time.perf_counter()
+        run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+        runs.append(time.perf_counter() - start)
+    assert min(runs) < 0.5
+    for name in commands.COMMANDS:
+        assert f"\n  {name} " in run.stdout
+
+
+@pytest.mark.parametrize("name", commands.COMMANDS)
+def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"usage: clench {name}" in out
+    assert name == "bench" or "--json" in out
+    assert "--no-" not in out
+
+
+def test_choices_are_the_values_of_the_enumerations() -> None:
+    assert set(commands.Source.__args__) == set(CollisionSource)
+    assert set(commands.Order.__args__) == set(ClosingOrder)
+    assert set(commands.Status.__args__) == set(SolutionStatus)
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"clench {clench.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["solv"], "clench: error: Command 'solv' is not in clench. Did you mean 'solve'?"),
+        (["hand", "robonaut3"], "clench: error: Hand 'robonaut3' is not"),
+        (["execute", "absent.json"], "clench: error: absent.json: no such file."),
+        (["record", "absent.db"], "clench: error: absent.db: no such record."),
+        (["solve", "--hand", "robonaut2", "--object", "absent.obj"], "clench: error: "),
+    ],
+)
+def test_bad_input_is_one_sentence(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(message)
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("arguments", [["solve"], ["solve", "--planes", "many"], ["hand"], [*SOLVE, "--oder", "x"]])
+def test_wrong_arguments_exit_with_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_debug_shows_where(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(clench.FileError):
+        main(["execute", "absent.json", "--debug"])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "text"),
+    [
+        (KeyError("x\ny"), 70, r"clench: error: internal error (KeyError: 'x\ny'); run again with --debug"),
+        (KeyboardInterrupt(), 130, "clench: error: interrupted."),
+        (CommandError("planes: bad."), 2, "clench: error: planes: bad."),
+    ],
+)
+def test_no_error_gives_a_traceback(
+    solver: FakeSolver,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    code: int,
+    text: str,
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setitem(vars(clench), "solve", fail)
+    assert main(SOLVE) == code
+    captured = capsys.readouterr()
+    assert captured.err.startswith(text)
+    assert captured.err.count("\n") == 1
+    if code == 70:
+        with pytest.raises(KeyError):
+            main([*SOLVE, "--debug"])
+
+
+@pytest.mark.parametrize(
+    ("status", "code", "strict"),
+    [("grasp", 0, 0), ("partial", 0, 1), ("no_contact", 1, 1), ("blocked", 1, 1)],
+)
+def test_exit_codes_of_answers(
+    solver: FakeSolver, capsys: pytest.CaptureFixture[str], status: str, code: int, strict: int
+) -> None:
+    solver.answer = make_solution(status=SolutionStatus(status))
+    assert main(SOLVE) == code
+    assert main([*SOLVE, "--strict"]) == strict
+    assert status in capsys.readouterr().out
+
+
+def test_solve_prints_json_that_loads(solver: FakeSolver, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SOLVE, "--json"]) == 0
+    loaded = GraspSolution.from_dict(json.loads(capsys.readouterr().out))
+    assert loaded == replace(solver.answer, hand_model="pincer", object_model="ball")
+
+
+def test_solve_prints_a_table(
+    solver: FakeSolver, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    solver.answer = make_solution(max_penetration=0.002)
+    assert main(SOLVE) == 0
+    out = capsys.readouterr().out
+    assert "partial: index touches, thumb does not" in out
+    assert "violation: The hand penetrates the object by 0.002 m" in out
+    assert "warning: looks like [millimetres]" in out
+    assert "full width" in out
+    assert "19.1 11.5" in out  # the angles of the index in degrees
+    assert "no closing joint can move" in out
+
+
+def test_solve_without_command_draws_an_approach_pose(solver: FakeSolver) -> None:
+    main([*SOLVE, "--seed", "5", "--planes", "3", "--order", "proximal-first", "--scale", "0.001", "--palm", "p"])
+    (command,) = solver.commands
+    assert command == GraspCommand(hand_pose=clench.Pose([0, 0, 0]), seed=5, planes=3)
+    assert solver.loaded[0] == ("pincer", {"hand_file": None, "palm": "p", "collision_source": None})
+    assert solver.loaded[1] == ("ball", {"scale": 0.001})
+
+
+def test_solve_says_when_there_is_no_approach_pose(
+    solver: FakeSolver, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(vars(clench), "approach_poses", lambda *_: [])
+    assert main(SOLVE) == 2
+    assert "No approach pose of hand 'pincer'" in capsys.readouterr().err
+
+
+def test_solve_with_a_command_file(solver: FakeSolver, tmp_path: Path) -> None:
+    file = tmp_path / "c.json"
+    file.write_text(json.dumps({"hand_pose": {"position": [0, 0, 1]}, "planes": 7}))
+    assert main([*SOLVE, "--command", str(file)]) == 0
+    assert main([*SOLVE, "--command", str(file), "--planes", "2"]) == 0
+    assert [c.planes for c in solver.commands] == [7, 2]
+    assert solver.commands[0].hand_pose == clench.Pose([0, 0, 1])
+
+
+def test_solve_writes_files_and_record(
+    solver: FakeSolver, figures: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, db = tmp_path / "a" / "out", tmp_path / "r.db"
+    assert main([*SOLVE, "--out", str(out), "--record", str(db)]) == 0
+    assert {p.name for p in out.iterdir()} == {"solution.json", "trajectory.json", "figure.png"}
+    printed = capsys.readouterr().out
+    assert all(str(p) in printed for p in (*out.iterdir(), db))
+    with Record(db) as record:
+        assert record.read(1) == GraspSolution.load(out / "solution.json")
+
+
+def test_a_folder_that_cannot_be_made(
+    solver: FakeSolver, figures: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main([*SOLVE, "--out", str(tmp_path / "file")]) == 2
+    assert "cannot be made a folder" in capsys.readouterr().err
+
+
+def test_models_that_are_files_are_recorded_with_their_whole_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("hand.xml").write_text("")
+    assert commands.loadable("hand.xml") == str(tmp_path / "hand.xml")
+    assert commands.loadable("mug") == "mug"
+
+
+@pytest.fixture
+def executed(solver: FakeSolver, monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], list[object]]:
+    """Return a function that says how executions end, and gives the list of calls."""
+    calls: list[object] = []
+
+    def prepare(success: bool) -> list[object]:
+        report = ExecutionReport("simulated", success, "because", {"index_curl": JointReached(0.5, 0.25)})
+        monkeypatch.setitem(vars(clench), "SimulatedHand", lambda *_, **__: "hand")
+        monkeypatch.setitem(vars(clench), "execute", lambda *a, **k: calls.append((*a, k)) or report)
+        return calls
+
+    return prepare
+
+
+@pytest.mark.parametrize(("success", "code"), [(True, 0), (False, 1)])
+def test_execute(
+    executed: Callable[[bool], list[object]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    success: bool,
+    code: int,
+) -> None:
+    make_solution().save(tmp_path / "s.json")
+    calls = executed(success)
+    arguments = ["execute", str(tmp_path / "s.json"), "--speed", "0.5", "--force", "--out", str(tmp_path / "r.json")]
+    assert main([*arguments, "--json"]) == code
+    assert calls == [(make_solution(), "hand", {"speed": 0.5, "force": True})]
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((tmp_path / "r.json").read_text())
+    assert document["success"] is success
+    assert main(arguments) == code
+    assert "-14.324" in capsys.readouterr().out
+    assert main([*arguments, "--strict"]) == 1  # partial only
+
+
+def test_execute_needs_to_know_the_models(
+    executed: Callable[[bool], list[object]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    executed(True)
+    make_solution(object_model="").save(tmp_path / "s.json")
+    assert main(["execute", str(tmp_path / "s.json")]) == 2
+    assert "object_model: the solution does not name it; give --object." in capsys.readouterr().err
+    assert main(["execute", str(tmp_path / "s.json"), "--object", "ball"]) == 0
+
+
+def test_record_lists_and_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    db = tmp_path / "r.db"
+    with Record(db) as record:
+        record.extend([make_solution(), make_solution(hand="other", status=SolutionStatus.GRASP)])
+    assert main(["record", str(db), "--json"]) == 0
+    assert [s["id"] for s in json.loads(capsys.readouterr().out)["solves"]] == [2, 1]
+    assert main(["record", str(db), "--status", "grasp"]) == 0
+    out = capsys.readouterr().out
+    assert "1 of 2 solves" in out
+    assert "other" in out
+    assert main(["record", str(db), "--id", "1", "--json"]) == 0
+    assert GraspSolution.from_dict(json.loads(capsys.readouterr().out)) == make_solution()
+    assert main(["record", str(db), "--id", "1"]) == 0
+    assert "pincer on ball" in capsys.readouterr().out
+    assert main(["record", str(db), "--id", "9"]) == 2
+    assert "Solve '9' is not in record" in capsys.readouterr().err
+
+
+def test_hand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["hand", "robonaut2", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [f["name"] for f in document["fingers"]] == ["thumb", "index", "middle", "ring", "little"]
+    assert main(["hand", "robonaut2"]) == 0
+    out = capsys.readouterr().out
+    assert "thumb_proximal" in out
+    assert "coupled joints" in out
+
+
+def test_bench_is_handed_its_own_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[list[str]] = []
+    module = SimpleNamespace(main=lambda arguments: seen.append(arguments) or 3)
+    monkeypatch.setitem(sys.modules, "clench.apps.bench", SimpleNamespace(main=module))
+    monkeypatch.setitem(sys.modules, "clench.apps.bench.main", module)
+    assert main(["bench", "solve", "--poses", "3", "--json"]) == 3
+    assert seen == [["solve", "--poses", "3", "--json"]]
+
+
+def test_demo_takes_the_best_pose_and_leaves_files(
+    executed: Callable[[bool], list[object]],
+    solver: FakeSolver,
+    figures: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls = executed(True)
+    answers = [
+        make_solution(status=SolutionStatus.BLOCKED),
+        make_solution(status=SolutionStatus.GRASP),
+        make_solution(status=SolutionStatus.PARTIAL),
+    ]
+    remaining = iter(answers)
+    monkeypatch.setitem(vars(clench), "solve", lambda *_: next(remaining))
+    assert main(["demo", "--out", str(tmp_path / "out"), "--json"]) == 0
+    captured = capsys.readouterr()
+    solution = GraspSolution.from_dict(json.loads(captured.out))
+    assert solution.status is SolutionStatus.GRASP
+    assert (solution.hand_model, solution.object_model) == ("robonaut2", "mug")
+    assert calls[0][0] == solution
+    names = {"solution.json", "trajectory.json", "figure.png", "execution.json", "record.db"}
+    assert names <= {p.name for p in (tmp_path / "out").iterdir()}
+
+
+def test_demo_fails_when_the_simulated_hand_does(
+    executed: Callable[[bool], list[object]], solver: FakeSolver, figures: None, tmp_path: Path
+) -> None:
+    executed(False)
+    assert main(["demo", "--out", str(tmp_path / "out")]) == 1
+
+
+def test_output_that_nobody_reads_is_no_error() -> None:
+    program = "import sys; from clench.apps.cli.main import main; sys.exit(main(['hand', 'robonaut2', '--json']))"
+    run = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    run.stdout.close()
+    assert run.wait(timeout=60) == 0
+    assert run.stderr.read() == b""
+    run.stderr.close()
