@@ -119,6 +119,8 @@ def test_invalid_solutions_are_not_carried_out(pincer: Hand, pinch: GraspSolutio
     assert not report.success
     assert report.reason.startswith("Not carried out: The hand penetrates the object by 0.01 m")
     assert report.joints == {}
+    forced = execute(replace(pinch, max_penetration=0.01), hand, force=True)
+    assert forced.success, forced.reason
     report = execute(replace(pinch, status=SolutionStatus.BLOCKED), hand)
     assert report.reason == "Not carried out: its status is 'blocked'."
     with pytest.raises(CommandError, match="The solution is for hand 'other', the actuator moves 'pincer'"):
