@@ -139,7 +139,8 @@ class Hand:
             of the tips, unit.
         default_source: the collision source used unless a command names one.
         warnings: sentences about what looks wrong.
-        spec_xml: MJCF text that MuJoCo compiles, with `assets`, for simulation.
+        spec_xml: MJCF or URDF text that MuJoCo compiles, with `assets`, for simulation: the model's own numbers, or
+            six digits of them where other limbs were left out or drawn geometry had to collide.
     """
 
     name: str

@@ -108,6 +108,7 @@ def _parse(path: Path) -> ET.Element:
 def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:
     """Expand includes and rename every file of an MJCF tree to a key of the returned assets."""
     _expand_includes(root, path, depth=0)
+    _name_bodies(root)
     folders = _asset_folders(root)
     store = MeshStore(path)
     for element in root.iter():
@@ -124,6 +125,24 @@ def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:
         element.set("file", key)
         element.attrib.pop("content_type", None)
     return store.assets
+
+
+def _name_bodies(root: ET.Element) -> None:
+    """Name what has no name, so that links and joints are found again in the compiled model."""
+    bodies = [b for world in root.iter("worldbody") for b in world.iter("body")]
+    taken = {b.get("name") for b in bodies} | {j.get("name") for b in bodies for j in b.findall("joint")}
+    for number, body in enumerate(bodies, start=1):
+        _name(body, f"body{number}", taken)
+        for joint in body.findall("joint"):
+            _name(joint, f"{body.get('name')}_joint", taken)
+
+
+def _name(element: ET.Element, wanted: str, taken: set[str | None]) -> None:
+    while element.get("name") is None:
+        if wanted not in taken:
+            element.set("name", wanted)
+            taken.add(wanted)
+        wanted += "_"
 
 
 def _asset_folders(root: ET.Element) -> dict[str, str]:

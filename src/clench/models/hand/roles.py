@@ -70,8 +70,8 @@ def assign_roles(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> 
     warnings = list(hand.warnings) + _decide_senses(replace(hand, joints=tuple(joints)), plans)
     for plan in plans:
         _apply(plan, joints, warnings)
-    _follow(hand, joints, overrides, warnings)
     _override(hand, joints, overrides)
+    _follow(hand, joints, overrides, warnings)
     return replace(hand, joints=tuple(joints), warnings=tuple(warnings))
 
 
@@ -280,6 +280,9 @@ def _override(hand: Hand, joints: list[Joint], overrides: HandFile) -> None:
             continue
         i = hand.joint_index(name)
         joint = joints[i]
+        leader = next((hand.joints[c.leader].name for c in hand.couplings if c.follower == i), None)
+        if leader is not None:
+            raise FileError(overrides.path, f"joints.{name}.open: it follows '{leader}'; give the open value of that.")
         if not joint.lower <= override.open_value <= joint.upper:
             raise FileError(
                 overrides.path,
