@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.base.errors import ClenchError, FileError
@@ -48,6 +48,7 @@ def test_round_trip_through_a_file(solution: GraspSolution, tmp_path: Path) -> N
     assert [p.name for p in tmp_path.iterdir()] == ["s.json"]
 
 
+@settings(deadline=None)
 @given(finite, st.lists(finite, min_size=3, max_size=3), st.text(), st.lists(st.floats(-1, 1), min_size=4, max_size=4))
 def test_round_trip_keeps_every_bit(number: float, vector: list[float], text: str, quaternion: list[float]) -> None:
     norm = float(np.linalg.norm(quaternion))
