@@ -124,6 +124,29 @@ def test_opposing_finger_without_a_name_is_the_thumb(tmp_path) -> None:
     np.testing.assert_allclose(loaded.palm_normal, [0, 0, 1], atol=1e-6)
 
 
+def test_a_chain_without_geometry_makes_no_finger(tmp_path) -> None:
+    bare = (
+        '<body name="x" pos="0 0 0.1"><joint name="dial" axis="0 0 1" range="0 1"/>'
+        '<inertial mass="0.1" pos="0 0 0" diaginertia="1e-5 1e-5 1e-5"/></body>'
+    )
+    loaded = Hand.load(written(tmp_path, hand(finger("a"), finger("b", (0.03, 0, 0.05)), bare)))
+    assert [f.name for f in loaded.fingers] == ["a", "b"]
+    assert any("'dial' move no geometry" in w for w in loaded.warnings)
+
+
+def test_one_finger_is_a_hand_with_a_warning(tmp_path) -> None:
+    loaded = Hand.load(written(tmp_path, hand(finger("a"))))
+    assert loaded.links[loaded.palm].name == "palm"
+    assert "The hand has only one finger." in loaded.warnings
+
+
+def test_fingers_that_stand_on_the_world_take_it_as_palm(tmp_path) -> None:
+    text = hand(finger("a"), finger("b", (0.03, 0, 0.05))).replace('<body name="palm">', "")
+    loaded = Hand.load(written(tmp_path, text.replace("</body></worldbody>", "</worldbody>")))
+    assert loaded.links[loaded.palm].name == "world"
+    assert len(loaded.fingers) == 2
+
+
 def test_shared_metacarpal_joint_is_posture_and_nobodys(tmp_path) -> None:
     meta = (
         '<body name="meta" pos="0 0 0.02"><joint name="arch" axis="0 0 1" range="0 0.5"/><geom size="0.01"/>'

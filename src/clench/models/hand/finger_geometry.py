@@ -54,7 +54,7 @@ def tip_point(hand: Hand, finger: Finger) -> FloatArray:
     start = _joint_place(hand, finger.tip_link)
     away = np.linalg.norm(points - start, axis=1)
     far = points[away >= _TIP_PART * away.max()]
-    return 0.5 * (far.min(axis=0) + far.max(axis=0))
+    return np.asarray(0.5 * (far.min(axis=0) + far.max(axis=0)))
 
 
 def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float | None]:

@@ -31,13 +31,20 @@ def own_chains(hand: Hand) -> list[tuple[int, ...]]:
     return sorted(own)
 
 
-def find_fingers(hand: Hand, overrides: HandFile) -> tuple[Finger, ...]:
-    """Return the fingers, named where joints and links tell; thumbs by name only.
+def find_fingers(hand: Hand, overrides: HandFile) -> tuple[tuple[Finger, ...], list[str]]:
+    """Return the fingers, named where joints and links tell, thumbs by name only; and warnings.
 
     Raises:
         UnknownNameError, FileError: the hand file names what does not exist.
+        HandError: no chain of joints moves any geometry.
     """
-    chains = own_chains(hand)
+    found = own_chains(hand)
+    chains = [chain for chain in found if _with_shape(hand, chain)]
+    warnings = [f"Joints {_quoted(hand, c)} move no geometry; they make no finger." for c in found if c not in chains]
+    if not chains:
+        raise HandError(f"{hand.name}: has no closing joint: no joint below the palm moves any geometry.")
+    if len(chains) == 1:
+        warnings.append("The hand has only one finger.")
     given = {name: o for name, o in overrides.fingers.items() if o.joints is not None}
     if given:
         named = {name: _given_chain(hand, name, o, overrides) for name, o in given.items()}
@@ -52,7 +59,7 @@ def find_fingers(hand: Hand, overrides: HandFile) -> tuple[Finger, ...]:
     )
     fingers = [_finger(hand, name, chain) for name, chain in zip(names, chains, strict=True) if name not in named]
     fingers += [_finger(hand, name, chain) for name, chain in named.items()]
-    return tuple(sorted(fingers, key=lambda f: f.joints[0]))
+    return tuple(sorted(fingers, key=lambda f: f.joints[0])), warnings
 
 
 def find_thumb(fingers: tuple[Finger, ...], stretch: FloatArray, closing: FloatArray) -> int | None:
@@ -113,6 +120,8 @@ def name_fingers(hand: Hand, thumb: int | None, places: list[float], overrides: 
             raise FileError(
                 overrides.path, f"fingers.{name}.tip: link '{override.tip}' is not in this finger. Links: {links}."
             )
+        if not any(hand.links[tip].shapes.values()):
+            raise FileError(overrides.path, f"fingers.{name}.tip: link '{override.tip}' has no geometry.")
         fingers.append(Finger(name, finger.links, finger.joints, is_thumb, tip))
     return tuple(fingers)
 
@@ -147,12 +156,18 @@ def _links_of(hand: Hand, chain: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _finger(hand: Hand, name: str, chain: tuple[int, ...]) -> Finger:
-    links = _links_of(hand, chain)
-    with_shape = [i for i in links if any(hand.links[i].shapes.values())]
+    with_shape = _with_shape(hand, chain)
     if not with_shape:
-        joints = ", ".join(f"'{hand.joints[j].name}'" for j in chain)
-        raise HandError(f"{hand.name}: no link moved by the joints {joints} has any geometry.")
-    return Finger(name, links, chain, names_thumb(name), with_shape[-1])
+        raise HandError(f"{hand.name}: no link moved by the joints {_quoted(hand, chain)} has any geometry.")
+    return Finger(name, _links_of(hand, chain), chain, names_thumb(name), with_shape[-1])
+
+
+def _with_shape(hand: Hand, chain: tuple[int, ...]) -> list[int]:
+    return [i for i in _links_of(hand, chain) if any(hand.links[i].shapes.values())]
+
+
+def _quoted(hand: Hand, chain: tuple[int, ...]) -> str:
+    return ", ".join(f"'{hand.joints[j].name}'" for j in chain)
 
 
 def _given_chain(hand: Hand, name: str, override: FingerOverride, overrides: HandFile) -> tuple[int, ...]:

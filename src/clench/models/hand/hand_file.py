@@ -210,10 +210,12 @@ class _Table:
         return [(k, _Table(self.path, f"{name}.{k}", v)) for k, v in inner.data.items()]
 
     def text(self, name: str) -> str | None:
-        return self._typed(name, "a text in quotes", lambda v: isinstance(v, str))
+        value = self._typed(name, "a text in quotes", lambda v: isinstance(v, str))
+        return None if value is None else str(value)
 
     def flag(self, name: str) -> bool | None:
-        return self._typed(name, "true or false", lambda v: isinstance(v, bool))
+        value = self._typed(name, "true or false", lambda v: isinstance(v, bool))
+        return None if value is None else bool(value)
 
     def texts(self, name: str) -> tuple[str, ...] | None:
         def check(value: Any) -> bool:

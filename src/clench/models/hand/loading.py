@@ -151,7 +151,8 @@ def _with_given_couplings(found: FoundCouplings, skeleton: Skeleton, overrides: 
 
 def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> Hand:
     """Return the hand with fingers, roles, thumb, fixed links and the palm's centre and normal."""
-    hand = replace(hand, fingers=find_fingers(hand, overrides))
+    fingers, warnings = find_fingers(hand, overrides)
+    hand = replace(hand, fingers=fingers, warnings=(*hand.warnings, *warnings))
     hand = assign_roles(hand, overrides, held)
     bases, tips, stretch, closing = _directions(hand)
     thumb = find_thumb(hand.fingers, stretch, closing)
