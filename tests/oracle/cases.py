@@ -111,11 +111,10 @@ def placed_vertices(finger: PlanarFinger, parameters: Floats, index: int) -> Flo
     return place(finger.packed, index, finger.angles(parameters))[1]
 
 
-def pushed_against(finger: PlanarFinger, curve: PlanarCurve, rng: Rng) -> PlanarCurve:
-    """Return the curve moved in from outside, in a random direction, to touch the open finger to about 1e-15."""
+def pushed_against(finger: PlanarFinger, curve: PlanarCurve, angle: float, rng: Rng) -> PlanarCurve:
+    """Return the curve moved in from outside, from the side at ``angle``, to touch the open finger to about 1e-15."""
     o = int(rng.integers(len(finger.outlines)))
     target = placed_vertices(finger, np.zeros(finger.groups), o).mean(axis=0)
-    angle = rng.uniform(0, 2 * np.pi)
     inward = -np.array([np.cos(angle), np.sin(angle)])
     curve = curve.moved(target - 4.0 * (finger.length + 0.1) * inward)
     for _ in range(400):
@@ -140,7 +139,7 @@ def _anywhere(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
 
 def _touching(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
     finger = random_finger(rng)
-    curve = pushed_against(finger, random_curve(rng), rng)
+    curve = pushed_against(finger, random_curve(rng), rng.uniform(0, 2 * np.pi), rng)
     return finger, curve.moved(rng.choice([0.0, 0.0, 1e-14, -1e-13, 1e-12]) * np.array([0.6, 0.8]))
 
 
@@ -154,9 +153,9 @@ def _grazing(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
     swept = PlanarOutline(0, np.zeros((1, 2)), ring_of_sides(1), reach)
     one = np.ones(1)
     disk = PlanarFinger(finger.pivots[:1], one, np.zeros(1, dtype=np.int64), one, (swept,))
-    curve = pushed_against(disk, random_curve(rng), rng)
+    curve = pushed_against(disk, random_curve(rng), rng.uniform(0.1, finger.travel(0)), rng)
     middle = np.concatenate([curve.segments.reshape(-1, 2), curve.disks[:, :2]]).mean(axis=0) - finger.pivots[0]
-    slip = float(rng.choice([-1e-9, -1e-11, -1e-12, 0.0, 1e-12, 1e-10, 1e-9]))
+    slip = float(rng.choice([-1e-7, -1e-8, -1e-9, -1e-11, -1e-12, 0.0, 1e-12, 1e-9]))
     return finger, curve.moved(slip * middle / np.hypot(*middle))
 
 

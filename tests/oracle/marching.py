@@ -74,6 +74,44 @@ def near_step(
 
 
 @compiled
+def disk_step(
+    place: tuple[float, float],
+    velocity: tuple[float, float],
+    edges: Floats,
+    swell: float,
+    tolerance: float,
+    swing: float,
+) -> float:
+    """Return a safe step for a disk near the edges of an outline: only what closes along the line between them counts.
+
+    An edge is convex, so it stays behind its own tangent line at the nearest point, wherever along it the touch goes.
+    """
+    x, z = place
+    best = np.inf
+    for e in range(len(edges)):
+        s = edges[e]
+        t = min(1.0, max(0.0, ((x - s[0]) * s[2] + (z - s[1]) * s[3]) * s[4]))
+        dx, dz = x - s[0] - t * s[2], z - s[1] - t * s[3]
+        away = np.hypot(dx, dz)
+        along = (dx * velocity[0] + dz * velocity[1]) / away if away > 0.0 else np.hypot(velocity[0], velocity[1])
+        closing = max(0.0, along)
+        best = min(best, safe_step(away - swell + tolerance, closing, swing))
+    return best
+
+
+@compiled
+def overlap_of_sharp(
+    body: Body, o: int, placed: Floats, edges: Floats, curve: Edges, near: float, tolerance: float
+) -> float:
+    """Return how deep a sharp outline is in the curve, 0 where it is clear; looked at only where something is near."""
+    w = body.radius[o]
+    for q in range(len(curve.points)):
+        near = min(near, to_edges(curve.points[q, 0], curve.points[q, 1], edges) - w)
+    depth = core_depth(body, o, placed, edges, curve) if near < 20.0 * tolerance else -1.0
+    return w + depth if depth >= 0.0 else 0.0
+
+
+@compiled
 def look(
     body: Body, o: int, curve: Edges, angles: Floats, rate: Floats, bounds: Floats, tolerance: float
 ) -> tuple[float, float]:
@@ -89,15 +127,8 @@ def look(
     for i in range(len(placed)):
         away[i] = to_curve(placed[i, 0], placed[i, 1], curve) - w
     gap = away.min()
-    lost = 0.0
     sharp = w <= 2.0 * tolerance
-    if sharp:
-        near = gap
-        for q in range(len(curve.points)):
-            near = min(near, to_edges(curve.points[q, 0], curve.points[q, 1], edges) - w)
-        if near < 20.0 * tolerance:
-            depth = core_depth(body, o, placed, edges, curve)
-            lost = w + depth if depth >= 0.0 else 0.0
+    lost = overlap_of_sharp(body, o, placed, edges, curve, gap, tolerance) if sharp else 0.0
     step = np.inf
     for i in range(len(placed)):
         x, z = placed[i, 0], placed[i, 1]
@@ -124,8 +155,11 @@ def look(
         clear = to_edges(x, z, edges) - swell
         gap = min(gap, clear)
         own = safe_step(margin_of(clear, lost, tolerance), speed, bounds[1])
-        if own < step and sharp and clear < NEAR * tolerance and q < len(curve.points):
-            own = near_step((x, z), (u, v), edges, w, lost, tolerance, bounds)
+        if own < step and sharp and clear < NEAR * tolerance:
+            if q < len(curve.points):
+                own = near_step((x, z), (u, v), edges, w, lost, tolerance, bounds)
+            else:
+                own = disk_step((x, z), (u, v), edges, swell, tolerance, bounds[3] + bounds[4] * swell)
         step = min(step, own)
     if lost > 0.0:
         gap = min(gap, -lost)
@@ -143,7 +177,7 @@ def chord_holds(a: float, b: float, h: float, curvature: float, floor: float) ->
 
 @compiled
 def bounds_of(body: Body, o: int, rate: Floats) -> Floats:
-    """Return upper bounds: speed, growth of a speed, second derivative of the gap, acceleration of a point."""
+    """Return bounds: speed, its growth, second derivative of the gap, acceleration of a point, squared turning."""
     total, speed, reach, active = 0.0, 0.0, 0.0, 0
     for j in range(body.joint[o] + 1):
         if rate[j] != 0.0:
@@ -154,7 +188,7 @@ def bounds_of(body: Body, o: int, rate: Floats) -> Floats:
     swing = total * total * reach
     w = body.radius[o]
     bend = 2.0 * speed * speed / w + swing if w > 0.0 else np.inf
-    return np.array([speed, swing if active > 1 else 0.0, bend, 1.01 * swing])
+    return np.array([speed, swing if active > 1 else 0.0, bend, 1.01 * swing, total * total])
 
 
 @compiled
