@@ -51,6 +51,7 @@ class PackedObject:
         tree: triangles of meshes and boxes.
         rounds: spheres, capsules, cylinders and ellipsoids.
         full_tree: all shapes as triangles, round ones inscribed, off by `tessellation_deviation` at most.
+        full_owners: `feature_owners` of `full_tree`.
         closed: every body is watertight with outward normals, so one-sided tests are exact.
         body_closed: the same for each body.
         body_names, body_roles: of the bodies that `tree.body` and `rounds.body` number.
@@ -62,6 +63,7 @@ class PackedObject:
     tree: MeshTree
     rounds: RoundShapes
     full_tree: MeshTree
+    full_owners: NDArray[np.uint8]
     closed: bool
     body_closed: tuple[bool, ...]
     body_names: tuple[str, ...]
@@ -123,6 +125,8 @@ _latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", N
 
 @lru_cache(maxsize=64)
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
+    from clench.kernels.tree import feature_owners
+
     placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
     flat = [(n, shape_mesh(s, source)) for n, s in placed if s.kind not in ROUND_KINDS]
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
@@ -137,6 +141,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         tree=tree,
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
         full_tree=full_tree,
+        full_owners=feature_owners(full_tree),
         closed=all(closed),
         body_closed=closed,
         body_names=tuple(body.name for body in bodies),

@@ -80,6 +80,25 @@ def build_tree(vertices: ArrayLike, triangles: ArrayLike, body: ArrayLike | None
     return MeshTree(v, t, normals, b[order], order, low, high, first, count, right, skip)
 
 
+def feature_owners(tree: MeshTree) -> NDArray[np.uint8]:
+    """Give every vertex and every edge to one of its triangles, so that a walk over triangles meets each once.
+
+    Returns:
+        a mask per triangle in tree order, shape (T,): bit k for its vertex k, bit 3 + k for its edge from k to k + 1.
+    """
+    owners = np.zeros(3 * len(tree.triangles), dtype=np.uint8)
+    bits = np.tile(np.array([1, 2, 4], dtype=np.uint8), len(tree.triangles))
+    vertices = tree.triangles.ravel().astype(np.int64)
+    nexts = np.roll(tree.triangles, -1, axis=1).ravel().astype(np.int64)
+    owned = np.unique(vertices, return_index=True)[1]
+    owners[owned] |= bits[owned]
+    edges = np.minimum(vertices, nexts) * max(len(tree.vertices), 1) + np.maximum(vertices, nexts)
+    owned = np.unique(edges, return_index=True)[1]
+    owners[owned] |= bits[owned] << 3
+    masks: NDArray[np.uint8] = np.bitwise_or.reduce(owners.reshape(-1, 3), axis=1)
+    return masks
+
+
 @kernel
 def face_normals(vertices: Floats, triangles: Ints, out: Floats) -> None:
     """Write the unit normal of each triangle to `out`, shape (T, 3); zero for triangles without area."""
