@@ -1,0 +1,130 @@
+"""Close every candidate of every finger in one call of the kernels (METHOD.md sections 2-5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+
+from .packing import pack_plans
+from .plan import FingerPlan
+from .scene import PackedObject
+
+if TYPE_CHECKING:
+    from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
+
+#: Segments per plane that the arena holds before it has to grow.
+_CAPACITY = 512
+
+
+@dataclass(eq=False)
+class HandPlan:
+    """Hold the packed plans of a hand at its postures, and the arena that its solves share.
+
+    Args:
+        plans: one per finger and posture, in entry order. finger: index into the command's fingers of each entry.
+        posture: index of the posture alternative of each entry.
+        arrays: the plans packed. items: one per entry and plane, then the full width, if wanted.
+    """
+
+    plans: tuple[FingerPlan, ...]
+    finger: tuple[int, ...]
+    posture: tuple[int, ...]
+    arrays: HandArrays
+    items: ItemArrays
+
+    @property
+    def most_planes(self) -> int:
+        """Return the number of planes of the largest entry."""
+        return max(sum(len(f.offsets) for f in plan.families) for plan in self.plans)
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedHand:
+    """Hold what the kernels computed.
+
+    Args:
+        answer: per item, see `ClosingArrays`. overlaps: per entry, an outline that overlaps at the start, or -1.
+        sections: of every entry's first family.
+    """
+
+    answer: ClosingArrays
+    overlaps: np.ndarray
+    sections: SectionArrays
+
+
+def make_hand_plan(
+    plans: Sequence[FingerPlan], finger: Sequence[int], posture: Sequence[int], full_width: bool
+) -> HandPlan:
+    """Pack plans and list their items of work."""
+    from clench.kernels.layout import ItemArrays
+
+    rows = []
+    for entry, plan in enumerate(plans):
+        count = len(plan.families[0].offsets)
+        rows += [(entry, k, k + 1) for k in range(count)]
+        if full_width:
+            rows.append((entry, 0, count))
+    table = np.array(rows, dtype=np.int64).reshape(-1, 3)
+    items = ItemArrays(*(np.ascontiguousarray(table[:, k]) for k in range(3)))
+    return HandPlan(tuple(plans), tuple(finger), tuple(posture), pack_plans(plans), items)
+
+
+def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, rounds: int) -> ClosedHand:
+    """Cut the object, look for overlaps at the start, and close every item.
+
+    Args:
+        plan: of the hand. packed: the object. T_palm_object: where it is, shape (4, 4).
+        rounds: how often all degrees of freedom are gone through.
+    """
+    from clench.kernels.closing import close_items
+    from clench.kernels.family_section import cut_first_families, make_sections
+    from clench.kernels.overlap import find_overlaps
+
+    T = np.ascontiguousarray(T_palm_object[:3])
+    shapes = _round_arrays(packed)
+    planes, most = len(plan.arrays.plane_offset), plan.most_planes
+    capacity, more = _CAPACITY, len(packed.rounds.kind)
+    overlaps = np.empty(len(plan.plans), dtype=np.int64)
+    while True:
+        shared = make_sections(planes, capacity, more)
+        own = make_sections(most, capacity, more)
+        wanted = cut_first_families(plan.arrays, packed.tree, shapes, T, shared)
+        if not wanted:
+            answer = empty_answer(plan, rounds)
+            find_overlaps(plan.arrays, packed.tree, packed.closed, T, shared, overlaps)
+            close_items(
+                plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer
+            )
+            wanted = int(answer.overflow.max(initial=0))
+            if not wanted:
+                return ClosedHand(answer, overlaps, shared)
+        capacity = 2 * wanted
+
+
+def empty_answer(plan: HandPlan, rounds: int) -> ClosingArrays:
+    """Return the arrays that the kernels write, with room for every contact."""
+    from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
+
+    items = len(plan.items.entry)
+    contacts = rounds * max(len(p.lengths) for p in plan.plans)
+    return ClosingArrays(
+        travel=np.zeros((items, len(plan.arrays.chain.group_length))),
+        turn=np.zeros((items, len(plan.arrays.chain.rate))),
+        count=np.zeros(items, dtype=np.int64),
+        hit=np.zeros((items, contacts, HIT_INTEGERS), dtype=np.int64),
+        point=np.zeros((items, contacts, HIT_FLOATS)),
+        pose=np.zeros((items, len(plan.arrays.family_pose), 3, 4)),
+        overflow=np.zeros(items, dtype=np.int64),
+    )
+
+
+def _round_arrays(packed: PackedObject) -> RoundArrays:
+    from clench.kernels.layout import RoundArrays
+
+    r = packed.rounds
+    return RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)

@@ -1,0 +1,71 @@
+"""Lay curl planes across a finger (METHOD.md section 1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.base.tolerances import EDGE_INSET
+
+#: Planes closer than this fraction of the width are one [-].
+_SAME = 1e-6
+
+
+def family_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> FloatArray:
+    """Return the curl-plane frame of a joint, right-handed, shape (4, 4).
+
+    Args:
+        axis: closing axis, unit: closing turns x towards z, so y is minus the axis.
+        origin: a point on the axis [m]. towards: the point that x points to [m].
+    """
+    y = -axis
+    x = towards - origin
+    x = x - y * (x @ y)
+    size = np.linalg.norm(x)
+    if size < 1e-9:
+        x = np.eye(3)[np.argmin(np.abs(y))]
+        x = x - y * (x @ y)
+        size = np.linalg.norm(x)
+    x = x / size
+    frame = np.eye(4)
+    frame[:3, 0], frame[:3, 1], frame[:3, 2], frame[:3, 3] = x, y, np.cross(x, y), origin
+    return frame
+
+
+def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
+    """Place curl planes across a finger, shape (P,), ascending [m].
+
+    One plane lies in the middle; two lie at both edges, inset by 1e-4 of the width; from three on there are the
+    edges, even spacing between them, and the edges of every narrower link.
+
+    Args:
+        extents: least and greatest y of every link [m]. count: at least 1.
+    """
+    low, high = min(e[0] for e in extents), max(e[1] for e in extents)
+    width = high - low
+    if count == 1 or width <= 0.0:
+        return np.array([0.5 * (low + high)])
+    offsets = list(np.linspace(low + EDGE_INSET * width, high - EDGE_INSET * width, count))
+    if count >= 3:
+        for a, b in extents:
+            inset = EDGE_INSET * (b - a)
+            offsets += [a + inset, b - inset]
+    offsets.sort()
+    kept = [offsets[0]]
+    for offset in offsets[1:]:
+        if offset - kept[-1] > _SAME * width:
+            kept.append(offset)
+    return np.array(kept)
+
+
+def refined(offsets: FloatArray, count: int) -> FloatArray:
+    """Return at least `count` planes, by halving the widest gaps, so that all families of a finger have as many."""
+    result = list(offsets)
+    while len(result) < count:
+        gaps = np.diff(result)
+        if not len(gaps) or gaps.max() <= 0.0:
+            result.append(result[-1])
+            continue
+        i = int(np.argmax(gaps))
+        result.insert(i + 1, 0.5 * (result[i] + result[i + 1]))
+    return np.array(result)

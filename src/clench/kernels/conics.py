@@ -1,0 +1,176 @@
+"""First contact with an ellipse of the object, whole or cut by two caps (METHOD.md section 3).
+
+The distance to a convex region is convex, so along a motion with acceleration at most M the gap bends down by at
+most M: the safe step of `coupled` holds here too. Sides use the support function of the ellipse.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clench.base.tolerances import FOOT_FRACTION
+
+from .compiling import kernel
+from .coupled import STEPS, bounds, evaluate, line_on_point, place, safe_step
+from .coupled_pairs import side_foot
+from .layout import KIND_SIDE, Floats, Outline, Work
+from .turning_pairs import note
+
+
+@kernel
+def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
+    """Return the point of an ellipse with semi-axes a >= b nearest to (t, y), by bisection on the multiplier.
+
+    The foot is `(a² t / (k + a²), b² y / (k + b²))` for the largest root k > -b² of
+    `(a t / (k + a²))² + (b y / (k + b²))² = 1`.
+    """
+    u, v = abs(t), abs(y)
+    if v == 0.0 and u * a <= a * a - b * b:
+        x = a * a * u / (a * a - b * b)
+        y0 = b * math.sqrt(max(1.0 - (x / a) ** 2, 0.0))
+        return math.copysign(x, t), y0
+    low = -b * b + b * v
+    high = -b * b + math.hypot(a * u, b * v)
+    for _ in range(200):
+        k = 0.5 * (low + high)
+        if k <= low or k >= high:
+            break
+        p, q = a * u / (k + a * a), b * v / (k + b * b)
+        if p * p + q * q > 1.0:
+            low = k
+        else:
+            high = k
+    k = high
+    return math.copysign(a * a * u / (k + a * a), t), math.copysign(b * b * v / (k + b * b), y)
+
+
+@kernel
+def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, float, float]:
+    """Return the distance of a point to an ellipse between its caps, the outward normal and the foot (x, z).
+
+    Inside the region the distance is negative, not more than the true depth.
+    """
+    dx, dz = px - e[0], pz - e[1]
+    ux, uz, a, b, low, high = e[2], e[3], e[4], e[5], e[6], e[7]
+    t, y = dx * ux + dz * uz, -dx * uz + dz * ux
+    level = math.hypot(t / a, y / b)
+    inside = level <= 1.0 and low <= t <= high
+    ft, fy = ellipse_foot(a, b, t, y)
+    if ft > high or ft < low:
+        ft = high if ft > high else low
+        half = b * math.sqrt(max(1.0 - (ft / a) ** 2, 0.0))
+        fy = min(max(y, -half), half)
+    fx, fz = e[0] + ft * ux - fy * uz, e[1] + ft * uz + fy * ux
+    distance = math.hypot(px - fx, pz - fz)
+    if inside or distance <= 1e-9 * b:
+        mt, my = ft / (a * a), fy / (b * b)
+        size = math.hypot(mt, my)
+        nx, nz = (mt * ux - my * uz) / size, (mt * uz + my * ux) / size
+        return (-distance if inside else distance), nx, nz, fx, fz
+    return distance, (px - fx) / distance, (pz - fz) / distance, fx, fz
+
+
+@kernel
+def sweep_vertex_region(work: Work, count: int, v: int, w: float, e: Floats, touch: float, best: float) -> float:
+    """Return the first `s` before `best` at which a moving vertex comes within `w` of a region."""
+    chain = work.chain
+    chain[count - 1, 1], chain[count - 1, 2] = work.vertex[v, 0], work.vertex[v, 1]
+    speed, bound = 0.0, 0.0
+    for i in range(count):
+        size = math.hypot(chain[i, 1], chain[i, 2])
+        speed += abs(chain[i, 0]) * size
+        bound += chain[i, 0] * chain[i, 0] * size
+    settled = 1e-3 * touch
+    if bound == 0.0:
+        return best
+    least = math.sqrt(2.0 * settled / bound)
+    s = 0.0
+    for step in range(STEPS):
+        x, z = place(chain, count, s)
+        value, nx, nz, _, _ = region_gap(e, x, z)
+        value -= w
+        if step == 0 and (value > speed * best or value < -touch):
+            return best
+        slope = 0.0
+        for i in range(count):
+            c, d = math.cos(chain[i, 0] * s), math.sin(chain[i, 0] * s)
+            ex, ez = c * chain[i, 1] - d * chain[i, 2], d * chain[i, 1] + c * chain[i, 2]
+            slope += chain[i, 0] * (nz * ex - nx * ez)
+        if value <= settled and (value < -touch or slope < -1e-9 * bound):
+            return s
+        s += max(safe_step(max(value, 0.0), slope, bound), least if value <= settled else 0.0)
+        if s >= best:
+            return best
+    return s
+
+
+@kernel
+def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
+    """Return the support of a whole ellipse about its centre, its derivative by the normal's angle, and -t there."""
+    p, q = nx * e[2] + nz * e[3], -nx * e[3] + nz * e[2]
+    a2, b2 = e[4] * e[4], e[5] * e[5]
+    value = math.sqrt(a2 * p * p + b2 * q * q)
+    return value, (b2 - a2) * p * q / value, a2 * p / value
+
+
+@kernel
+def sweep_side_region(
+    work: Work, count: int, side: int, flip: float, w: float, e: Floats, touch: float, best: float
+) -> float:
+    """Return the first `s` before `best` at which a moving side meets the curved part of a region."""
+    nx, nz, g = work.side[side, 0] * flip, work.side[side, 1] * flip, work.side[side, 2] * flip
+    ta, tb = work.side[side, 3], work.side[side, 4]
+    if flip < 0.0:
+        ta, tb = -tb, -ta
+    n, constant = line_on_point(work.chain, count, nx, nz, g, e[0], e[1], w, work.terms)
+    _, bound = bounds(work.terms, n)
+    rate = work.chain[count - 1, 0]
+    bound += rate * rate * e[4] * e[4] / e[5]
+    settled, least = 1e-3 * touch, math.sqrt(2e-3 * touch / bound)
+    slack = FOOT_FRACTION * (tb - ta)
+    s, sign = 0.0, 0.0
+    for _ in range(STEPS):
+        value, slope, _ = evaluate(work.terms, n, constant, s)
+        c, d = math.cos(rate * s), math.sin(rate * s)
+        mx, mz = c * nx - d * nz, d * nx + c * nz
+        size, change, t = support(e, mx, mz)
+        value -= size
+        slope -= rate * change
+        if sign == 0.0:
+            sign = 1.0 if value >= -touch else -1.0
+        value *= sign
+        slope *= sign
+        if value <= settled and (value < -touch or slope < -1e-9 * bound):
+            if sign > 0.0 and e[6] - slack <= -t <= e[7] + slack:
+                y = -(e[5] * e[5]) * (-mx * e[3] + mz * e[2]) / size
+                qx, qz = e[0] - t * e[2] - y * e[3], e[1] - t * e[3] + y * e[2]
+                if ta - slack <= side_foot(work, count, nx, nz, qx, qz, s) <= tb + slack:
+                    return s
+            sign = -sign
+            value, slope = -value, -slope
+        s += max(safe_step(max(value, 0.0), slope, bound), least if value <= settled else 0.0)
+        if s >= best:
+            return best
+    return s
+
+
+@kernel
+def sweep_region(outline: Outline, i: int, e: Floats, touch: float, count: int, best: float, work: Work) -> float:
+    """Return the first contact of a moving outline with a region before `best`; all relative to the first pivot."""
+    w = outline.radius
+    for v in range(outline.v0, outline.v1):
+        found = sweep_vertex_region(work, count, v, w, e, touch, best)
+        if found < best:
+            best = found
+            note(work.best, outline.tip, outline.index, v, i, 0, 2)
+    for side in range(outline.s0, outline.s1):
+        found = sweep_side_region(work, count, side, 1.0, w, e, touch, best)
+        if found < best:
+            best = found
+            note(work.best, KIND_SIDE, outline.index, side, i, 0, 2)
+        if outline.both:
+            found = sweep_side_region(work, count, side, -1.0, w, e, touch, best)
+            if found < best:
+                best = found
+                note(work.best, KIND_SIDE, outline.index, side, i, 2, 2)
+    return best

@@ -1,0 +1,62 @@
+"""Where a family of curl planes is, given the turns of the joints before it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .advance import place_joints
+from .compiling import kernel
+from .layout import Floats, HandArrays
+
+
+@kernel
+def compose(a: Floats, b: Floats, out: Floats) -> None:
+    """Write the product of two rigid poses, shape (3, 4) each."""
+    for r in range(3):
+        for c in range(4):
+            total = a[r, 3] if c == 3 else 0.0
+            for k in range(3):
+                total += a[r, k] * b[k, c]
+            out[r, c] = total
+
+
+@kernel
+def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
+    """Write `a⁻¹ b` for rigid poses, shape (3, 4) each."""
+    for r in range(3):
+        for c in range(4):
+            total = 0.0
+            for k in range(3):
+                value = b[k, c] - a[k, 3] if c == 3 else b[k, c]
+                total += a[k, r] * value
+            out[r, c] = total
+
+
+@kernel
+def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, place: Floats, poses: Floats) -> None:
+    """Write `T_palm_family` of a family from that of the family before and the turns of its joints.
+
+    Args:
+        hand: the fingers. family: its index. first: it is its entry's first family, which nothing moves.
+        turns: of every joint [rad]. place: scratch space, (J, 3). poses: (F, 3, 4), read and written.
+    """
+    if first:
+        for r in range(3):
+            for k in range(4):
+                poses[family, r, k] = hand.family_pose[family, r, k]
+        return
+    place_joints(hand.chain, family - 1, turns, place)
+    last = 0
+    for j in range(turns.shape[0]):
+        if hand.chain.joint_family[j] == family - 1:
+            last = j
+    c, s = math.cos(place[last, 2]), math.sin(place[last, 2])
+    step = np.zeros((3, 4))
+    step[0, 0], step[0, 2], step[0, 3] = c, -s, place[last, 0]
+    step[1, 1] = 1.0
+    step[2, 0], step[2, 2], step[2, 3] = s, c, place[last, 1]
+    before = np.empty((3, 4))
+    compose(poses[family - 1], step, before)
+    compose(before, hand.family_pose[family], poses[family])

@@ -1,0 +1,104 @@
+"""The object's sections with the curl planes of a family: triangles and round primitives (METHOD.md section 2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiling import kernel
+from .family_pose import compose_inverse
+from .layout import Floats, HandArrays, RoundArrays, SectionArrays
+from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
+from .section import cut
+from .tree import MeshTree
+
+
+@kernel
+def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
+    """Allocate an arena; a round primitive gives at most four segments, two disks and one ellipse."""
+    return SectionArrays(
+        np.empty((planes, capacity + 4 * rounds, 6)),
+        np.empty((planes, capacity + 4 * rounds), dtype=np.int64),
+        np.empty((planes, 2 * rounds, 3)),
+        np.empty((planes, 2 * rounds), dtype=np.int64),
+        np.empty((planes, rounds, 8)),
+        np.empty((planes, rounds), dtype=np.int64),
+        np.zeros((planes, 3), dtype=np.int64),
+    )
+
+
+@kernel
+def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections: SectionArrays) -> None:
+    """Append the sections of all round primitives with one plane."""
+    pose = np.empty((3, 4))
+    for i in range(rounds.kind.shape[0]):
+        for r in range(3):
+            for c in range(4):
+                total = T[r, 3] if c == 3 else 0.0
+                for k in range(3):
+                    total += T[r, k] * rounds.pose[i, k, c]
+                pose[r, c] = total
+        kind, size = rounds.kind[i], rounds.size[i]
+        if kind == CYLINDER:
+            cut_cylinder(pose, size[0], size[1], offset, True, i, row, sections)
+        elif kind == CAPSULE:
+            cut_capsule(pose, size[0], size[1], offset, i, row, sections)
+        elif kind == ELLIPSOID:
+            cut_ellipsoid(pose, size, offset, i, row, sections)
+        else:
+            cut_sphere(pose[0, 3], pose[1, 3], pose[2, 3], size[0], offset, i, row, sections)
+
+
+@kernel
+def cut_planes(
+    hand: HandArrays,
+    family: int,
+    low: int,
+    high: int,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    T: Floats,
+    sections: SectionArrays,
+    base: int,
+) -> int:
+    """Cut the object by the planes `low` to `high` of a family; row `plane - base` of the arena is written.
+
+    Args:
+        T: `T_family_object`, shape (3, 4).
+
+    Returns:
+        0, or the capacity that the arena should have had.
+    """
+    wanted = 0
+    spare = 4 * rounds.kind.shape[0]
+    capacity = sections.segments.shape[1] - spare
+    for plane in range(low, high):
+        row = plane - base
+        offset = hand.plane_offset[plane]
+        found = cut(
+            tree, T, offset, hand.family_reach[family], sections.segments[row, :capacity], sections.sources[row]
+        )
+        if found < 0:
+            wanted = max(wanted, -found)
+            found = 0
+        sections.counts[row, 0], sections.counts[row, 1], sections.counts[row, 2] = found, 0, 0
+        cut_rounds(rounds, T, offset, row, sections)
+    return wanted
+
+
+@kernel
+def cut_first_families(
+    hand: HandArrays, tree: MeshTree, rounds: RoundArrays, T_palm_object: Floats, sections: SectionArrays
+) -> int:
+    """Cut the object by the planes of every entry's first family, which no turn moves; row = global plane.
+
+    Returns:
+        0, or the capacity that the arena should have had.
+    """
+    wanted = 0
+    T = np.empty((3, 4))
+    for entry in range(hand.entry_family.shape[0] - 1):
+        family = hand.entry_family[entry]
+        compose_inverse(hand.family_pose[family], T_palm_object, T)
+        low, high = hand.family_plane[family], hand.family_plane[family + 1]
+        wanted = max(wanted, cut_planes(hand, family, low, high, tree, rounds, T, sections, 0))
+    return wanted

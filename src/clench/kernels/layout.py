@@ -1,0 +1,203 @@
+"""Layout of the arrays that kernels read and write (METHOD.md sections 1 and 2).
+
+A *family* is a set of parallel curl planes shared by consecutive joints of a finger. Its frame has y along the
+planes' normal, so in-plane coordinates are (x, z) and a positive turn takes x towards z. Everything in `FingerArrays`
+is in family axes at the open posture.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class ChainArrays(NamedTuple):
+    """Hold the joints; J joints, G groups.
+
+    Args:
+        joint_family: (J,), ascending. joint_group: (J,).
+        pivot: pivot of each joint relative to the pivot before it in its family [m], (J, 2).
+        rate: turn per unit of its group's travel [-], (J,).
+        start, stop: travel of the group between which the joint moves [rad], (J,).
+        group_length: travel of each group up to its limit [rad], (G,).
+    """
+
+    joint_family: Ints
+    joint_group: Ints
+    pivot: Floats
+    rate: Floats
+    start: Floats
+    stop: Floats
+    group_length: Floats
+
+
+class OutlineArrays(NamedTuple):
+    """Hold the links' outlines on all planes; O outlines, V vertices, S sides.
+
+    Args:
+        joint: joint that moves it, (O,). link: (O,). radius: [m], (O,).
+        both: 1 where the sides' winding is not known, (O,).
+        disk: circle about it relative to its joint's pivot, (O, 3): x, z, radius with that of the outline.
+        vertex_first: first vertex of each outline, (O + 1,). vertex: relative to the joint's pivot [m], (V, 2).
+        side_first: first side of each outline, (O + 1,).
+        side: rows (n_x, n_z, g, t_a, t_b) relative to the joint's pivot, (S, 5): outward unit normal, offset, and the
+            two ends along (-n_z, n_x) [m].
+    """
+
+    joint: Ints
+    link: Ints
+    radius: Floats
+    both: Ints
+    disk: Floats
+    vertex_first: Ints
+    vertex: Floats
+    side_first: Ints
+    side: Floats
+
+
+class Outline(NamedTuple):
+    """Name one outline: its index, its ranges of vertices and sides, radius, `both`, and the kind of its vertices."""
+
+    index: int
+    v0: int
+    v1: int
+    s0: int
+    s1: int
+    radius: float
+    both: bool
+    tip: int
+
+
+class HandArrays(NamedTuple):
+    """Hold the fingers of a hand, each at one or several postures ("entries"), in one piece.
+
+    E entries, F families, P planes. Every index is global, and what belongs to one entry stands together: an item of
+    work is a range of groups and a range of planes.
+
+    Args:
+        entry_group: first group of each entry, (E + 1,). entry_family: first family of each entry, (E + 1,).
+        chain: the joints. outlines: the links, by plane.
+        family_pose: (F, 3, 4); an entry's first in the palm frame, others in the frame that sits on the last pivot of
+            the family before, with that family's axes, and turns with its last joint.
+        family_plane: first plane of each family, (F + 1,). plane_offset: place along y [m], (P,).
+        family_reach: no moved point gets farther from the family's origin in the plane [m], (F,).
+        family_length: length of the finger [m], the scale of its tolerances, (F,).
+        plane_outline: first outline of each plane, (P + 1,).
+    """
+
+    entry_group: Ints
+    entry_family: Ints
+    chain: ChainArrays
+    outlines: OutlineArrays
+    family_pose: Floats
+    family_plane: Ints
+    plane_offset: Floats
+    family_reach: Floats
+    family_length: Floats
+    plane_outline: Ints
+
+
+class Work(NamedTuple):
+    """Hold the scratch space of one item, so that closing allocates nothing.
+
+    Args:
+        place: joints at the start of the segment, rows (x, z, turn), (J, 3).
+        vertex, side, disk: the moving outlines' features about their turning centre, as in `OutlineArrays`; the third
+            column of `vertex` is the distance from that centre.
+        chain: rows (Ω, e_x, e_z), (J + 1, 3). terms: sums of `coupled`, (N, 3). ellipse: one, relative, (8,).
+        best: the winner: kind, outline, feature, object feature, which end or orientation, 0 segment, 1 disk
+            or 2 ellipse, (6,).
+    """
+
+    place: Floats
+    vertex: Floats
+    side: Floats
+    disk: Floats
+    chain: Floats
+    terms: Floats
+    ellipse: Floats
+    best: Ints
+
+
+class SectionArrays(NamedTuple):
+    """Hold the object's sections with P planes, one row each; a fixed arena with a count per plane.
+
+    Args:
+        segments: rows (a_x, a_z, b_x, b_z, n_x, n_z) [m], (P, capacity, 6), outward unit normals.
+        sources: triangle of the tree, or -1 - index of a round primitive, (P, capacity).
+        disks: rows (x, z, radius) [m], (P, D, 3). disk_sources: (P, D).
+        ellipses: rows (x, z, u_x, u_z, a, b, low, high) [m], (P, E, 8): centre, direction of the major semi-axis,
+            semi-axes a >= b, and the band of coordinates along u that belongs to the section.
+        ellipse_sources: (P, E).
+        counts: segments, disks and ellipses in use, (P, 3); negative where the arena was too small.
+    """
+
+    segments: Floats
+    sources: Ints
+    disks: Floats
+    disk_sources: Ints
+    ellipses: Floats
+    ellipse_sources: Ints
+    counts: Ints
+
+
+class RoundArrays(NamedTuple):
+    """Hold an object's round primitives; R primitives.
+
+    Args:
+        kind: 0 sphere, 1 capsule, 2 cylinder, 3 ellipsoid, (R,). size: as `ShapeKind` says [m], (R, 3).
+        pose: `T_object_shape`, (R, 3, 4).
+    """
+
+    kind: Ints
+    size: Floats
+    pose: Floats
+
+
+class ItemArrays(NamedTuple):
+    """List the items of work: an entry's one plane, or all of its planes (the full width).
+
+    Args:
+        entry: (I,). low, high: range of planes, counted from the first plane of each family of the entry, (I,).
+    """
+
+    entry: Ints
+    low: Ints
+    high: Ints
+
+
+class ClosingArrays(NamedTuple):
+    """Hold the answers of all items; I items, S contacts at most.
+
+    Args:
+        travel: of every group [rad], (I, G). turn: of every joint [rad], (I, J); only the entry's own are set.
+        count: number of contacts, (I,). hit: integers of each contact, (I, S, 6), see below.
+        point: numbers of each contact in its family's plane, (I, S, 8), see below.
+        pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
+        overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
+    """
+
+    travel: Floats
+    turn: Floats
+    count: Ints
+    hit: Ints
+    point: Floats
+    pose: Floats
+    overflow: Ints
+
+
+#: Columns of `ClosingArrays.hit`.
+HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY = 0, 1, 2, 3, 4, 5
+HIT_INTEGERS = 6
+#: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, travel,
+#: and the gap at the item's final posture.
+HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_TRAVEL, HIT_GAP = 0, 1, 2, 3, 4, 5, 6, 7
+HIT_FLOATS = 8
+
+#: Kinds of touching features.
+KIND_SIDE, KIND_TIP, KIND_EDGE = 0, 1, 2

@@ -1,0 +1,128 @@
+"""Whether a finger overlaps the object before anything moves (METHOD.md section 3)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from clench.base.tolerances import TOUCH_FRACTION
+
+from .advance import make_work, place_joints, put_outline
+from .compiling import kernel
+from .distance import is_inside
+from .family_pose import compose_inverse, pose_family
+from .layout import Floats, HandArrays, Ints, Outline, SectionArrays, Work
+from .outline_gap import core_distance, outline_distance, point_segment, side_ends
+from .tree import MeshTree
+
+
+@kernel
+def crosses(
+    ax: float, az: float, bx: float, bz: float, cx: float, cz: float, dx: float, dz: float, margin: float
+) -> bool:
+    """Say whether two segments cross with every end farther than `margin` from the other's line."""
+    ux, uz, vx, vz = bx - ax, bz - az, dx - cx, dz - cz
+    u, v = math.hypot(ux, uz), math.hypot(vx, vz)
+    c = ux * (cz - az) - uz * (cx - ax)
+    d = ux * (dz - az) - uz * (dx - ax)
+    a = vx * (az - cz) - vz * (ax - cx)
+    b = vx * (bz - cz) - vz * (bx - cx)
+    mu, mv = margin * u, margin * v
+    return ((c > mu and d < -mu) or (c < -mu and d > mu)) and ((a > mv and b < -mv) or (a < -mv and b > mv))
+
+
+@kernel
+def core_holds(outline: Outline, qx: float, qz: float, work: Work) -> bool:
+    """Say whether an outline's core goes around a point (by the crossings of a ray along x)."""
+    around = 0
+    for s in range(outline.s0, outline.s1):
+        ax, az, bx, bz = side_ends(work.side, s)
+        if (az > qz) != (bz > qz) and ax + (qz - az) / (bz - az) * (bx - ax) > qx:
+            around += 1 if work.side[s, 0] > 0.0 else -1
+    return around != 0
+
+
+@kernel
+def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> bool:
+    """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
+    margin = 4.0 * touch
+    gap, _, _ = outline_distance(outline, sections, row, work)
+    if gap > 0.0 and outline.s1 - outline.s0 < 3:
+        return False
+    if gap < -margin:
+        return True
+    segments = sections.segments
+    for i in range(sections.counts[row, 0]):
+        ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
+        for s in range(outline.s0, outline.s1):
+            cx, cz, dx, dz = side_ends(work.side, s)
+            if crosses(ax, az, bx, bz, cx, cz, dx, dz, margin):
+                return True
+        if gap > margin - outline.radius and outline.s1 - outline.s0 >= 3:
+            d, _, _ = core_distance(outline, ax, az, work)
+            if d > margin and core_holds(outline, ax, az, work):
+                return True
+    for i in range(sections.counts[row, 1]):
+        if core_holds(outline, sections.disks[row, i, 0], sections.disks[row, i, 1], work):
+            return True
+    return False
+
+
+@kernel
+def starts_inside(tree: MeshTree, closed: bool, T_family_object: Floats, x: float, y: float, z: float) -> bool:
+    """Say whether a point given in a family's frame lies inside the object's mesh."""
+    p = np.empty(3)
+    for k in range(3):
+        p[k] = (
+            T_family_object[0, k] * (x - T_family_object[0, 3])
+            + T_family_object[1, k] * (y - T_family_object[1, 3])
+            + T_family_object[2, k] * (z - T_family_object[2, 3])
+        )
+        if tree.low.shape[0] == 0 or p[k] < tree.low[0, k] or p[k] > tree.high[0, k]:
+            return False
+    return bool(is_inside(tree, p, closed))
+
+
+@kernel
+def find_overlaps(
+    hand: HandArrays, tree: MeshTree, closed: bool, T_palm_object: Floats, sections: SectionArrays, overlaps: Ints
+) -> None:
+    """Write, for every entry, an outline that overlaps the object before anything moves, or -1, shape (E,)."""
+    work = make_work(hand.chain.rate.shape[0], hand.outlines)
+    turns = np.zeros(hand.chain.rate.shape[0])
+    poses = np.empty((hand.family_pose.shape[0], 3, 4))
+    T = np.empty((3, 4))
+    for entry in range(hand.entry_family.shape[0] - 1):
+        overlaps[entry] = -1
+        family = hand.entry_family[entry]
+        touch = TOUCH_FRACTION * hand.family_length[family]
+        pose_family(hand, family, True, turns, work.place, poses)
+        place_joints(hand.chain, family, turns, work.place)
+        compose_inverse(poses[family], T_palm_object, T)
+        for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
+            for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
+                outline = put_outline(hand.outlines, o, hand.outlines.joint[o], 0.0, 0.0, 1.0, work)
+                x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
+                if (
+                    starts_inside(tree, closed, T, x, hand.plane_offset[plane], z)
+                    and not closer_than(outline, sections, plane, 4.0 * touch, work)
+                ) or curves_overlap(outline, sections, plane, touch, work):
+                    overlaps[entry] = o
+                    break
+            if overlaps[entry] >= 0:
+                break
+
+
+@kernel
+def closer_than(outline: Outline, sections: SectionArrays, row: int, margin: float, work: Work) -> bool:
+    """Say whether an outline's first vertex is within `margin` of a section's segments, so that inside is not sure."""
+    x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
+    segments = sections.segments
+    for i in range(sections.counts[row, 0]):
+        d, _, _ = point_segment(
+            x, z, segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
+        )
+        if d <= margin:
+            return True
+    return False

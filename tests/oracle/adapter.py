@@ -1,0 +1,131 @@
+"""Connect the kernel to the oracle: pack a planar finger and curve, close them, return the stages."""
+
+import numpy as np
+
+from clench.kernels.closing import close_items
+from clench.kernels.family_section import make_sections
+from clench.kernels.layout import (
+    ChainArrays,
+    ClosingArrays,
+    HandArrays,
+    ItemArrays,
+    OutlineArrays,
+    RoundArrays,
+    SectionArrays,
+)
+from clench.kernels.tree import build_tree
+
+from .planar import StageAnswer
+from .scene import PlanarCurve, PlanarFinger, PlanarOutline
+
+EMPTY_TREE = build_tree(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
+NO_ROUNDS = RoundArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)))
+
+
+def _ints(values) -> np.ndarray:
+    return np.asarray(values, dtype=np.int64)
+
+
+def side_rows(outline: PlanarOutline) -> np.ndarray:
+    """Return the sides of an outline as the kernel's rows (n_x, n_z, g, t_a, t_b)."""
+    rows = []
+    for i, j in outline.sides:
+        a, b = outline.vertices[i], outline.vertices[j]
+        run = b - a
+        length = np.linalg.norm(run)
+        if length == 0.0:
+            continue
+        nx, nz = run[1] / length, -run[0] / length
+        ends = sorted([-nz * a[0] + nx * a[1], -nz * b[0] + nx * b[1]])
+        rows.append([nx, nz, nx * a[0] + nz * a[1], *ends])
+    return np.array(rows).reshape(-1, 5)
+
+
+def pack_finger(finger: PlanarFinger) -> HandArrays:
+    """Return the kernel's arrays for one finger with one plane."""
+    joints = len(finger.rates)
+    groups = finger.groups
+    stop = np.array([finger.limits[j] / abs(finger.rates[j]) for j in range(joints)])
+    length = np.array([finger.travel(g) for g in range(groups)])
+    for g in range(groups):
+        stop[finger.leader(g)] = length[g]
+    sides = [side_rows(o) for o in finger.outlines]
+    disks = []
+    for o in finger.outlines:
+        center = o.vertices.mean(axis=0)
+        disks.append([*center, np.linalg.norm(o.vertices - center, axis=1).max() * (1 + 1e-12) + o.radius])
+    chain = ChainArrays(
+        joint_family=_ints(np.zeros(joints)),
+        joint_group=_ints(finger.group),
+        pivot=np.ascontiguousarray(finger.pivots, dtype=np.float64),
+        rate=np.ascontiguousarray(finger.rates, dtype=np.float64),
+        start=np.zeros(joints),
+        stop=stop,
+        group_length=length,
+    )
+    outlines = OutlineArrays(
+        joint=_ints([o.joint for o in finger.outlines]),
+        link=_ints(range(len(finger.outlines))),
+        radius=np.array([o.radius for o in finger.outlines], dtype=np.float64),
+        both=_ints(np.zeros(len(finger.outlines))),
+        disk=np.array(disks, dtype=np.float64),
+        vertex_first=_ints(np.cumsum([0, *(len(o.vertices) for o in finger.outlines)])),
+        vertex=np.ascontiguousarray(np.vstack([o.vertices for o in finger.outlines]), dtype=np.float64),
+        side_first=_ints(np.cumsum([0, *(len(s) for s in sides)])),
+        side=np.ascontiguousarray(np.vstack(sides)),
+    )
+    return HandArrays(
+        entry_group=_ints([0, groups]),
+        entry_family=_ints([0, 1]),
+        chain=chain,
+        outlines=outlines,
+        family_pose=np.eye(4)[None, :3].copy(),
+        family_plane=_ints([0, 1]),
+        plane_offset=np.zeros(1),
+        family_reach=np.array([10 * finger.length]),
+        family_length=np.array([finger.length]),
+        plane_outline=_ints([0, len(finger.outlines)]),
+    )
+
+
+def pack_curve(curve: PlanarCurve) -> SectionArrays:
+    """Return the kernel's arena with one plane that holds the curve."""
+    segments = len(curve.segments)
+    sections = make_sections(1, segments, len(curve.disks))
+    rows = np.concatenate([curve.segments.reshape(-1, 4), curve.normals], axis=1)
+    sections.segments[0, :segments] = rows
+    sections.sources[0] = np.arange(sections.sources.shape[1])
+    sections.disks[0, : len(curve.disks)] = curve.disks
+    sections.disk_sources[0] = -1
+    sections.counts[0] = segments, len(curve.disks), 0
+    return sections
+
+
+def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
+    """Return an answer to be written."""
+    groups, joints, families = len(hand.chain.group_length), len(hand.chain.rate), len(hand.family_pose)
+    return ClosingArrays(
+        np.zeros((items, groups)),
+        np.zeros((items, joints)),
+        np.zeros(items, np.int64),
+        np.zeros((items, contacts, 6), np.int64),
+        np.zeros((items, contacts, 8)),
+        np.zeros((items, families, 3, 4)),
+        np.zeros(items, np.int64),
+    )
+
+
+def solve_planar(finger: PlanarFinger, curve: PlanarCurve) -> tuple[tuple[StageAnswer, ...], ClosingArrays]:
+    """Close a planar finger with the kernel; return its stages and the raw answer."""
+    hand = pack_finger(finger)
+    sections = pack_curve(curve)
+    items = ItemArrays(_ints([0]), _ints([0]), _ints([1]))
+    answer = empty_answer(hand, 1, finger.groups)
+    closed = not curve.two_sided
+    T = np.eye(4)[:3].copy()
+    close_items(hand, EMPTY_TREE, NO_ROUNDS, closed, T, sections, sections, items, 1, answer)
+    stopped = {int(h[4]) for h in answer.hit[0, : answer.count[0]]}
+    stages = tuple(
+        StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)
+    )
+    return stages, answer
