@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from clench.kernels.tree import MeshTree
 
 #: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
-TESSELLATION_FRACTION: Final = 5e-4
+TESSELLATION_FRACTION: Final = 2e-3
 #: ... and in metres.
 TESSELLATION_DEVIATION: Final = 2e-5
 #: Number of each kind of round shape in `RoundShapes.kind`.

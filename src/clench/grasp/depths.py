@@ -1,0 +1,252 @@
+"""How deep every link of a posed hand overlaps an object, and how far back the hand must go to be free."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.pose import FloatArray, invert
+from clench.models.hand.hand import Hand
+from clench.models.mesh import TriangleMesh
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
+
+from .scene import PackedObject, shape_mesh
+
+if TYPE_CHECKING:
+    from clench.kernels.tree import MeshTree
+
+#: Depths below this fraction of the object's size are rounding of a touch [-].
+_TOUCHING: Final = 1e-12
+_KEPT_HANDS: Final = 16
+
+
+@dataclass(frozen=True)
+class LinkDepth:
+    """Hold how deep one link overlaps the object.
+
+    Args:
+        link: index of the link in the hand.
+        depth: [m], 0 when disjoint or just touching.
+        place: the deepest point in the object's frame [m], shape (3,); None when the depth is 0.
+    """
+
+    link: int
+    depth: float
+    place: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMesh:
+    """Hold the triangles of one link in its frame.
+
+    Args:
+        link: index of the link in the hand.
+        tree: all its shapes as triangles, round ones inscribed.
+        owners: `feature_owners` of the tree.
+        closed: every shape is watertight with outward normals.
+        center, radius: of a ball around it [m], in the link's frame.
+    """
+
+    link: int
+    tree: MeshTree
+    owners: NDArray[np.uint8]
+    closed: bool
+    center: FloatArray
+    radius: float
+
+
+def hand_depths(
+    hand: Hand,
+    q: FloatArray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource | None = None,
+    *,
+    links: Collection[int] | None = None,
+) -> tuple[LinkDepth, ...]:
+    """Return the depth of penetration of every link that has a shape (METHOD.md section 5).
+
+    Round shapes are inscribed polyhedra, so their depth is too small by at most `TESSELLATION_DEVIATION` for each side.
+
+    Args:
+        hand: the hand.
+        q: angles of all its joints [rad], shape (J,).
+        packed: the object.
+        T_palm_object: shape (4, 4).
+        source: which geometry of the hand; None is its default.
+        links: only these links; None is all of the hand.
+    """
+    from clench.kernels.depth import CROSSINGS, penetration
+    from clench.kernels.tree import STACK_SIZE
+
+    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
+    T_object_links = invert(np.asarray(T_palm_object, dtype=np.float64)) @ hand.link_poses(q)
+    found = []
+    for mesh in link_meshes(hand, source):
+        if links is not None and mesh.link not in links:
+            continue
+        T_object_link = T_object_links[mesh.link]
+        depth = 0.0
+        if _may_touch(mesh, T_object_link, packed):
+            depth, *place = penetration(
+                mesh.tree,
+                mesh.owners,
+                mesh.closed,
+                packed.full_tree,
+                packed.full_owners,
+                packed.closed,
+                np.ascontiguousarray(T_object_link[:3]),
+                np.ascontiguousarray(invert(T_object_link)[:3]),
+                crossings,
+                stack,
+            )
+        if depth > _TOUCHING * packed.radius:
+            found.append(LinkDepth(mesh.link, depth, np.array(place)))
+        else:
+            found.append(LinkDepth(mesh.link, 0.0, None))
+    return tuple(found)
+
+
+def travel_to_touch(
+    hand: Hand,
+    q: FloatArray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    direction: FloatArray,
+    source: CollisionSource | None = None,
+) -> float:
+    """Return how far the hand moves along a direction until a link first touches the object.
+
+    Args:
+        hand: the hand.
+        q: angles of all its joints [rad], shape (J,).
+        packed: the object.
+        T_palm_object: where the object is at the start, shape (4, 4); nothing may overlap there.
+        direction: unit vector in the palm's frame, shape (3,).
+        source: which geometry of the hand; None is its default.
+
+    Returns:
+        distance [m], infinite when the hand passes the object.
+    """
+    from clench.kernels.translation import PAIRS, first_contact
+
+    stack = np.empty((PAIRS, 2), dtype=np.int32)
+    T_object_palm = invert(np.asarray(T_palm_object, dtype=np.float64))
+    along = T_object_palm[:3, :3] @ direction
+    placed = [(mesh, T_object_palm @ T) for mesh, T in _placed(hand, q, source)]
+    best = np.inf
+    for mesh, T_object_link in sorted(placed, key=lambda pair: -float(pair[1][:3, 3] @ along)):
+        # Links that are ahead come first: they bound the search of those behind.
+        T = np.ascontiguousarray(T_object_link[:3])
+        distance, _, _ = first_contact(
+            mesh.tree, mesh.owners, T, packed.full_tree, packed.full_owners, along, best, stack
+        )
+        best = min(best, distance)
+    return best
+
+
+def retreat_distance(
+    hand: Hand,
+    q: FloatArray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource | None = None,
+) -> float:
+    """Return how far back along its palm normal the hand is free, from there all the way out [m].
+
+    It is found from outside: the hand comes in along the normal from where it is clear, up to its first touch. 0 when
+    it gets to where it is without touching.
+    """
+    T = np.array(T_palm_object, dtype=np.float64)
+    outside = clear_distance(hand, q, packed, T, source)
+    T[:3, 3] += outside * hand.palm_normal
+    travel = travel_to_touch(hand, q, packed, T, hand.palm_normal, source)
+    return max(outside - travel, 0.0)
+
+
+def clear_distance(
+    hand: Hand,
+    q: FloatArray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource | None = None,
+) -> float:
+    """Return a retreat along the palm normal that takes all links off the ball around the object [m], at least 0."""
+    normal = hand.palm_normal
+    ahead = max(
+        (float(normal @ (T[:3, :3] @ mesh.center + T[:3, 3])) + mesh.radius for mesh, T in _placed(hand, q, source)),
+        default=0.0,
+    )
+    center = T_palm_object[:3, :3] @ packed.center + T_palm_object[:3, 3]
+    return max(ahead - (float(normal @ center) - packed.radius), 0.0)
+
+
+def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[LinkMesh, ...]:
+    """Return the meshes of all links of the hand that have a shape; made once per hand and source."""
+    chosen = hand.default_source if source is None else CollisionSource(source)
+    key = (id(hand), chosen)
+    kept = _kept.get(key)
+    if kept is not None and kept[0] is hand:
+        return kept[1]
+    numbers = sorted({*hand.fixed_links, *(link for finger in hand.fingers for link in finger.links)})
+    meshes = tuple(_link_mesh(n, hand.links[n].shapes.get(chosen, ()), chosen) for n in numbers)
+    meshes = tuple(mesh for mesh in meshes if len(mesh.tree.triangles))
+    _kept[key] = (hand, meshes)
+    while len(_kept) > _KEPT_HANDS:
+        _kept.popitem(last=False)
+    return meshes
+
+
+#: Meshes by identity of the hand; each entry holds its hand, so that the identity stays its own.
+_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, tuple[LinkMesh, ...]]] = OrderedDict()
+
+
+def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:
+    from clench.kernels.tree import build_tree, feature_owners
+
+    meshes = [shape_mesh(shape, source) for shape in shapes]
+    mesh = TriangleMesh.joined(meshes)
+    tree = build_tree(mesh.vertices, mesh.triangles)
+    corners = tree.vertices[tree.triangles].reshape(-1, 3)
+    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) if len(corners) else np.zeros(3)
+    return LinkMesh(
+        link,
+        tree,
+        feature_owners(tree),
+        all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True)),
+        center,
+        float(np.linalg.norm(corners - center, axis=1).max(initial=0.0)),
+    )
+
+
+def is_closed(mesh: TriangleMesh) -> bool:
+    """Say whether every edge has as many triangles on either side, places merged, and the volume is positive."""
+    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    triangles = place.reshape(-1)[mesh.triangles]
+    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    size = len(mesh.vertices) + 1
+    forward = np.sort((starts * size + ends)[starts != ends])
+    backward = np.sort((ends * size + starts)[starts != ends])
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    middle = mesh.vertices.mean(axis=0) if len(mesh.vertices) else np.zeros(3)
+    volume = float(np.einsum("ij,ij->", a - middle, np.cross(b - middle, c - middle)))
+    return bool(np.array_equal(forward, backward)) and volume > 0.0
+
+
+def _placed(hand: Hand, q: FloatArray, source: CollisionSource | None) -> list[tuple[LinkMesh, FloatArray]]:
+    poses = hand.link_poses(q)
+    return [(mesh, poses[mesh.link]) for mesh in link_meshes(hand, source)]
+
+
+def _may_touch(mesh: LinkMesh, T_object_link: FloatArray, packed: PackedObject) -> bool:
+    """Say whether the ball around a link meets the box around the object."""
+    if len(packed.full_tree.low) == 0:
+        return False
+    center = T_object_link[:3, :3] @ mesh.center + T_object_link[:3, 3]
+    outside = np.maximum(np.maximum(packed.full_tree.low[0] - center, center - packed.full_tree.high[0]), 0.0)
+    return bool(outside @ outside <= mesh.radius**2)
