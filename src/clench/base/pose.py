@@ -41,7 +41,9 @@ class Pose:
         norm = float(np.linalg.norm(quaternion))
         if abs(norm - 1.0) > QUATERNION_NORM:
             raise CommandError(f"{key}.wxyz: expected a unit quaternion [w, x, y, z], got norm {norm:.6g}.")
-        data = np.concatenate([quaternion / norm, xyz])
+        if abs(norm - 1.0) > 4e-16:  # a pose read back stays the same to the bit
+            quaternion = quaternion / norm
+        data = np.concatenate([quaternion, xyz])
         data.flags.writeable = False
         object.__setattr__(self, "wxyz_xyz", data)
 

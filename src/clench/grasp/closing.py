@@ -29,6 +29,7 @@ class HandPlan:
         plans: one per finger and posture, in entry order. finger: index into the command's fingers of each entry.
         posture: index of the posture alternative of each entry.
         arrays: the plans packed. items: one per entry and plane, then the full width, if wanted.
+        whole: whether each item is the full width.
     """
 
     plans: tuple[FingerPlan, ...]
@@ -36,6 +37,7 @@ class HandPlan:
     posture: tuple[int, ...]
     arrays: HandArrays
     items: ItemArrays
+    whole: tuple[bool, ...]
 
     @property
     def most_planes(self) -> int:
@@ -66,12 +68,14 @@ def make_hand_plan(
     rows = []
     for entry, plan in enumerate(plans):
         count = len(plan.families[0].offsets)
-        rows += [(entry, k, k + 1) for k in range(count)]
+        rows += [(entry, k, k + 1, 0) for k in range(count)]
         if full_width:
-            rows.append((entry, 0, count))
-    table = np.array(rows, dtype=np.int64).reshape(-1, 3)
+            rows.append((entry, 0, count, 1))
+    table = np.array(rows, dtype=np.int64).reshape(-1, 4)
     items = ItemArrays(*(np.ascontiguousarray(table[:, k]) for k in range(3)))
-    return HandPlan(tuple(plans), tuple(finger), tuple(posture), pack_plans(plans), items)
+    return HandPlan(
+        tuple(plans), tuple(finger), tuple(posture), pack_plans(plans), items, tuple(map(bool, table[:, 3]))
+    )
 
 
 def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, rounds: int) -> ClosedHand:
@@ -97,9 +101,7 @@ def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, 
         if not wanted:
             answer = empty_answer(plan, rounds)
             find_overlaps(plan.arrays, packed.tree, packed.closed, T, shared, overlaps)
-            close_items(
-                plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer
-            )
+            close_items(plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer)
             wanted = int(answer.overflow.max(initial=0))
             if not wanted:
                 return ClosedHand(answer, overlaps, shared)

@@ -108,4 +108,3 @@ def _enclosing(vertices: FloatArray, radius: float) -> tuple[float, float, float
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     reach = float(np.linalg.norm(vertices - middle, axis=1).max())
     return float(middle[0]), float(middle[1]), reach * (1.0 + 1e-12) + radius
-

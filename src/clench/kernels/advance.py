@@ -24,6 +24,9 @@ from .layout import (
 )
 from .turning_pairs import turn_disk, turn_segment
 
+#: Several joints at once move on by at most this before gaps are looked at anew [travel].
+STRIDE = 0.06
+
 
 @kernel
 def make_work(joints: int, outlines: OutlineArrays) -> Work:
@@ -31,6 +34,8 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
     rows = joints + 1
     return Work(
         np.zeros((joints, 3)),
+        np.zeros((joints, 3)),
+        np.zeros(joints),
         np.empty((outlines.vertex.shape[0], 3)),
         np.empty((outlines.side.shape[0], 5)),
         np.empty((outlines.joint.shape[0], 3)),
@@ -55,9 +60,11 @@ def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) 
 
 
 @kernel
-def put_outline(outlines: OutlineArrays, o: int, j: int, cx: float, cz: float, mirror: float, work: Work) -> Outline:
+def put_outline(
+    outlines: OutlineArrays, o: int, j: int, place: Floats, cx: float, cz: float, mirror: float, work: Work
+) -> Outline:
     """Write an outline's features at its placed joint `j` about a centre, mirrored in z for clockwise turns."""
-    dx, dz, angle = work.place[j, 0] - cx, work.place[j, 1] - cz, work.place[j, 2]
+    dx, dz, angle = place[j, 0] - cx, place[j, 1] - cz, place[j, 2]
     c, s = math.cos(angle), math.sin(angle)
     v0, v1 = outlines.vertex_first[o], outlines.vertex_first[o + 1]
     for i in range(v0, v1):
@@ -84,7 +91,7 @@ def put_outline(outlines: OutlineArrays, o: int, j: int, cx: float, cz: float, m
 
 
 @kernel
-def fill_chain(joint: int, first: int, rates: Floats, work: Work) -> tuple[int, int, float, float]:
+def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work) -> tuple[int, int, float, float]:
     """Write the chain of active joints up to `joint`.
 
     Returns:
@@ -94,7 +101,7 @@ def fill_chain(joint: int, first: int, rates: Floats, work: Work) -> tuple[int, 
     for j in range(first, joint + 1):
         if rates[j] != 0.0:
             if count:
-                ex, ez = work.place[j, 0] - work.place[last, 0], work.place[j, 1] - work.place[last, 1]
+                ex, ez = place[j, 0] - place[last, 0], place[j, 1] - place[last, 1]
                 work.chain[count - 1, 1], work.chain[count - 1, 2] = ex, ez
                 speed += abs(rate) * math.hypot(ex, ez)
             rate += rates[j]
@@ -190,12 +197,15 @@ def sweep_outline(
 
 @kernel
 def advance_outline(
+    chain: ChainArrays,
     outlines: OutlineArrays,
     o: int,
+    family: int,
     sections: SectionArrays,
     row: int,
     closed: bool,
     first: int,
+    turns: Floats,
     rates: Floats,
     touch: float,
     best: float,
@@ -203,22 +213,52 @@ def advance_outline(
 ) -> float:
     """Return the first contact of one outline with a plane's section before `best`, else `best`.
 
-    Behind one active joint an outline turns about that joint's pivot (mirrored when it turns clockwise); behind
-    several, its features are relative to the last of them.
+    Behind one active joint an outline turns about that joint's pivot (mirrored when it turns clockwise). Behind
+    several, its features are relative to the last of them, and the motion is cut into short strides: at the start of
+    a stride a feature's gap costs no trigonometry, and most are too wide for the stride.
     """
-    joint = outlines.joint[o]
-    count, last, rate, speed = fill_chain(joint, first, rates, work)
+    joint, place = outlines.joint[o], work.place
+    count, last, rate, speed = fill_chain(joint, first, rates, place, work)
     if count == 0:
         return best
-    px, pz = work.place[first, 0], work.place[first, 1]
-    mirror = -1.0 if count == 1 and rate < 0.0 else 1.0
-    outline = put_outline(outlines, o, joint, work.place[last, 0], work.place[last, 1], mirror, work)
+    px, pz = place[first, 0], place[first, 1]
     if count == 1:
+        mirror = -1.0 if rate < 0.0 else 1.0
+        outline = put_outline(outlines, o, joint, place, place[last, 0], place[last, 1], mirror, work)
         work.chain[0, 0] = abs(rate)
         best = turn_outline(outline, sections, row, closed, px, pz, mirror, abs(rate), touch, best, work)
-    else:
+        return sweep_ellipses(outline, sections, row, px, pz, mirror, 1, touch, best, work)
+    begun = 0.0
+    while begun < best:
+        stride = min(STRIDE, best - begun)
+        for j in range(turns.shape[0]):
+            work.turns[j] = turns[j] + rates[j] * begun
+        place_joints(chain, family, work.turns, work.moved)
+        count, last, rate, speed = fill_chain(joint, first, rates, work.moved, work)
+        outline = put_outline(outlines, o, joint, work.moved, work.moved[last, 0], work.moved[last, 1], 1.0, work)
         speed += abs(rate) * (math.hypot(work.disk[o, 0], work.disk[o, 1]) + work.disk[o, 2])
-        best = sweep_outline(outline, sections, row, closed, px, pz, count, speed, touch, best, work)
+        found = sweep_outline(outline, sections, row, closed, px, pz, count, speed, touch, stride, work)
+        found = sweep_ellipses(outline, sections, row, px, pz, 1.0, count, touch, found, work)
+        if found < stride:
+            return begun + found
+        begun += stride
+    return best
+
+
+@kernel
+def sweep_ellipses(
+    outline: Outline,
+    sections: SectionArrays,
+    row: int,
+    px: float,
+    pz: float,
+    mirror: float,
+    count: int,
+    touch: float,
+    best: float,
+    work: Work,
+) -> float:
+    """Return the first contact of a moving outline with the ellipses of a plane's section, before `best`."""
     for i in range(sections.counts[row, 2]):
         for k in range(8):
             work.ellipse[k] = sections.ellipses[row, i, k]
@@ -267,7 +307,21 @@ def advance(
     touch = TOUCH_FRACTION * hand.family_length[family]
     for plane in range(low, high):
         for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
-            found = advance_outline(hand.outlines, o, sections, plane - base, closed, first, rates, touch, best, work)
+            found = advance_outline(
+                hand.chain,
+                hand.outlines,
+                o,
+                family,
+                sections,
+                plane - base,
+                closed,
+                first,
+                turns,
+                rates,
+                touch,
+                best,
+                work,
+            )
             if found < best:
                 best, hit = found, plane
                 if best == 0.0:

@@ -234,7 +234,7 @@ def settle_hits(
         if family > start:
             sections, row = own, plane - hand.family_plane[start]
         place_joints(hand.chain, family, answer.turn[i], work.place)
-        outline = put_outline(hand.outlines, o, hand.outlines.joint[o], 0.0, 0.0, 1.0, work)
+        outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
         point = answer.point[i, n]
         gap, _, _ = core_distance(outline, point[HIT_X], point[HIT_Z], work)
         point[HIT_GAP] = gap - outline.radius

@@ -35,11 +35,20 @@ def evaluate(terms: Floats, count: int, constant: float, s: float) -> tuple[floa
 
 
 @kernel
+def at_start(terms: Floats, count: int, constant: float) -> float:
+    """Return a trigonometric sum at 0."""
+    value = constant
+    for i in range(count):
+        value += terms[i, 1]
+    return value
+
+
+@kernel
 def bounds(terms: Floats, count: int) -> tuple[float, float]:
     """Return bounds on the absolute slope and curvature of a trigonometric sum."""
     first, second = 0.0, 0.0
     for i in range(count):
-        size = math.hypot(terms[i, 1], terms[i, 2])
+        size = math.sqrt(terms[i, 1] ** 2 + terms[i, 2] ** 2)
         first += abs(terms[i, 0]) * size
         second += terms[i, 0] * terms[i, 0] * size
     return first, second

@@ -7,7 +7,7 @@ import math
 from clench.base.tolerances import FOOT_FRACTION
 
 from .compiling import kernel
-from .coupled import bounds, evaluate, line_on_point, next_root, place, point_on_line, point_on_point
+from .coupled import at_start, bounds, line_on_point, next_root, place, point_on_line, point_on_point
 from .layout import KIND_SIDE, Outline, Work
 from .turning_pairs import note
 
@@ -47,7 +47,7 @@ def sweep_vertex_line(
     work.chain[count - 1, 1], work.chain[count - 1, 2] = work.vertex[v, 0], work.vertex[v, 1]
     n, constant = point_on_line(work.chain, count, nx, nz, h + w, work.terms)
     first, second = bounds(work.terms, n)
-    value, _, _ = evaluate(work.terms, n, constant, 0.0)
+    value = at_start(work.terms, n, constant)
     if abs(value) - touch > first * best:
         return best
     slack = FOOT_FRACTION * (tb - ta)
@@ -79,7 +79,7 @@ def sweep_side_point(
     """Return the first `s` before `best` at which a moving side meets a fixed point from the side's outer side."""
     n, constant = line_on_point(work.chain, count, nx, nz, g, qx, qz, w, work.terms)
     first, second = bounds(work.terms, n)
-    value, _, _ = evaluate(work.terms, n, constant, 0.0)
+    value = at_start(work.terms, n, constant)
     if abs(value) - touch > first * best:
         return best
     slack = FOOT_FRACTION * (tb - ta)
@@ -101,7 +101,7 @@ def sweep_vertex_point(
     work.chain[count - 1, 1], work.chain[count - 1, 2] = work.vertex[v, 0], work.vertex[v, 1]
     n, constant = point_on_point(work.chain, count, qx, qz, w, work.terms)
     first, second = bounds(work.terms, n)
-    value, _, _ = evaluate(work.terms, n, constant, 0.0)
+    value = at_start(work.terms, n, constant)
     if value - touch > first * best or value < -touch:
         return best
     return next_root(work.terms, n, constant, 0.0, 1.0, second, touch, best)

@@ -106,7 +106,8 @@ class Work(NamedTuple):
     """Hold the scratch space of one item, so that closing allocates nothing.
 
     Args:
-        place: joints at the start of the segment, rows (x, z, turn), (J, 3).
+        place: joints at the start of the segment, rows (x, z, turn), (J, 3). moved, turns: joints at a later place,
+            (J, 3), and their turns, (J,).
         vertex, side, disk: the moving outlines' features about their turning centre, as in `OutlineArrays`; the third
             column of `vertex` is the distance from that centre.
         chain: rows (Ω, e_x, e_z), (J + 1, 3). terms: sums of `coupled`, (N, 3). ellipse: one, relative, (8,).
@@ -115,6 +116,8 @@ class Work(NamedTuple):
     """
 
     place: Floats
+    moved: Floats
+    turns: Floats
     vertex: Floats
     side: Floats
     disk: Floats

@@ -48,7 +48,14 @@ def outline_distance(outline: Outline, sections: SectionArrays, row: int, work: 
             d, _, _ = point_segment(bx, bz, cx, cz, dx, dz)
             if d < best:
                 best, x, z = d, bx, bz
-    best -= outline.radius
+    gap, fx, fz = round_distance(outline, sections, row, work)
+    return (best - outline.radius, x, z) if best - outline.radius <= gap else (gap, fx, fz)
+
+
+@kernel
+def round_distance(outline: Outline, sections: SectionArrays, row: int, work: Work) -> tuple[float, float, float]:
+    """Return the least distance of an outline to the round parts of a section, and the section's point."""
+    best, x, z = math.inf, 0.0, 0.0
     for i in range(sections.counts[row, 1]):
         qx, qz, radius = sections.disks[row, i, 0], sections.disks[row, i, 1], sections.disks[row, i, 2]
         d, nx, nz = core_distance(outline, qx, qz, work)

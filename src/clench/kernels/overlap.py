@@ -13,7 +13,7 @@ from .compiling import kernel
 from .distance import is_inside
 from .family_pose import compose_inverse, pose_family
 from .layout import Floats, HandArrays, Ints, Outline, SectionArrays, Work
-from .outline_gap import core_distance, outline_distance, point_segment, side_ends
+from .outline_gap import core_distance, point_segment, round_distance, side_ends
 from .tree import MeshTree
 
 
@@ -44,27 +44,51 @@ def core_holds(outline: Outline, qx: float, qz: float, work: Work) -> bool:
 
 
 @kernel
+def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: float, margin: float, work: Work) -> bool:
+    """Say whether a segment crosses an outline, comes closer to its core than the radius, or begins inside it."""
+    limit = outline.radius - margin
+    for v in range(outline.v0, outline.v1):
+        if limit > 0.0:
+            d, _, _ = point_segment(work.vertex[v, 0], work.vertex[v, 1], ax, az, bx, bz)
+            if d < limit:
+                return True
+    for s in range(outline.s0, outline.s1):
+        cx, cz, dx, dz = side_ends(work.side, s)
+        if crosses(ax, az, bx, bz, cx, cz, dx, dz, margin):
+            return True
+        if limit > 0.0:
+            d, _, _ = point_segment(ax, az, cx, cz, dx, dz)
+            if d < limit:
+                return True
+    if outline.s1 - outline.s0 >= 3 and core_holds(outline, ax, az, work):
+        d, _, _ = core_distance(outline, ax, az, work)
+        return d > margin
+    return False
+
+
+@kernel
 def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> bool:
     """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
     margin = 4.0 * touch
-    gap, _, _ = outline_distance(outline, sections, row, work)
-    if gap > 0.0 and outline.s1 - outline.s0 < 3:
-        return False
-    if gap < -margin:
-        return True
+    x, z, reach = work.disk[outline.index, 0], work.disk[outline.index, 1], work.disk[outline.index, 2]
     segments = sections.segments
     for i in range(sections.counts[row, 0]):
         ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
-        for s in range(outline.s0, outline.s1):
-            cx, cz, dx, dz = side_ends(work.side, s)
-            if crosses(ax, az, bx, bz, cx, cz, dx, dz, margin):
-                return True
-        if gap > margin - outline.radius and outline.s1 - outline.s0 >= 3:
-            d, _, _ = core_distance(outline, ax, az, work)
-            if d > margin and core_holds(outline, ax, az, work):
-                return True
+        half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+        if (0.5 * (ax + bx) - x) ** 2 + (0.5 * (az + bz) - z) ** 2 <= (reach + half) ** 2 and segment_overlaps(
+            outline, ax, az, bx, bz, margin, work
+        ):
+            return True
+    if sections.counts[row, 1] == 0 and sections.counts[row, 2] == 0:
+        return False
+    gap, _, _ = round_distance(outline, sections, row, work)
+    if gap < -margin:
+        return True
     for i in range(sections.counts[row, 1]):
         if core_holds(outline, sections.disks[row, i, 0], sections.disks[row, i, 1], work):
+            return True
+    for i in range(sections.counts[row, 2]):
+        if core_holds(outline, sections.ellipses[row, i, 0], sections.ellipses[row, i, 1], work):
             return True
     return False
 
@@ -102,7 +126,7 @@ def find_overlaps(
         compose_inverse(poses[family], T_palm_object, T)
         for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
             for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
-                outline = put_outline(hand.outlines, o, hand.outlines.joint[o], 0.0, 0.0, 1.0, work)
+                outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
                 x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
                 if (
                     starts_inside(tree, closed, T, x, hand.plane_offset[plane], z)

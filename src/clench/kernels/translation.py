@@ -55,6 +55,9 @@ def first_contact(
     if moving.low.shape[0] == 0 or rest.low.shape[0] == 0:
         return np.inf, -1, -1
     along = _frame(direction)
+    # What lies behind by rounding only is a touch at the start.
+    slack = _FOOT * (_reach(moving.low, moving.high) + _reach(rest.low, rest.high))
+    slack += _FOOT * (abs(T_rest_moving[0, 3]) + abs(T_rest_moving[1, 3]) + abs(T_rest_moving[2, 3]))
     stack[0, 0], stack[0, 1] = 0, 0
     waiting = 1
     while waiting:
@@ -72,6 +75,7 @@ def first_contact(
                 rest_owners,
                 b,
                 along,
+                slack,
                 best,
                 moving_triangle,
                 rest_triangle,
@@ -158,6 +162,7 @@ def _meet_leaves(
     rest_owners: Masks,
     b: int,
     along: Triple,
+    slack: float,
     best: float,
     moving_triangle: int,
     rest_triangle: int,
@@ -171,7 +176,7 @@ def _meet_leaves(
             two = (_turn(along, u), _turn(along, v), _turn(along, w))
             if _apart(one, two, best):
                 continue
-            distance = _meet(one, moving_owners[i], two, rest_owners[j])
+            distance = _meet(one, moving_owners[i], two, rest_owners[j], slack)
             if distance < best:
                 best, moving_triangle, rest_triangle = distance, i, j
     return best, moving_triangle, rest_triangle
@@ -202,34 +207,34 @@ def _apart(one: Triple, two: Triple, best: float) -> bool:
 
 
 @kernel
-def _meet(one: Triple, one_owns: int, two: Triple, two_owns: int) -> float:
+def _meet(one: Triple, one_owns: int, two: Triple, two_owns: int, slack: float) -> float:
     """Return the distance at which two triangles first touch by the features that they own; infinite for none."""
     best = np.inf
     a, b, c = one
     d, e, f = two
     for k in range(3):
         if one_owns & (1 << k):
-            best = min(best, _earlier(_height_over(a, d, e, f)))
+            best = min(best, _earlier(_height_over(a, d, e, f), slack))
         if two_owns & (1 << k):
-            best = min(best, _earlier(-_height_over(d, one[0], one[1], one[2])))
+            best = min(best, _earlier(-_height_over(d, one[0], one[1], one[2]), slack))
         if one_owns & (8 << k):
             if two_owns & 8:
-                best = min(best, _earlier(_edges(a, b, two[0], two[1])))
+                best = min(best, _earlier(_edges(a, b, two[0], two[1]), slack))
             if two_owns & 16:
-                best = min(best, _earlier(_edges(a, b, two[1], two[2])))
+                best = min(best, _earlier(_edges(a, b, two[1], two[2]), slack))
             if two_owns & 32:
-                best = min(best, _earlier(_edges(a, b, two[2], two[0])))
+                best = min(best, _earlier(_edges(a, b, two[2], two[0]), slack))
         a, b, c = b, c, a
         d, e, f = e, f, d
     return best
 
 
 @kernel
-def _earlier(distance: float) -> float:
+def _earlier(distance: float, slack: float) -> float:
     """Return a distance as it counts: not a number is none, and what lies behind by rounding only is 0."""
     if distance >= 0.0:
         return distance
-    return 0.0 if distance > -_FOOT else np.inf
+    return 0.0 if distance >= -slack else np.inf
 
 
 @kernel

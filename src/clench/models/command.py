@@ -35,6 +35,7 @@ class GraspCommand:
         full_width: also compute the set that closes over all planes at once.
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
+        check_sets: measure the penetration of every alternative set, which costs more than the solve.
         collision_source: geometry of the hand; None is the hand's default.
         criteria: weights by criterion name; None is the default calibration. A path names a calibration file.
         seed: recorded with the result; nothing random depends on it.
@@ -51,6 +52,7 @@ class GraspCommand:
     full_width: bool = True
     yaw_grid: tuple[float, ...] = (0.0,)
     open_variants: tuple[float, ...] = (0.0,)
+    check_sets: bool = False
     collision_source: CollisionSource | None = None
     criteria: Mapping[str, float] | Path | None = None
     seed: int | None = None

@@ -161,6 +161,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "full_width": _flag,
         "yaw_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
         "open_variants": lambda v, key: _numbers(v, key, "offsets in rad"),
+        "check_sets": _flag,
         "collision_source": lambda v, key: _choice(v, CollisionSource, key),
         "criteria": lambda v, key: _criteria(v, key, folder),
         "seed": _whole,

@@ -1,0 +1,46 @@
+"""Pictures of a solution, for people who have not read the source: PNG files, made without a screen."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from clench.models.command import GraspCommand
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+    from clench.solve.solution import GraspSolution
+
+__all__ = ["draw_solution"]
+
+
+def draw_solution(
+    hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, directory: str | Path
+) -> list[Path]:
+    """Draw every finger in its curl planes, its alternative sets, and the hand from two sides.
+
+    Args:
+        hand, obj, command: what was solved. solution: the answer.
+        directory: an existing folder; `<finger>_plane.png`, `<finger>_sets.png` and `grasp.png` are written there.
+
+    Returns:
+        the files written; a finger without sets (nothing to close) has no picture of its own.
+
+    Raises:
+        FileError: a file cannot be written.
+    """
+    from .curl_plane import draw_finger
+    from .plane_scene import FingerScenes
+    from .set_grid import draw_sets
+
+    folder = Path(directory)
+    files = []
+    for name, result in solution.fingers.items():
+        if not 0 <= result.chosen < len(result.candidates):
+            continue
+        stem = re.sub(r"[^\w.-]+", "_", name)
+        scenes = FingerScenes(hand, obj, command, solution, name, result.candidates[result.chosen])
+        files.append(draw_finger(scenes, result, hand.name, obj.name, folder / f"{stem}_plane.png"))
+        files.append(draw_sets(hand, obj, command, solution, result, folder / f"{stem}_sets.png"))
+    return files

@@ -1,0 +1,168 @@
+"""Draw a finger's alternative sets side by side: what every curl plane gives alone, and which set was chosen."""
+
+from __future__ import annotations
+
+import math
+import os.path
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from clench.models.command import GraspCommand
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.solution import Candidate, FingerResult, GraspSolution
+
+from . import style
+from .curl_plane import draw_plane, frame_plane, overlap, set_name
+from .plane_scene import FingerScenes, PlaneScene, bounds
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Sets shown at most; of more, an even selection.
+MOST_SETS: Final = 8
+_COLUMNS: Final = 4
+_PANEL: Final = 370
+_GAP: Final = 20
+#: Height of the lines below a panel, in pixels.
+_LINES: Final = 58
+_TOP: Final = 92
+_TITLE: Final = 24
+_BOTTOM: Final = 42
+
+
+def draw_sets(
+    hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, result: FingerResult, path: Path
+) -> Path:
+    """Write a figure with one panel per set at the chosen posture, the chosen one framed."""
+    chosen = result.candidates[result.chosen]
+    alike = [c for c in result.candidates if c.posture == chosen.posture]
+    shown = _selected(alike, chosen)
+    made = [FingerScenes(hand, obj, command, solution, result.name, c) for c in shown]
+    family = _busiest_family(made[0])
+    scenes = [m.scene(family, dict(m.touched_planes(99)[::-1])[family], with_open=False) for m in made]
+    low, high = bounds(scenes)
+    columns = min(_COLUMNS, len(shown))
+    rows = math.ceil(len(shown) / columns)
+    aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.55, 1.1))
+    each = (_PANEL, round(_PANEL * aspect))
+    width = max(_GAP + columns * (each[0] + _GAP), 900)
+    height = _TOP + rows * (each[1] + _TITLE + _LINES + _GAP) + _BOTTOM
+    figure = style.new_figure(width, height)
+    for k, (candidate, scene) in enumerate(zip(shown, scenes, strict=True)):
+        x = _GAP + (k % columns) * (each[0] + _GAP)
+        y = height - _TOP - _TITLE - each[1] - (k // columns) * (each[1] + _TITLE + _LINES + _GAP)
+        axes = figure.add_axes((x / width, y / height, each[0] / width, each[1] / height))
+        frame_plane(axes, low, high)
+        draw_plane(axes, scene, small=True)
+        _caption(axes, candidate, scene, candidate is chosen)
+        if k == 0:
+            _scale_bar(axes)
+    more = f" ({len(shown)} of {len(alike)} shown)" if len(shown) < len(alike) else ""
+    title = f"Finger '{result.name}' of {hand.name} on {obj.name}: the sets of joint angles to choose from{more}"
+    style.write(figure, _GAP / width, 1.0 - 14 / height, title, fontsize=14, fontweight="bold", va="top")
+    for i, text in enumerate(_explanation(made[0], scenes[0], result, chosen)):
+        y = 1.0 - (40 + 18 * i) / height
+        style.write(figure, _GAP / width, y, text, fontsize=10, va="top", color=style.INK if i == 0 else style.CHOSEN)
+    note = "●  touches the object on the plane that is drawn      ○  touches on another plane of this finger"
+    style.write(figure, _GAP / width, 16 / height, note, fontsize=9.5, color=style.CONTACT)
+    return style.save_figure(figure, path)
+
+
+def _selected(alike: list[Candidate], chosen: Candidate) -> list[Candidate]:
+    """Return at most `MOST_SETS` of the sets, spread evenly, always with the chosen one and the full width."""
+    planes = [c for c in alike if c.plane is not None and c is not chosen]
+    kept = [c for c in alike if c.plane is None or c is chosen][: MOST_SETS // 2]
+    if chosen not in kept:
+        kept[-1] = chosen
+    room = MOST_SETS - len(kept)
+    if len(planes) > room:
+        offsets = np.array([c.offset or 0.0 for c in planes])
+        wanted_offsets = np.linspace(offsets[0], offsets[-1], room)
+        planes = [planes[i] for i in sorted({int(np.argmin(np.abs(offsets - y))) for y in wanted_offsets})]
+    wanted = {id(c) for c in planes + kept}
+    return [c for c in alike if id(c) in wanted]
+
+
+def _busiest_family(scenes: FingerScenes) -> int:
+    """Return the family of planes with most joints, the first of several."""
+    families = [p.family for p in scenes.plan.joints]
+    return max(sorted(set(families)), key=families.count)
+
+
+def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) -> None:
+    """Title a panel, write its joint angles, and frame the chosen one."""
+    where = "" if candidate.offset is None else f" (y = {candidate.offset * 1e3:+.1f} mm)"
+    title = f"{set_name(candidate)}{where}"
+    color = style.CHOSEN if chosen else style.INK
+    axes.set_title(
+        f"CHOSEN: {title}" if chosen else title,
+        fontsize=11,
+        loc="left",
+        color=color,
+        fontweight="bold" if chosen else "normal",
+        pad=5,
+    )
+    _frame(axes, chosen)
+    box = axes.get_window_extent()
+    names = _short([j.name for j in scene.joints])
+    for i, joint in enumerate(scene.joints):
+        shade = style.mixed(style.joint_color(joint.position), "#000000", 0.25)
+        x = i / max(len(scene.joints), 3)
+        for text, down, size in ((names[i], 6.0, 8.5), (f"{np.degrees(joint.angle):.1f}°", 19.0, 11.0)):
+            label = style.write(axes, x, -down / box.height, text, fontsize=size, color=shade, fontweight="bold")
+            label.set(transform=axes.transAxes, va="top")
+    label = style.write(axes, 0.0, -39.0 / box.height, _verdict(candidate), fontsize=9)
+    label.set(transform=axes.transAxes, va="top")
+
+
+def _frame(axes: Axes, chosen: bool) -> None:
+    """Replace an axes' ticks and spines, which cost more to draw than what is in it, by a border."""
+    from matplotlib.patches import Rectangle
+
+    axes.set_axis_off()
+    color, width = (style.CHOSEN, 3.5) if chosen else ("#cccccc", 1.0)
+    border = Rectangle((0, 0), 1, 1, transform=axes.transAxes, fill=False, edgecolor=color, linewidth=width, zorder=13)
+    border.set_clip_on(False)
+    axes.add_artist(border)
+
+
+def _short(names: list[str]) -> list[str]:
+    """Return names without the words that all of them start with."""
+    start = os.path.commonprefix(names)
+    cut = start.rfind("_") + 1 if len(names) > 1 else 0
+    return [name[cut:] for name in names]
+
+
+def _verdict(candidate: Candidate) -> str:
+    touching = "" if candidate.contacts else "no contact; "
+    if candidate.penetration is None or candidate.feasible is None:
+        return f"{touching}overlap not checked"
+    return f"{touching}{overlap(candidate.penetration)}"
+
+
+def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, chosen: Candidate) -> list[str]:
+    family = ""
+    if len(scenes.plan.families) > 1:
+        family = f" Its joints lie in {len(scenes.plan.families)} families of planes; drawn are those of "
+        family += f"{', '.join(j.name for j in scene.joints)}."
+    first = "One set per curl plane, closed as if only that plane existed, and one closed over the full width at once."
+    why = {
+        True: "it stops at the first touch anywhere across the finger's width",
+        False: "it scores best among the sets",
+    }[chosen.plane is None]
+    score = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in chosen.scores.items())
+    second = f"Chosen: {set_name(chosen)}: {why}" + (f" ({score})." if score else ".")
+    return [first + family, second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
+
+
+def _scale_bar(axes: Axes) -> None:
+    """Draw a bar of a round length in the lower right corner of a panel whose axes are in millimetres."""
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    length = next(step for step in (100, 50, 20, 10, 5, 2, 1) if step < 0.3 * (x1 - x0) or step == 1)
+    right, low = x1 - 0.04 * (x1 - x0), y0 + 0.13 * (y1 - y0)
+    axes.plot([right - length, right], [low, low], "-", color=style.INK, lw=2.5, solid_capstyle="butt", zorder=12)
+    label = style.write(axes, right - 0.5 * length, low + 0.015 * (y1 - y0), f"{length} mm", fontsize=9)
+    label.set(ha="center", va="bottom", path_effects=style.halo(), zorder=12)

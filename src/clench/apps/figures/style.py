@@ -1,0 +1,73 @@
+"""Colours that colour-blind readers can tell apart, and how a figure is made and saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from clench.base.errors import FileError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI: Final = 100
+INK: Final = "#222222"
+FAINT: Final = "#8a8a8a"
+PAPER: Final = "#ffffff"
+OBJECT_FILL: Final = "#efe6cf"
+OBJECT_EDGE: Final = "#7a6a3a"
+OBSTACLE_FILL: Final = "#e3e3e3"
+OBSTACLE_EDGE: Final = "#6f6f6f"
+PALM_FILL: Final = "#d9d9d9"
+CONTACT: Final = "#d55e00"
+CHOSEN: Final = "#0b7a53"
+#: One colour per joint and the link that it moves, palm side first (after Okabe and Ito).
+JOINT_COLORS: Final = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f5539")
+
+
+def joint_color(position: int) -> str:
+    """Return the colour of a finger's joint by its place from the palm outwards."""
+    return JOINT_COLORS[position % len(JOINT_COLORS)]
+
+
+def mixed(color: str, other: str, share: float) -> str:
+    """Return a colour with a share [-] of another one, both as ``"#rrggbb"``."""
+    pairs = ((int(color[i : i + 2], 16), int(other[i : i + 2], 16)) for i in (1, 3, 5))
+    return "#" + "".join(f"{round((1.0 - share) * a + share * b):02x}" for a, b in pairs)
+
+
+def new_figure(width: int, height: int) -> Figure:
+    """Return an empty figure of a size in pixels, drawn without a screen and without any global state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor=PAPER)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG and return its path.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    try:
+        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 2})
+    except OSError as error:
+        raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
+    return path
+
+
+def write(target: Any, x: float, y: float, text: str, **options: Any) -> Any:
+    """Put text into a figure or axes; names with `$` stay as they are."""
+    label = target.text(x, y, text, **{"color": INK, "fontsize": 10, **options})
+    label.set_parse_math(False)
+    return label
+
+
+def halo(width: float = 3.0) -> list[Any]:
+    """Return the effect that keeps text readable on top of lines."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=width, foreground=PAPER)]

@@ -1,0 +1,126 @@
+"""The alternative sets of a finger, read out of what the kernels computed (METHOD.md section 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.base.tolerances import PASSED_GAP
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import BodyRole
+
+from .closing import ClosedHand, HandPlan
+from .plan import FingerPlan
+from .scene import PackedObject
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Describe one contact, in the palm frame.
+
+    Args:
+        link, joint: indices in the hand: the touching link, and the leader of the group it stopped.
+        body: index of the touched body. graspable: whether that body is to be grasped.
+        plane: of the family. offset: its place along y [m]. kind: 0 side, 1 tip, 2 edge.
+        position: [m], normal: out of the object, unit, shape (3,). gap: at the final posture [m].
+        curve_angle: tangent angle of the object's curve [rad]. link_angle: of the touching side [rad], else None.
+    """
+
+    link: int
+    joint: int
+    body: int
+    graspable: bool
+    plane: int
+    offset: float
+    kind: int
+    position: FloatArray
+    normal: FloatArray
+    gap: float
+    curve_angle: float
+    link_angle: float | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether a later motion opened it by more than 1 µm."""
+        return self.gap > PASSED_GAP
+
+
+@dataclass(frozen=True, eq=False)
+class FingerCandidate:
+    """Hold one alternative set of a finger.
+
+    Args:
+        plan: the finger at its posture. posture: index of the posture alternative.
+        plane: index, or None for the full width. travel: of the plan's groups [rad].
+        q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
+        touches: in stage order. overlap: link that overlaps the object at the start, or None.
+        feasible, penetration: None when not checked. scores: criterion name to value.
+    """
+
+    plan: FingerPlan
+    posture: int
+    plane: int | None
+    travel: FloatArray
+    q: FloatArray
+    touches: tuple[Touch, ...]
+    overlap: int | None
+    feasible: bool | None = None
+    penetration: float | None = None
+    scores: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def offset(self) -> float | None:
+        """Place of the plane along y of the first family [m]; None for the full width."""
+        return None if self.plane is None else float(self.plan.families[0].offsets[self.plane])
+
+    @property
+    def holding(self) -> tuple[Touch, ...]:
+        """Contacts with a graspable body that are still touching."""
+        return tuple(t for t in self.touches if t.graspable and not t.passed)
+
+
+def read_candidates(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand) -> list[FingerCandidate]:
+    """Return one candidate per item, in item order."""
+    return [_candidate(hand, plan, packed, closed, i) for i in range(len(plan.items.entry))]
+
+
+def _candidate(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int) -> FingerCandidate:
+    entry = int(plan.items.entry[i])
+    finger = plan.plans[entry]
+    first, last = plan.arrays.entry_group[entry : entry + 2]
+    travel = closed.answer.travel[i, first:last].copy()
+    overlap = int(closed.overlaps[entry])
+    return FingerCandidate(
+        plan=finger,
+        posture=plan.posture[entry],
+        plane=None if plan.whole[i] else int(plan.items.low[i]),
+        travel=travel,
+        q=finger.angles(hand, travel),
+        touches=tuple(_touch(plan, packed, closed, i, n, entry) for n in range(closed.answer.count[i])),
+        overlap=int(plan.arrays.outlines.link[overlap]) if overlap >= 0 else None,
+    )
+
+
+def _touch(plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int, entry: int) -> Touch:
+    answer, arrays = closed.answer, plan.arrays
+    plane, outline, kind, source, group, family = (int(v) for v in answer.hit[i, n])
+    x, z, nx, nz, cx, cz, _, gap = answer.point[i, n]
+    pose = answer.pose[i, family]
+    offset = float(arrays.plane_offset[plane])
+    body = int(packed.tree.body[source]) if source >= 0 else int(packed.rounds.body[-1 - source])
+    return Touch(
+        link=int(arrays.outlines.link[outline]),
+        joint=plan.plans[entry].leaders[group - int(arrays.entry_group[entry])],
+        body=body,
+        graspable=packed.body_roles[body] is BodyRole.GRASPABLE,
+        plane=plane - int(arrays.family_plane[family]),
+        offset=offset,
+        kind=kind,
+        position=pose[:, :3] @ np.array([x, offset, z]) + pose[:, 3],
+        normal=pose[:, :3] @ np.array([nx, 0.0, nz]),
+        gap=float(gap),
+        curve_angle=float(np.arctan2(cx, -cz)),
+        link_angle=float(np.arctan2(nx, -nz)) if kind == 0 else None,
+    )

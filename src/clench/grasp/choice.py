@@ -1,0 +1,24 @@
+"""Choose the best set of each finger (METHOD.md section 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from .candidates import FingerCandidate
+from .criteria import weigh
+
+
+def choose(candidates: Sequence[FingerCandidate], weights: Mapping[str, float]) -> int:
+    """Return the index of the best candidate.
+
+    A set that is known to be infeasible is never chosen before one that is not; one known to be feasible goes before
+    one that was not checked; one that touches goes before one that does not. The weighted scores decide among the
+    rest; ties go to the full width, then to the first.
+    """
+
+    def rank(i: int) -> tuple[int, int, float, bool, int]:
+        c = candidates[i]
+        known = {True: 2, None: 1, False: 0}[c.feasible]
+        return known, int(bool(c.holding)), weigh(c.scores, weights), c.plane is None, -i
+
+    return max(range(len(candidates)), key=rank)

@@ -1,0 +1,78 @@
+"""Judge which alternative sets a rigid hand could take (METHOD.md section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.base.tolerances import ALLOWED_PENETRATION
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+from .candidates import FingerCandidate
+from .depths import hand_depths
+from .scene import PackedObject
+
+#: Travels closer than this are the same set [rad].
+_SAME = 1e-12
+#: Postures at which the path of a set is looked at, besides its end.
+_LOOKS = 8
+
+
+def judge_sets(
+    hand: Hand,
+    candidates: Sequence[FingerCandidate],
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource,
+    measure: bool,
+) -> list[FingerCandidate]:
+    """Return the candidates with `feasible` and `penetration` filled as far as they are known.
+
+    The full-width set passes through nothing on any plane; a plane's own set that equals it is the same set. Every
+    other one passes through what another plane would have stopped at: how deep is measured on request.
+
+    Args:
+        hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
+        source: geometry of the hand. measure: measure the sets whose answer the planes do not give.
+    """
+    whole = {id(c.plan): c for c in candidates if c.plane is None}
+    judged = []
+    for c in candidates:
+        full = whole.get(id(c.plan))
+        if c.overlap is not None:
+            judged.append(replace(c, feasible=False))
+        elif full is not None and np.abs(c.travel - full.travel).max(initial=0.0) <= _SAME:
+            judged.append(replace(c, feasible=True))
+        elif measure:
+            depth, allowed = _deepest(hand, c, packed, T_palm_object, source)
+            judged.append(replace(c, feasible=depth <= allowed, penetration=depth))
+        else:
+            judged.append(c)
+    return judged
+
+
+def _deepest(
+    hand: Hand, candidate: FingerCandidate, packed: PackedObject, T_palm_object: FloatArray, source: CollisionSource
+) -> tuple[float, float]:
+    """Return the largest depth beyond its link's allowance along a set's path, and that allowance [m]."""
+    deepest, allowance = 0.0, ALLOWED_PENETRATION
+    for travel in _path(candidate.travel):
+        q = candidate.plan.angles(hand, travel)
+        for found in hand_depths(hand, q, packed, T_palm_object, source, links=candidate.plan.finger.links):
+            allowed = max(ALLOWED_PENETRATION, hand.links[found.link].pad_indentation)
+            if found.depth - allowed > deepest - allowance:
+                deepest, allowance = found.depth, allowed
+    return deepest, allowance
+
+
+def _path(travel: FloatArray) -> list[FloatArray]:
+    """Return travels along the closing path, one group after another, the end last."""
+    path = []
+    for g in range(len(travel)):
+        for part in np.linspace(0.0, 1.0, _LOOKS, endpoint=False)[1:]:
+            path.append(np.concatenate([travel[:g], [part * travel[g]], np.zeros(len(travel) - g - 1)]))
+    return [*path, travel]

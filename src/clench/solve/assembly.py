@@ -1,0 +1,227 @@
+"""Assemble the solution: the computed sets, the choice and the judgement, in names and world coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.grasp.candidates import FingerCandidate, Touch
+from clench.grasp.depths import LinkDepth, retreat_distance
+from clench.grasp.motion import asked_fingers, decompose
+from clench.grasp.scene import hash_hand
+
+from .solution import (
+    Candidate,
+    Contact,
+    ContactKind,
+    FingerResult,
+    FingerStatus,
+    GraspSolution,
+    SolutionStatus,
+)
+
+if TYPE_CHECKING:
+    from .controller import Problem
+
+_KINDS = (ContactKind.SIDE, ContactKind.TIP, ContactKind.EDGE)
+#: Contacts of thumb and finger oppose each other when their normals do: the cosine is below this [-].
+_OPPOSED = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Hold what was computed and chosen.
+
+    Args:
+        fingers: candidates of each finger that closes. chosen: index of the chosen one of each.
+        final: posture of the hand, shape (J,) [rad].
+        at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the end.
+    """
+
+    fingers: Sequence[Sequence[FingerCandidate]]
+    chosen: Sequence[int]
+    final: FloatArray
+    at_start: Sequence[LinkDepth]
+    at_end: Sequence[LinkDepth]
+
+    @property
+    def best(self) -> list[FingerCandidate]:
+        """The chosen candidate of each finger."""
+        return [group[i] for group, i in zip(self.fingers, self.chosen, strict=True)]
+
+
+def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> GraspSolution:
+    """Return the solution in names and world coordinates."""
+    from clench import __version__
+
+    hand, command, packed = problem.hand, problem.command, problem.packed
+    results = {c.plan.finger.name: _finger(answer, k, problem) for k, c in enumerate(answer.best)}
+    for finger in asked_fingers(hand, command):
+        if finger.name not in results:
+            text = f"{finger.name} has no closing joint."
+            results[finger.name] = FingerResult(finger.name, FingerStatus.NO_MOTION, text, 0, ())
+    status, reason = _status(answer, results, problem)
+    names = hand.joint_names
+    return GraspSolution(
+        clench_version=__version__,
+        hand=hand.name,
+        object=problem.obj.name,
+        hand_model=str(hand.path) if hand.path else hand.name,
+        object_model=str(problem.obj.path) if problem.obj.path else problem.obj.name,
+        geometry_hash=f"{hash_hand(hand, problem.source)}+{packed.geometry_hash}",
+        seed=command.seed,
+        status=status,
+        reason=reason,
+        hand_pose=problem.T_world_palm,
+        object_pose=problem.T_world_object,
+        decomposition=decompose(hand, answer.final),
+        joint_angles=dict(zip(names, answer.final.tolist(), strict=True)),
+        open_angles=dict(zip(names, problem.start.tolist(), strict=True)),
+        certified=False,
+        collision_source=str(problem.source),
+        object_collision_source=str(problem.obj.collision_source),
+        max_penetration=max((d.depth for d in answer.at_end), default=0.0),
+        fingers=results,
+        contacts=tuple(c for r in results.values() if r.candidates for c in r.candidates[r.chosen].contacts),
+        timing=dict(timing),
+        joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
+    )
+
+
+def _finger(answer: Answer, k: int, problem: Problem) -> FingerResult:
+    candidates = tuple(_candidate(c, problem) for c in answer.fingers[k])
+    best = candidates[answer.chosen[k]]
+    name = answer.fingers[k][0].plan.finger.name
+    return FingerResult(name, best.status, best.reason, answer.chosen[k], candidates)
+
+
+def _candidate(c: FingerCandidate, problem: Problem) -> Candidate:
+    hand = problem.hand
+    status, reason = _finger_status(c, problem)
+    return Candidate(
+        plane=c.plane,
+        offset=c.offset,
+        order=str(problem.command.order),
+        posture=c.posture,
+        joint_angles={hand.joints[j].name: float(c.q[j]) for j in c.plan.finger.joints},
+        status=status,
+        reason=reason,
+        feasible=c.feasible,
+        penetration=c.penetration,
+        scores=dict(c.scores),
+        contacts=tuple(_contact(c, t, problem) for t in c.touches),
+    )
+
+
+def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
+    T = problem.T_world_palm
+    return Contact(
+        finger=c.plan.finger.name,
+        link=problem.hand.links[t.link].name,
+        body=problem.packed.body_names[t.body],
+        stops_joint=problem.hand.joints[t.joint].name,
+        plane=t.plane,
+        offset=t.offset,
+        kind=_KINDS[t.kind],
+        passed=t.passed,
+        position=T.apply(t.position),
+        normal=T.rotation @ t.normal,
+        gap=t.gap,
+        curve_angle=t.curve_angle,
+        link_angle=t.link_angle,
+    )
+
+
+def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, str]:
+    hand, name = problem.hand, c.plan.finger.name
+    if c.overlap is not None:
+        link = hand.links[c.overlap].name
+        return FingerStatus.BLOCKED, f"{link} overlaps {problem.obj.name} before {name} moves."
+    if c.holding:
+        links = list(dict.fromkeys(hand.links[t.link].name for t in c.holding))
+        return FingerStatus.TOUCH, f"{', '.join(links)} touches {problem.packed.body_names[c.holding[0].body]}."
+    if max(c.plan.lengths, default=0.0) <= 0.0:
+        return FingerStatus.NO_MOTION, f"Every closing joint of {name} is at its limit before it moves."
+    stopped = [t for t in c.touches if not t.passed]
+    if stopped:
+        body = problem.packed.body_names[stopped[0].body]
+        return FingerStatus.LIMIT, f"{name} is stopped by the obstacle {body} and does not reach the object."
+    if c.touches:
+        return FingerStatus.LIMIT, f"{name} touched on its way and was carried off again by a later joint."
+    angles = ", ".join(f"{hand.joints[j].name} {c.q[j]:.3f}" for j in c.plan.leaders)
+    return FingerStatus.LIMIT, f"{name} closes to its limits without touching ({angles} rad)."
+
+
+def _status(
+    answer: Answer, results: Mapping[str, FingerResult], problem: Problem
+) -> tuple[SolutionStatus, dict[str, Any]]:
+    deepest = max(answer.at_start, key=lambda d: d.depth, default=None)
+    if deepest is not None and deepest.depth > 0.0:
+        return SolutionStatus.BLOCKED, _overlap_reason(deepest, problem)
+    statuses = [r.status for r in results.values()]
+    if all(s is FingerStatus.BLOCKED for s in statuses):
+        reasons = [_finger_overlap(c, problem) for c in answer.best]
+        worst = max(reasons, key=lambda r: float(r.get("depth") or 0.0))
+        return SolutionStatus.BLOCKED, {**worst, "retreat": _retreat(problem)}
+    touching = [r.name for r in results.values() if r.status is FingerStatus.TOUCH]
+    if not touching:
+        text = "No finger touches: " + " ".join(r.reason for r in results.values())
+        return SolutionStatus.NO_CONTACT, {"code": "no_contact", "text": text}
+    listed = ", ".join(touching)
+    if len(touching) == len(results):
+        return SolutionStatus.GRASP, {"code": "all_touch", "text": f"Every finger touches: {listed}."}
+    pair = _opposition(answer)
+    if pair:
+        text = f"{pair[0]} and {pair[1]} oppose each other; touching: {listed}."
+        return SolutionStatus.GRASP, {"code": "opposed", "text": text}
+    return SolutionStatus.PARTIAL, {"code": "some_touch", "text": f"Only some fingers touch: {listed}."}
+
+
+def _overlap_reason(found: LinkDepth, problem: Problem) -> dict[str, Any]:
+    link = problem.hand.links[found.link].name
+    retreat = _retreat(problem)
+    place = None if found.place is None else problem.T_world_object.apply(found.place).tolist()
+    text = (
+        f"{link} overlaps {problem.obj.name} by {found.depth * 1e3:.2f} mm before anything moves; "
+        f"moving the hand back along its palm normal by {retreat * 1e3:.2f} mm frees it."
+    )
+    return {
+        "code": "overlap", "text": text, "link": link, "depth": found.depth, "place": place, "retreat": retreat,
+    }  # fmt: skip
+
+
+def _finger_overlap(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
+    from clench.grasp.depths import hand_depths
+
+    links = c.plan.finger.links
+    depths = hand_depths(
+        problem.hand, c.plan.posture, problem.packed, problem.T_palm_object, problem.source, links=links
+    )
+    deepest = max(depths, key=lambda d: d.depth, default=None)
+    if deepest is None or deepest.depth <= 0.0:
+        link = problem.hand.links[c.overlap if c.overlap is not None else links[0]].name
+        return {"code": "overlap", "text": f"{link} overlaps {problem.obj.name}.", "link": link, "depth": 0.0}
+    return _overlap_reason(deepest, problem)
+
+
+def _retreat(problem: Problem) -> float:
+    return retreat_distance(problem.hand, problem.start, problem.packed, problem.T_palm_object, problem.source)
+
+
+def _opposition(answer: Answer) -> tuple[str, str] | None:
+    """Return a thumb and a finger whose contact normals oppose each other most, or None."""
+    best, pair = _OPPOSED, None
+    thumbs = [c for c in answer.best if c.plan.finger.is_thumb]
+    others = [c for c in answer.best if not c.plan.finger.is_thumb]
+    for thumb in thumbs:
+        for finger in others:
+            for a in thumb.holding:
+                for b in finger.holding:
+                    cosine = float(np.dot(a.normal, b.normal))
+                    if cosine < best:
+                        best, pair = cosine, (thumb.plan.finger.name, finger.plan.finger.name)
+    return pair

@@ -1,0 +1,190 @@
+"""The controller: three inputs in, one solution out."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clench.base.errors import HandError, ObjectError
+from clench.base.pose import FloatArray, Pose, invert
+from clench.grasp.calibration import weights_of
+from clench.grasp.candidates import FingerCandidate, read_candidates
+from clench.grasp.choice import choose
+from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
+from clench.grasp.criteria import Setting, score_all
+from clench.grasp.depths import hand_depths
+from clench.grasp.feasibility import judge_sets
+from clench.grasp.motion import alternatives, asked_fingers, open_posture, palm_pose
+from clench.grasp.plan import plan_finger
+from clench.grasp.scene import PackedObject, pack_object
+from clench.models.command import GraspCommand
+from clench.models.command_file import check_command
+from clench.models.hand.hand import Hand, JointRole
+from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.shapes import CollisionSource
+
+from .assembly import Answer, assemble
+from .solution import GraspSolution
+
+if TYPE_CHECKING:
+    from .record import Record
+
+_KEPT_PLANS = 64
+_plans: OrderedDict[tuple[object, ...], tuple[Hand, HandPlan]] = OrderedDict()
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Hold the three inputs, checked and brought together.
+
+    Args:
+        start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
+        T_world_palm, T_world_object: poses. packed: the object.
+    """
+
+    hand: Hand
+    obj: GraspObject
+    command: GraspCommand
+    start: FloatArray
+    source: CollisionSource
+    T_world_palm: Pose
+    T_world_object: Pose
+    packed: PackedObject
+
+    @property
+    def T_palm_object(self) -> FloatArray:
+        """Where the object is for the hand, shape (4, 4)."""
+        return invert(self.T_world_palm.matrix) @ self.T_world_object.matrix
+
+
+def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record | None = None) -> GraspSolution:
+    """Close a hand around an object and return the best set of contacts and joint angles (METHOD.md).
+
+    Args:
+        hand: see `Hand.load`. obj: see `GraspObject.load`.
+        command: where the hand is, how it is preshaped, what is asked for.
+        record: a store that the solution is appended to.
+
+    Raises:
+        ClenchError: a command that does not fit the hand, or a hand that no plane can close.
+    """
+    clock = _Clock()
+    problem = make_problem(hand, obj, command)
+    weights = weights_of(command.criteria)
+    clock.lap("read")
+    plan = plan_hand(problem)
+    clock.lap("plan")
+    closed = close_hand(plan, problem.packed, problem.T_palm_object, command.rounds)
+    clock.lap("close")
+    candidates = read_candidates(hand, plan, problem.packed, closed)
+    judged = judge_sets(hand, candidates, problem.packed, problem.T_palm_object, problem.source, command.check_sets)
+    setting = Setting(hand, problem.start)
+    scored = [replace(c, scores=score_all(c, setting)) for c in judged]
+    fingers = group_by_finger(plan, scored)
+    chosen = [choose(group, weights) for group in fingers]
+    clock.lap("choose")
+    final = combine(hand, problem.start, [group[i] for group, i in zip(fingers, chosen, strict=True)])
+    answer = judge_answer(problem, fingers, chosen, final)
+    clock.lap("judge")
+    solution = assemble(answer, problem, clock.stages())
+    if record is not None:
+        record.append(solution)
+    return solution
+
+
+def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:
+    """Check the three inputs and bring them together."""
+    check_command(hand, command)
+    if not any(body.role is BodyRole.GRASPABLE for body in obj.bodies):
+        raise ObjectError(f"{obj.name}: no body to grasp; every body is an obstacle.")
+    start = open_posture(hand, command)
+    source = CollisionSource(command.collision_source or hand.default_source)
+    T_world_object = command.object_pose if command.object_pose is not None else obj.pose
+    return Problem(hand, obj, command, start, source, palm_pose(hand, command, start), T_world_object, pack_object(obj))
+
+
+def plan_hand(problem: Problem) -> HandPlan:
+    """Return the plan of a hand at a posture; the same posture is planned once.
+
+    Raises:
+        HandError: no finger asked for has a closing joint.
+    """
+    hand, command = problem.hand, problem.command
+    key = (
+        id(hand),
+        problem.start.tobytes(),
+        command.fingers,
+        command.planes,
+        command.full_width,
+        tuple(command.yaw_grid),
+        tuple(command.open_variants),
+        problem.source,
+    )
+    kept = _plans.get(key)
+    if kept is not None and kept[0] is hand:
+        return kept[1]
+    plans, finger, posture = [], [], []
+    for f, asked in enumerate(asked_fingers(hand, command)):
+        if any(hand.joints[j].role is JointRole.CLOSING for j in asked.joints):
+            for p, q in enumerate(alternatives(hand, asked, problem.start, command)):
+                plans.append(plan_finger(hand, asked, q, command.planes, problem.source))
+                finger.append(f)
+                posture.append(p)
+    if not plans:
+        raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
+    plan = make_hand_plan(plans, finger, posture, command.full_width)
+    _plans[key] = (hand, plan)
+    while len(_plans) > _KEPT_PLANS:
+        _plans.popitem(last=False)
+    return plan
+
+
+def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> list[list[FingerCandidate]]:
+    """Return the candidates of each finger that closes, in the command's order."""
+    groups: dict[int, list[FingerCandidate]] = {}
+    for entry, candidate in zip(plan.items.entry, candidates, strict=True):
+        groups.setdefault(plan.finger[int(entry)], []).append(candidate)
+    return list(groups.values())
+
+
+def combine(hand: Hand, start: FloatArray, chosen: list[FingerCandidate]) -> FloatArray:
+    """Return the posture of the whole hand with every finger at its chosen set, shape (J,) [rad]."""
+    q = start.copy()
+    for candidate in chosen:
+        own = list(candidate.plan.finger.joints)
+        q[own] = candidate.q[own]
+    return hand.coupled(q)
+
+
+def judge_answer(
+    problem: Problem, fingers: list[list[FingerCandidate]], chosen: list[int], final: FloatArray
+) -> Answer:
+    """Measure what overlaps at the start and at the end, over the whole width."""
+    hand = problem.hand
+    at_start = hand_depths(
+        hand, problem.start, problem.packed, problem.T_palm_object, problem.source, links=hand.fixed_links
+    )
+    at_end = hand_depths(hand, final, problem.packed, problem.T_palm_object, problem.source)
+    return Answer(fingers, chosen, final, at_start, at_end)
+
+
+class _Clock:
+    """Time the stages of a solve [s]."""
+
+    def __init__(self) -> None:
+        self._last = time.perf_counter()
+        self._stages: dict[str, float] = {}
+
+    def lap(self, stage: str) -> None:
+        """Note the time since the last lap under a name."""
+        now = time.perf_counter()
+        self._stages[stage] = now - self._last
+        self._last = now
+
+    def stages(self) -> dict[str, float]:
+        """Return the stages, with their total."""
+        return {**self._stages, "total": float(np.sum(list(self._stages.values())))}

@@ -1,0 +1,135 @@
+"""Approach poses are free, near, tilted as promised, and the same for a seed."""
+
+import numpy as np
+import pytest
+from block_hands import block_hand
+
+from clench.base.errors import CommandError, ObjectError, UnknownNameError
+from clench.base.pose import Pose
+from clench.grasp.approach import BACK_OFF, MAX_TILT, approach_poses
+from clench.grasp.depths import hand_depths, travel_to_touch
+from clench.grasp.scene import pack_object
+from clench.models.hand.hand import Hand
+from clench.models.mesh import TriangleMesh
+from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.shapes import Shape, ShapeKind
+
+BALL = GraspObject("ball", (Body("ball", (Shape(ShapeKind.SPHERE, (0.03, 0.0, 0.0)),)),), pose=Pose([0.4, 0.5, 0.6]))
+TABLE = Body("table", (Shape(ShapeKind.BOX, (1.0, 1.0, 0.1), Pose([0.0, 0.0, -0.13])),), role=BodyRole.OBSTACLE)
+
+
+def travels(hand, obj, poses, q=None):
+    packed, q = pack_object(obj), hand.open_angles() if q is None else q
+    for pose in poses:
+        T_palm_object = (pose.inverse() @ obj.pose).matrix
+        assert all(depth.place is None for depth in hand_depths(hand, q, packed, T_palm_object))
+        yield travel_to_touch(hand, q, packed, T_palm_object, hand.palm_normal)
+
+
+def test_poses_are_free_and_backed_off():
+    hand = block_hand()
+    back = np.array(list(travels(hand, BALL, approach_poses(hand, BALL, 200, 1))))
+    assert back.min() >= BACK_OFF[0] - 1e-9
+    assert back.max() <= BACK_OFF[1] + 1e-9
+    # Uniform between them: the mean of 200 is within four standard errors.
+    assert back.mean() == pytest.approx(np.mean(BACK_OFF), abs=4 * np.ptp(BACK_OFF) / np.sqrt(12 * 200))
+
+
+def test_the_normal_points_into_the_surface_tilted_by_up_to_30_degrees():
+    hand = block_hand()
+    poses = approach_poses(hand, BALL, 300, 2)
+    tilts = []
+    for pose in poses:
+        start, normal = pose.position - BALL.pose.position, pose.rotation[:, 2]
+        along = start @ normal
+        # The line of the palm's centre meets the ball where it was drawn, or at its far side.
+        root = np.sqrt(max(0.03**2 - (start @ start - along**2), 0.0))
+        tilts.append(np.arccos(np.clip(-(start + (-along - root) * normal) @ normal / 0.03, -1.0, 1.0)))
+    assert max(tilts) <= MAX_TILT + 0.05
+    assert max(tilts) > 0.9 * MAX_TILT
+    # Uniform over the cap: the cosine is uniform.
+    assert np.cos(tilts).mean() == pytest.approx((1.0 + np.cos(MAX_TILT)) / 2.0, abs=0.01)
+    assert np.linalg.norm(np.mean([p.rotation[:, 2] for p in poses], axis=0)) < 0.2
+
+
+def test_the_same_seed_gives_the_same_poses_and_count_does_not_matter():
+    hand = block_hand()
+    six = approach_poses(hand, BALL, 6, 3)
+    assert approach_poses(hand, BALL, 6, 3) == six
+    assert approach_poses(hand, BALL, 2, 3) == six[:2]
+    assert approach_poses(hand, BALL, 0, 3) == []
+    assert not set(approach_poses(hand, BALL, 6, 4)) & set(six)
+
+
+def test_the_poses_move_with_the_object():
+    hand, move = block_hand(), Pose([1.0, -2.0, 0.5], [0.5, -0.5, 0.5, 0.5])
+    here = approach_poses(hand, BALL, 4, 5)
+    there = approach_poses(hand, BALL.posed(move @ BALL.pose), 4, 5)
+    for one, other in zip(here, there, strict=True):
+        np.testing.assert_allclose((move @ one).matrix, other.matrix, atol=1e-12)
+
+
+def test_obstacles_stop_the_hand_but_are_not_approached():
+    hand, obj = block_hand(), BALL.with_body(TABLE)
+    poses = approach_poses(hand, obj, 60, 6)
+    assert min(travels(hand, obj, poses)) >= BACK_OFF[0] - 1e-9
+    # Some came from below or beside and were stopped by the table: 40 mm off the ball and more.
+    far = [np.linalg.norm(p.position - BALL.pose.position) > 0.1 for p in poses]
+    assert 5 < sum(far) < 55
+    assert not any(np.linalg.norm(p.position - BALL.pose.position) > 0.1 for p in approach_poses(hand, BALL, 60, 6))
+    aims = [np.linalg.norm(np.cross(BALL.pose.position - p.position, p.rotation[:, 2])) for p in poses]
+    # The line of the palm's centre meets the ball, wherever the table stopped the hand.
+    assert max(aims) <= 0.03 + 1e-9
+
+
+def test_a_preshape_changes_what_touches_first():
+    hand = block_hand()
+    block = GraspObject("block", (Body("block", (Shape(ShapeKind.BOX, (0.2, 0.2, 0.2)),)),))
+    flat, straight = approach_poses(hand, block, 20, 7, preshape={"bend": 1.5}), approach_poses(hand, block, 20, 7)
+    # The same draws; only the first touch differs, and a finger out of the way lets the palm come no less near.
+    gained = [(one.position - other.position) @ one.rotation[:, 2] for one, other in zip(flat, straight, strict=True)]
+    assert max(gained) > 0.02
+    assert min(travels(hand, block, flat, np.array([1.5]))) >= BACK_OFF[0] - 1e-9
+
+
+def test_bad_input_is_named():
+    hand = block_hand()
+    with pytest.raises(UnknownNameError, match=r"'bent' is not in hand 'block'\. Did you mean 'bend'"):
+        approach_poses(hand, BALL, 1, 0, preshape={"bent": 0.0})
+    with pytest.raises(CommandError, match=r"preshape\.bend: expected a finite angle"):
+        approach_poses(hand, BALL, 1, 0, preshape={"bend": np.nan})
+    with pytest.raises(CommandError, match="count and a seed of 0 or more, got -1 and 0"):
+        approach_poses(hand, BALL, -1, 0)
+    needle = Shape(ShapeKind.MESH, mesh=TriangleMesh([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]], [[0, 1, 2]]))
+    with pytest.raises(ObjectError, match="object 'needle': expected a graspable body with a surface"):
+        approach_poses(hand, GraspObject("needle", (Body("needle", (needle,)),)), 1, 0)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("model", ["shadow_hand_mjcf/right_hand.xml", "leap_hand_urdf/leap_hand_right.urdf"])
+def test_real_hands_are_free_of_a_real_object_by_an_independent_engine(shared_data, model):
+    import fcl
+
+    from clench.grasp.depths import link_meshes
+
+    hand = Hand.load(shared_data / "hands" / model)
+    obj = GraspObject.load(shared_data / "objects" / "ycb_mug" / "textured.obj")
+    tree = pack_object(obj).full_tree
+
+    def volumes(tree):
+        model = fcl.BVHModel()
+        model.beginModel(len(tree.vertices), len(tree.triangles))
+        model.addSubModel(tree.vertices, tree.triangles)
+        model.endModel()
+        return model
+
+    mug = fcl.CollisionObject(volumes(tree), fcl.Transform())
+    links = [(mesh.link, volumes(mesh.tree)) for mesh in link_meshes(hand)]
+    poses = hand.link_poses(hand.open_angles())
+    for pose in approach_poses(hand, obj, 5, 8):
+        gaps = []
+        for link, volume in links:
+            T = pose.matrix @ poses[link]
+            placed = fcl.CollisionObject(volume, fcl.Transform(T[:3, :3], T[:3, 3]))
+            gaps.append(fcl.distance(placed, mug, fcl.DistanceRequest(), fcl.DistanceResult()))
+        assert 0.0 < min(gaps) <= BACK_OFF[1] + 1e-9

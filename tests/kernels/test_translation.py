@@ -1,0 +1,152 @@
+"""The first contact of a translation: by hand for each kind of event, by conservative advancement for any mesh."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernel_solids import bounding_volumes, box, gap, hull, moved, star, torus
+from scipy.spatial.transform import Rotation
+
+from clench.kernels.translation import PAIRS, first_contact
+from clench.kernels.tree import build_tree, feature_owners
+from clench.models.mesh import TriangleMesh
+
+
+def travel(moving, rest, T, direction, limit=np.inf):
+    one, two = build_tree(moving.vertices, moving.triangles), build_tree(rest.vertices, rest.triangles)
+    return first_contact(
+        one,
+        feature_owners(one),
+        np.ascontiguousarray(T[:3]),
+        two,
+        feature_owners(two),
+        np.array(direction, dtype=float),
+        limit,
+        np.empty((PAIRS, 2), dtype=np.int32),
+    )
+
+
+def pose(x=0.0, y=0.0, z=0.0, rotation=None):
+    T = np.eye(4)
+    T[:3, 3] = x, y, z
+    if rotation is not None:
+        T[:3, :3] = rotation.as_matrix()
+    return T
+
+
+CORNER_DOWN = Rotation.align_vectors([[0, 0, -1]], [[1, 1, 1]])[0]
+RIDGE_X = Rotation.from_euler("x", 45, degrees=True)
+RIDGE_Y = Rotation.from_euler("y", 45, degrees=True)
+
+
+@pytest.mark.parametrize(
+    ("moving", "rest", "expected"),
+    [
+        (None, None, 9.0),
+        (CORNER_DOWN, None, 9.5 - np.sqrt(3.0) / 2.0),
+        (None, CORNER_DOWN.inv() * Rotation.from_euler("x", 180, degrees=True), None),
+        (RIDGE_X, RIDGE_Y, 10.0 - np.sqrt(2.0)),
+        (RIDGE_X, RIDGE_X, 10.0 - np.sqrt(2.0)),
+        (RIDGE_X, None, 9.5 - np.sqrt(0.5)),
+    ],
+    ids=["face-face", "vertex-face", "face-vertex", "edge-edge", "parallel edges", "edge-face"],
+)
+def test_unit_boxes_falling(moving, rest, expected):
+    below = box(1, 1, 1)
+    if rest is not None:
+        below = moved(below, pose(rotation=rest))
+    if expected is None:
+        expected = 9.5 - below.vertices[:, 2].max()
+    distance, _, _ = travel(box(1, 1, 1), below, pose(z=10.0, rotation=moving), [0, 0, -1])
+    assert distance == pytest.approx(expected, abs=1e-14)
+
+
+def test_vertex_on_vertex():
+    up = moved(box(1, 1, 1), pose(rotation=Rotation.align_vectors([[0, 0, 1]], [[1, 1, 1]])[0]))
+    distance, _, _ = travel(box(1, 1, 1), up, pose(z=10.0, rotation=CORNER_DOWN), [0, 0, -1])
+    assert distance == pytest.approx(10.0 - np.sqrt(3.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.25, 0.999999])
+def test_needle_and_blade_are_not_missed(aside):
+    needle, blade = box(1e-6, 1e-6, 1.0), box(2.0, 1e-6, 1.0)
+    assert travel(needle, blade, pose(x=aside, z=5.0), [0, 0, -1])[0] == pytest.approx(4.0, abs=1e-12)
+    assert travel(blade, needle, pose(x=-aside, z=5.0), [0, 0, -1])[0] == pytest.approx(4.0, abs=1e-12)
+
+
+def test_passing_by_through_a_hole_and_away():
+    ring = torus(1.0, 0.3)
+    assert travel(box(0.5, 0.5, 0.5), ring, pose(z=5.0), [0, 0, -1]) == (np.inf, -1, -1)
+    assert travel(box(0.5, 0.5, 0.5), ring, pose(x=1.0, z=5.0), [0, 0, 1]) == (np.inf, -1, -1)
+    assert travel(box(0.5, 0.5, 0.5), ring, pose(x=1.0, z=5.0), [0, 0, -1])[0] < 5.0
+    nothing = TriangleMesh(np.empty((0, 3)), np.empty((0, 3)))
+    assert travel(nothing, ring, pose(z=5.0), [0, 0, -1]) == (np.inf, -1, -1)
+
+
+def test_limit_cuts_off_later_contacts_only():
+    assert travel(box(1, 1, 1), box(1, 1, 1), pose(z=10.0), [0, 0, -1], 8.9) == (np.inf, -1, -1)
+    assert travel(box(1, 1, 1), box(1, 1, 1), pose(z=10.0), [0, 0, -1], 9.1)[0] == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_touching_at_the_start_is_no_travel(scale):
+    assert travel(box(scale, scale, scale), box(scale, scale, scale), pose(z=scale), [0, 0, -1])[0] == 0.0
+    # The same, with a rounding error of one unit in the last place.
+    just_in = pose(z=np.nextafter(scale, 0.0))
+    assert travel(box(scale, scale, scale), box(scale, scale, scale), just_in, [0, 0, -1])[0] == 0.0
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.integers(0, 2**31), st.sampled_from(["hull", "star", "torus"]), st.floats(0.0, 1.8))
+def test_gap_is_closed_there_and_open_before(seed, kind, aside):
+    rest = torus(1.0, 0.4) if kind == "torus" else {"hull": hull, "star": star}[kind](seed, 1.0)
+    moving = star(seed + 1, 0.5)
+    frame = Rotation.random(random_state=seed).as_matrix()
+    direction = frame[0]
+    start = pose(*(aside * frame[1] - 6.0 * direction), rotation=Rotation.random(random_state=seed + 1))
+    distance, one, two = travel(moving, rest, start, direction)
+    volumes = bounding_volumes(moving), bounding_volumes(rest)
+
+    def gap_after(way):
+        T = start.copy()
+        T[:3, 3] += way * direction
+        return gap(volumes[0], T, volumes[1], np.eye(4))
+
+    # Conservative advancement: the gap shrinks no faster than the way grows.
+    way, gap_now = 0.0, gap_after(0.0)
+    while gap_now > 1e-9 and way < 12.0:
+        way += gap_now
+        gap_now = gap_after(way)
+    if way >= 12.0:
+        assert distance == np.inf
+        return
+    assert way <= distance + 1e-9
+    if np.isfinite(distance):
+        assert one >= 0
+        assert two >= 0
+        assert gap_after(distance) <= 1e-9
+        # Where the motion grazes, the gap stays below 1e-9 for some way before it closes.
+        assert all(gap_after(w) <= 1e-9 for w in np.linspace(way, distance, 5))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3])
+def test_distance_scales(scale):
+    expected = travel(star(4, 0.5), torus(1.0, 0.4), pose(x=0.7, z=5.0), [0, 0, -1])
+    scaled = travel(
+        moved(star(4, 0.5), np.eye(4), scale),
+        moved(torus(1.0, 0.4), np.eye(4), scale),
+        pose(x=0.7 * scale, z=5.0 * scale),
+        [0, 0, -1],
+    )
+    assert scaled[0] == pytest.approx(expected[0] * scale, rel=1e-13)
+    assert scaled[1:] == expected[1:]
+
+
+def test_distance_does_not_depend_on_the_frame_or_on_the_vertices_shared():
+    one, two = star(4, 0.5), star(5, 1.0)
+    G = pose(3.0, -2.0, 1.0, Rotation.random(random_state=8))
+    expected, _, _ = travel(one, two, pose(z=5.0), [0, 0, -1])
+    turned, _, _ = travel(one, moved(two, G), G @ pose(z=5.0), -G[:3, 2])
+    assert turned == pytest.approx(expected, abs=1e-13)
+    soup = TriangleMesh(one.vertices[one.triangles], np.arange(one.triangles.size))
+    assert travel(soup, two, pose(z=5.0), [0, 0, -1])[0] == expected
