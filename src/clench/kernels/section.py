@@ -145,6 +145,8 @@ def _misses(
     y = y_row[0] * cx + y_row[1] * cy + y_row[2] * cz + y_row[3]
     if abs(y) > abs(y_row[0]) * hx + abs(y_row[1]) * hy + abs(y_row[2]) * hz + slack:
         return True
+    if reach == np.inf:
+        return False
     x = abs(x_row[0] * cx + x_row[1] * cy + x_row[2] * cz + x_row[3])
     z = abs(z_row[0] * cx + z_row[1] * cy + z_row[2] * cz + z_row[3])
     x = max(x - abs(x_row[0]) * hx - abs(x_row[1]) * hy - abs(x_row[2]) * hz - slack, 0.0)
@@ -160,14 +162,22 @@ def _segment(
     da, db, dc = _map(y_row, a), _map(y_row, b), _map(y_row, c)
     if (da > on and db > on and dc > on) or (da < -on and db < -on and dc < -on):
         return 0, 0.0, 0.0, 0.0, 0.0
+    p = (_map(x_row, a), _map(z_row, a))
+    q = (_map(x_row, b), _map(z_row, b))
+    r = (_map(x_row, c), _map(z_row, c))
+    if abs(da) > on and abs(db) > on and abs(dc) > on:
+        # No vertex on the plane, the common case: two edges cross, those of the vertex that is alone on its side.
+        if (da > 0.0) == (db > 0.0):
+            p, r, da, dc = r, p, dc, da
+        elif (da > 0.0) == (dc > 0.0):
+            p, q, da, db = q, p, db, da
+        u, v = _crossing(p, q, abs(da), abs(db)), _crossing(p, r, abs(da), abs(dc))
+        return 2, u[0], u[1], v[0], v[1]
     da = 0.0 if abs(da) <= on else da
     db = 0.0 if abs(db) <= on else db
     dc = 0.0 if abs(dc) <= on else dc
     if da == 0.0 and db == 0.0 and dc == 0.0:
         return 0, 0.0, 0.0, 0.0, 0.0
-    p = (_map(x_row, a), _map(z_row, a))
-    q = (_map(x_row, b), _map(z_row, b))
-    r = (_map(x_row, c), _map(z_row, c))
     # Each vertex on the plane and each edge with an end on either side gives one end point.
     ends, u, v = 0, p, p
     if da == 0.0:
@@ -205,12 +215,15 @@ def _add(ends: int, u: Flat, v: Flat, point: Flat) -> tuple[int, Flat, Flat]:
 @kernel
 def _crossing(p: Flat, q: Flat, dp: float, dq: float) -> Flat:
     """Return the point between p and q at distances dp and dq from the plane: the same bits with both exchanged."""
-    return (p[0] * dq + q[0] * dp) / (dp + dq), (p[1] * dq + q[1] * dp) / (dp + dq)
+    share = 1.0 / (dp + dq)
+    return (p[0] * dq + q[0] * dp) * share, (p[1] * dq + q[1] * dp) * share
 
 
 @kernel
 def _within(ax: float, az: float, bx: float, bz: float, reach: float) -> bool:
     """Say whether a segment comes as near to the origin as `reach`."""
+    if ax * ax + az * az <= reach * reach:
+        return True
     ux, uz = bx - ax, bz - az
     squared = ux * ux + uz * uz
     s = 0.0
@@ -231,6 +244,5 @@ def _normal(ax: float, az: float, bx: float, bz: float, fx: float, fz: float, sh
     if length <= short or side == 0.0:
         length = np.sqrt(fx * fx + fz * fz)
         return fx / length, fz / length
-    if side < 0.0:
-        length = -length
-    return nx / length, nz / length
+    share = 1.0 / length if side > 0.0 else -1.0 / length
+    return nx * share, nz * share
