@@ -144,6 +144,7 @@ def turn_outline(
 ) -> float:
     """Return the first contact of an outline behind one active joint with a plane's section, before `best`."""
     segments, disks = sections.segments, sections.disks
+    vertex, side, pair = work.vertex, work.side, work.best
     cx, cz, reach = work.disk[outline.index, 0], work.disk[outline.index, 1], work.disk[outline.index, 2] + touch
     d = math.sqrt(cx * cx + cz * cz)
     before, ex, ez, wide = -1.0, 0.0, 0.0, False
@@ -157,12 +158,12 @@ def turn_outline(
         half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
         if not misses(cx, cz, d, ex, ez, wide, 0.5 * (ax + bx), 0.5 * (az + bz), reach + half):
             nx, nz = segments[row, i, 4], segments[row, i, 5] * mirror
-            best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, work)
+            best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, vertex, side, pair)
             if best == 0.0:
                 return best
     for i in range(sections.counts[row, 1]):
         qx, qz = disks[row, i, 0] - px, (disks[row, i, 1] - pz) * mirror
-        best = turn_disk(outline, i, qx, qz, disks[row, i, 2], touch, rate, best, work)
+        best = turn_disk(outline, i, qx, qz, disks[row, i, 2], touch, rate, best, vertex, side, pair)
     return best
 
 
@@ -182,16 +183,27 @@ def sweep_outline(
 ) -> float:
     """Return the first contact of an outline behind several active joints with a plane's section, before `best`."""
     segments, disks = sections.segments, sections.disks
+    vertex, side, chain, terms, pair = work.vertex, work.side, work.chain, work.terms, work.best
+    # The outline's enclosing circle, relative to the first pivot, and how far it gets.
+    x, z = work.disk[outline.index, 0], work.disk[outline.index, 1]
+    for k in range(count - 1):
+        x += chain[k, 1]
+        z += chain[k, 2]
+    reach = work.disk[outline.index, 2] + touch + speed * best
     for i in range(sections.counts[row, 0]):
         ax, az = segments[row, i, 0] - px, segments[row, i, 1] - pz
         bx, bz = segments[row, i, 2] - px, segments[row, i, 3] - pz
-        nx, nz = segments[row, i, 4], segments[row, i, 5]
-        best = sweep_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, count, speed, best, work)
-        if best == 0.0:
-            return best
+        near = reach + 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+        if (0.5 * (ax + bx) - x) ** 2 + (0.5 * (az + bz) - z) ** 2 <= near * near:
+            nx, nz = segments[row, i, 4], segments[row, i, 5]
+            best = sweep_segment(
+                outline, i, ax, az, bx, bz, nx, nz, closed, touch, count, best, vertex, side, chain, terms, pair
+            )
+            if best == 0.0:
+                return best
     for i in range(sections.counts[row, 1]):
         qx, qz = disks[row, i, 0] - px, disks[row, i, 1] - pz
-        best = sweep_disk(outline, i, qx, qz, disks[row, i, 2], touch, count, best, work)
+        best = sweep_disk(outline, i, qx, qz, disks[row, i, 2], touch, count, best, vertex, side, chain, terms, pair)
     return best
 
 
@@ -265,7 +277,9 @@ def sweep_ellipses(
         work.ellipse[0] -= px
         work.ellipse[1] = (work.ellipse[1] - pz) * mirror
         work.ellipse[3] *= mirror
-        best = sweep_region(outline, i, work.ellipse, touch, count, best, work)
+        best = sweep_region(
+            outline, i, work.ellipse, touch, count, best, work.vertex, work.side, work.chain, work.terms, work.best
+        )
     return best
 
 

@@ -13,7 +13,7 @@ from clench.base.tolerances import FOOT_FRACTION
 from .compiling import kernel
 from .coupled import STEPS, bounds, evaluate, line_on_point, place, safe_step
 from .coupled_pairs import side_foot
-from .layout import KIND_SIDE, Floats, Outline, Work
+from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning_pairs import note
 
 
@@ -71,10 +71,11 @@ def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, fl
 
 
 @kernel
-def sweep_vertex_region(work: Work, count: int, v: int, w: float, e: Floats, touch: float, best: float) -> float:
+def sweep_vertex_region(
+    chain: Floats, count: int, vx: float, vz: float, w: float, e: Floats, touch: float, best: float
+) -> float:
     """Return the first `s` before `best` at which a moving vertex comes within `w` of a region."""
-    chain = work.chain
-    chain[count - 1, 1], chain[count - 1, 2] = work.vertex[v, 0], work.vertex[v, 1]
+    chain[count - 1, 1], chain[count - 1, 2] = vx, vz
     speed, bound = 0.0, 0.0
     for i in range(count):
         size = math.hypot(chain[i, 1], chain[i, 2])
@@ -115,22 +116,29 @@ def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
 
 @kernel
 def sweep_side_region(
-    work: Work, count: int, side: int, flip: float, w: float, e: Floats, touch: float, best: float
+    chain: Floats,
+    terms: Floats,
+    count: int,
+    nx: float,
+    nz: float,
+    g: float,
+    ta: float,
+    tb: float,
+    w: float,
+    e: Floats,
+    touch: float,
+    best: float,
 ) -> float:
     """Return the first `s` before `best` at which a moving side meets the curved part of a region."""
-    nx, nz, g = work.side[side, 0] * flip, work.side[side, 1] * flip, work.side[side, 2] * flip
-    ta, tb = work.side[side, 3], work.side[side, 4]
-    if flip < 0.0:
-        ta, tb = -tb, -ta
-    n, constant = line_on_point(work.chain, count, nx, nz, g, e[0], e[1], w, work.terms)
-    _, bound = bounds(work.terms, n)
-    rate = work.chain[count - 1, 0]
+    n, constant = line_on_point(chain, count, nx, nz, g, e[0], e[1], w, terms)
+    _, bound = bounds(terms, n)
+    rate = chain[count - 1, 0]
     bound += rate * rate * e[4] * e[4] / e[5]
     settled, least = 1e-3 * touch, math.sqrt(2e-3 * touch / bound)
     slack = FOOT_FRACTION * (tb - ta)
     s, sign = 0.0, 0.0
     for _ in range(STEPS):
-        value, slope, _ = evaluate(work.terms, n, constant, s)
+        value, slope, _ = evaluate(terms, n, constant, s)
         c, d = math.cos(rate * s), math.sin(rate * s)
         mx, mz = c * nx - d * nz, d * nx + c * nz
         size, change, t = support(e, mx, mz)
@@ -144,7 +152,7 @@ def sweep_side_region(
             if sign > 0.0 and e[6] - slack <= -t <= e[7] + slack:
                 y = -(e[5] * e[5]) * (-mx * e[3] + mz * e[2]) / size
                 qx, qz = e[0] - t * e[2] - y * e[3], e[1] - t * e[3] + y * e[2]
-                if ta - slack <= side_foot(work, count, nx, nz, qx, qz, s) <= tb + slack:
+                if ta - slack <= side_foot(chain, count, nx, nz, qx, qz, s) <= tb + slack:
                     return s
             sign = -sign
             value, slope = -value, -slope
@@ -155,22 +163,35 @@ def sweep_side_region(
 
 
 @kernel
-def sweep_region(outline: Outline, i: int, e: Floats, touch: float, count: int, best: float, work: Work) -> float:
+def sweep_region(
+    outline: Outline,
+    i: int,
+    e: Floats,
+    touch: float,
+    count: int,
+    best: float,
+    vertex: Floats,
+    side: Floats,
+    chain: Floats,
+    terms: Floats,
+    pair: Ints,
+) -> float:
     """Return the first contact of a moving outline with a region before `best`; all relative to the first pivot."""
     w = outline.radius
     for v in range(outline.v0, outline.v1):
-        found = sweep_vertex_region(work, count, v, w, e, touch, best)
+        found = sweep_vertex_region(chain, count, vertex[v, 0], vertex[v, 1], w, e, touch, best)
         if found < best:
             best = found
-            note(work.best, outline.tip, outline.index, v, i, 0, 2)
-    for side in range(outline.s0, outline.s1):
-        found = sweep_side_region(work, count, side, 1.0, w, e, touch, best)
+            note(pair, outline.tip, outline.index, v, i, 0, 2)
+    for k in range(outline.s0, outline.s1):
+        nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
+        found = sweep_side_region(chain, terms, count, nx, nz, g, ta, tb, w, e, touch, best)
         if found < best:
             best = found
-            note(work.best, KIND_SIDE, outline.index, side, i, 0, 2)
+            note(pair, KIND_SIDE, outline.index, k, i, 0, 2)
         if outline.both:
-            found = sweep_side_region(work, count, side, -1.0, w, e, touch, best)
+            found = sweep_side_region(chain, terms, count, -nx, -nz, -g, -tb, -ta, w, e, touch, best)
             if found < best:
                 best = found
-                note(work.best, KIND_SIDE, outline.index, side, i, 2, 2)
+                note(pair, KIND_SIDE, outline.index, k, i, 2, 2)
     return best

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from .compiling import kernel
-from .layout import KIND_SIDE, Ints, Outline, Work
+from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
 
 
 @kernel
-def note(best: Ints, kind: int, outline: int, feature: int, source: int, which: int, disk: int) -> None:
+def note(pair: Ints, kind: int, outline: int, feature: int, source: int, which: int, disk: int) -> None:
     """Write the winning pair."""
-    best[0], best[1], best[2], best[3], best[4], best[5] = kind, outline, feature, source, which, disk
+    pair[0], pair[1], pair[2], pair[3], pair[4], pair[5] = kind, outline, feature, source, which, disk
 
 
 @kernel
@@ -29,11 +29,14 @@ def turn_segment(
     touch: float,
     rate: float,
     best: float,
-    work: Work,
+    vertex: Floats,
+    side: Floats,
+    pair: Ints,
 ) -> float:
     """Return the first contact of a turning outline with segment `i`, in units of travel, before `best`.
 
-    The segment is relative to the pivot; `work` holds the outline about the pivot. When the object is not closed,
+    The segment is relative to the pivot; `vertex` and `side` hold the outline about the pivot, `pair` gets the winner.
+    When the object is not closed,
     both sides of the segment count.
     """
     w = outline.radius
@@ -45,27 +48,27 @@ def turn_segment(
     turn = limit
     ra, rb = math.sqrt(ax * ax + az * az), math.sqrt(bx * bx + bz * bz)
     for v in range(outline.v0, outline.v1):
-        vx, vz, rho = work.vertex[v, 0], work.vertex[v, 1], work.vertex[v, 2]
+        vx, vz, rho = vertex[v, 0], vertex[v, 1], vertex[v, 2]
         found = disk_on_segment(vx, vz, w, nx, nz, h, ta, tb, touch, turn)
         if found < turn:
             turn = found
-            note(work.best, outline.tip, outline.index, v, i, 0, 0)
+            note(pair, outline.tip, outline.index, v, i, 0, 0)
         if not closed:
             found = disk_on_segment(vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, turn)
             if found < turn:
                 turn = found
-                note(work.best, outline.tip, outline.index, v, i, 1, 0)
+                note(pair, outline.tip, outline.index, v, i, 1, 0)
         if w > 0.0:
             found = disk_on_vertex(vx, vz, rho, ax, az, ra, w, touch, turn)
             if found < turn:
                 turn = found
-                note(work.best, outline.tip, outline.index, v, i, 2, 0)
+                note(pair, outline.tip, outline.index, v, i, 2, 0)
             found = disk_on_vertex(vx, vz, rho, bx, bz, rb, w, touch, turn)
             if found < turn:
                 turn = found
-                note(work.best, outline.tip, outline.index, v, i, 3, 0)
-    found = turn_sides(outline, i, 0, ax, az, 0.0, 0, touch, turn, work)
-    turn = turn_sides(outline, i, 1, bx, bz, 0.0, 0, touch, found, work)
+                note(pair, outline.tip, outline.index, v, i, 3, 0)
+    found = turn_sides(outline, i, 0, ax, az, 0.0, 0, touch, turn, side, pair)
+    turn = turn_sides(outline, i, 1, bx, bz, 0.0, 0, touch, found, side, pair)
     return turn / rate if turn < limit else best
 
 
@@ -80,22 +83,23 @@ def turn_sides(
     disk: int,
     touch: float,
     turn: float,
-    work: Work,
+    side: Floats,
+    pair: Ints,
 ) -> float:
     """Return the first turn at which a side of the outline meets an object vertex of some radius."""
     w = outline.radius + radius
     for s in range(outline.s0, outline.s1):
-        nx, nz, g = work.side[s, 0], work.side[s, 1], work.side[s, 2]
-        ta, tb = work.side[s, 3], work.side[s, 4]
+        nx, nz, g = side[s, 0], side[s, 1], side[s, 2]
+        ta, tb = side[s, 3], side[s, 4]
         found = side_on_vertex(nx, nz, g, ta, tb, qx, qz, w, touch, turn)
         if found < turn:
             turn = found
-            note(work.best, KIND_SIDE, outline.index, s, i, end, disk)
+            note(pair, KIND_SIDE, outline.index, s, i, end, disk)
         if outline.both:
             found = side_on_vertex(-nx, -nz, -g, -tb, -ta, qx, qz, w, touch, turn)
             if found < turn:
                 turn = found
-                note(work.best, KIND_SIDE, outline.index, s, i, end + 2, disk)
+                note(pair, KIND_SIDE, outline.index, s, i, end + 2, disk)
     return turn
 
 
@@ -109,7 +113,9 @@ def turn_disk(
     touch: float,
     rate: float,
     best: float,
-    work: Work,
+    vertex: Floats,
+    side: Floats,
+    pair: Ints,
 ) -> float:
     """Return the first contact of a turning outline with a disk of the object, in units of travel, before `best`."""
     w = outline.radius
@@ -117,10 +123,10 @@ def turn_disk(
     turn = limit
     r = math.sqrt(qx * qx + qz * qz)
     for v in range(outline.v0, outline.v1):
-        vx, vz, rho = work.vertex[v, 0], work.vertex[v, 1], work.vertex[v, 2]
+        vx, vz, rho = vertex[v, 0], vertex[v, 1], vertex[v, 2]
         found = disk_on_vertex(vx, vz, rho, qx, qz, r, w + radius, touch, turn)
         if found < turn:
             turn = found
-            note(work.best, outline.tip, outline.index, v, i, 0, 1)
-    turn = turn_sides(outline, i, 0, qx, qz, radius, 1, touch, turn, work)
+            note(pair, outline.tip, outline.index, v, i, 0, 1)
+    turn = turn_sides(outline, i, 0, qx, qz, radius, 1, touch, turn, side, pair)
     return turn / rate if turn < limit else best

@@ -31,6 +31,7 @@ def draw_solution(
         FileError: a file cannot be written.
     """
     from .curl_plane import draw_finger
+    from .hand_view import draw_hand
     from .plane_scene import FingerScenes
     from .set_grid import draw_sets
 
@@ -43,4 +44,5 @@ def draw_solution(
         scenes = FingerScenes(hand, obj, command, solution, name, result.candidates[result.chosen])
         files.append(draw_finger(scenes, result, hand.name, obj.name, folder / f"{stem}_plane.png"))
         files.append(draw_sets(hand, obj, command, solution, result, folder / f"{stem}_sets.png"))
+    files.append(draw_hand(hand, obj, solution, folder / "grasp.png"))
     return files

@@ -34,7 +34,7 @@ def draw_finger(scenes: FingerScenes, result: FingerResult, hand: str, obj: str,
     for axes, scene in zip(panels, shown, strict=True):
         draw_plane(axes, scene)
         frame_plane(axes, low, high)
-        axes.set_title(plane_title(scene, len(scenes.plan.families)), fontsize=11, loc="left", color=style.INK)
+        axes.set_title(plane_title(scene, len(scenes.plan.families)), fontsize=11, loc="left", color=style.INK, y=1.0)
         axes.set_xlabel("x, in the plane [mm]", fontsize=9)
     panels[0].set_ylabel("z, the way the finger closes [mm]", fontsize=9)
     width = figure.get_figwidth() * style.DPI

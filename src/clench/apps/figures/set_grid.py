@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os.path
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -66,7 +67,8 @@ def draw_sets(
     for i, text in enumerate(_explanation(made[0], scenes[0], result, chosen)):
         y = 1.0 - (40 + 18 * i) / height
         style.write(figure, _GAP / width, y, text, fontsize=10, va="top", color=style.INK if i == 0 else style.CHOSEN)
-    note = "●  touches the object on the plane that is drawn      ○  touches on another plane of this finger"
+    note = "●  touches on the plane that is drawn     ○  touches on another plane of this finger     "
+    note += "thin line: joints, also where the plane misses a link"
     style.write(figure, _GAP / width, 16 / height, note, fontsize=9.5, color=style.CONTACT)
     return style.save_figure(figure, path)
 
@@ -78,10 +80,9 @@ def _selected(alike: list[Candidate], chosen: Candidate) -> list[Candidate]:
     if chosen not in kept:
         kept[-1] = chosen
     room = MOST_SETS - len(kept)
-    if len(planes) > room:
-        offsets = np.array([c.offset or 0.0 for c in planes])
-        wanted_offsets = np.linspace(offsets[0], offsets[-1], room)
-        planes = [planes[i] for i in sorted({int(np.argmin(np.abs(offsets - y))) for y in wanted_offsets})]
+    while len(planes) > room:
+        gaps = [abs((after.offset or 0.0) - (c.offset or 0.0)) for c, after in pairwise(planes)]
+        planes.pop(max(int(np.argmin(gaps)), 1))  # the first one is an edge of the finger
     wanted = {id(c) for c in planes + kept}
     return [c for c in alike if id(c) in wanted]
 
@@ -101,6 +102,7 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
         f"CHOSEN: {title}" if chosen else title,
         fontsize=11,
         loc="left",
+        y=1.0,
         color=color,
         fontweight="bold" if chosen else "normal",
         pad=5,

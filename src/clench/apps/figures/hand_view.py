@@ -1,0 +1,364 @@
+"""Draw hand, object and contacts from two sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.mesh import TriangleMesh
+from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.shapes import CollisionSource, ShapeKind
+from clench.solve.solution import Contact, GraspSolution
+
+from . import style
+from .raster import Camera, Picture, borders, halved, look_along, rasterise, shade
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Meshes of more triangles are thinned out before they are drawn.
+MOST_TRIANGLES: Final = 120_000
+_VIEW: Final = (590, 620)
+_TEXT: Final = 330
+_GAP: Final = 20
+_TOP: Final = 70
+_BOTTOM: Final = 60
+#: Round shapes are drawn with facets off by at most this [m].
+_DEVIATION: Final = 5e-5
+#: A contact farther than this behind the nearest surface is hidden [m].
+_HIDDEN: Final = 2e-3
+_ARROW: Final = 0.016
+#: How much of the hand shows through the object in front of it [-].
+_THROUGH: Final = 0.3
+_OBJECT: Final = "#e3cf92"
+_OBSTACLE: Final = "#c4c4c4"
+_PALM: Final = "#a9b0b7"
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Hold triangles to draw.
+
+    Args:
+        corners: in the world [m], shape (T, 3, 3). normals: unit, shape (T, 3). colors: shape (T, 3).
+        groups: number of the body of each triangle, shape (T,).
+    """
+
+    corners: FloatArray
+    normals: FloatArray
+    colors: FloatArray
+    groups: NDArray[np.int64]
+
+
+def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path) -> Path:
+    """Write a figure of the closed hand on the object from two sides, with every contact and its normal."""
+    body, things = hand_surface(hand, solution), object_surface(obj, solution)
+    figure, views = _layout()
+    focus = _focus(body, things)
+    directions = viewpoints(body, things, focus, solution)
+    for axes, direction in zip(views, directions, strict=True):
+        camera = _camera(direction, focus, (2 * _VIEW[0], 2 * _VIEW[1]))
+        image, nearness = render(body, things, camera)
+        axes.imshow(halved(image), extent=(0, _VIEW[0], _VIEW[1], 0), interpolation="nearest")
+        small = _camera(direction, focus, _VIEW)
+        _mark(axes, small, nearness[::2, ::2], solution.contacts)
+        _world_axes(axes, small)
+        axes.set_xlim(0, _VIEW[0])
+        axes.set_ylim(_VIEW[1], 0)
+        axes.set_axis_off()
+    _scale_bar(views[0], small.scale)
+    _explain(figure, hand, solution)
+    return style.save_figure(figure, path)
+
+
+def hand_surface(hand: Hand, solution: GraspSolution) -> Surface:
+    """Return the hand's geometry at the chosen joint angles, each finger's links in the colours of their joints."""
+    source = CollisionSource(solution.collision_source)
+    q = np.array([solution.joint_angles.get(j.name, j.open_value) for j in hand.joints])
+    poses = solution.hand_pose.matrix @ hand.link_poses(q)
+    colors = link_colors(hand)
+    parts = []
+    for i, link in enumerate(hand.links):
+        for shape in link.shapes.get(source, ()):
+            parts.append((_placed(shape.to_mesh(_DEVIATION), poses[i]), colors[i], i))
+    return _surface(parts)
+
+
+def link_colors(hand: Hand) -> list[str]:
+    """Return the colour of every link: of the closing joint that moves it, as in the planar figures, or grey."""
+    colors = [_PALM] * len(hand.links)
+    for finger in hand.fingers:
+        closing = [j for j in finger.joints if hand.joints[j].role.value == "closing"]
+        for i in finger.links:
+            k = i
+            while k >= 0 and hand.links[k].joint not in closing:
+                k = hand.links[k].parent
+            if k >= 0:
+                color = style.joint_color(closing.index(hand.links[k].joint))
+                colors[i] = style.mixed(color, style.PAPER, 0.3)
+    return colors
+
+
+def object_surface(obj: GraspObject, solution: GraspSolution) -> Surface:
+    """Return the geometry of the object and its obstacles where the solution has it."""
+    from clench.models.tessellation import convex_hull
+
+    T = solution.object_pose.matrix
+    engine = solution.object_collision_source == CollisionSource.ENGINE.value
+    parts = []
+    for number, body in enumerate(obj.bodies):
+        color = _OBSTACLE if body.role is BodyRole.OBSTACLE else _OBJECT
+        for shape in body.shapes:
+            if shape.kind is ShapeKind.MESH and engine and shape.mesh is not None:
+                mesh = convex_hull(shape.mesh).transformed(shape.pose)
+            else:
+                mesh = shape.to_mesh(_DEVIATION)
+            parts.append((_placed(thinned(mesh, MOST_TRIANGLES), T), color, 10_000 + number))
+    return _surface(parts)
+
+
+def thinned(mesh: TriangleMesh, most: int) -> TriangleMesh:
+    """Return a mesh with fewer triangles: vertices of the same cell of a grid become one, until it is small enough."""
+    cells = 512
+    while len(mesh.triangles) > most and cells >= 16:
+        low = mesh.vertices.min(axis=0)
+        size = float(np.ptp(mesh.vertices, axis=0).max()) or 1.0
+        cell = np.floor((mesh.vertices - low) / size * cells).astype(np.int64)
+        _, kept, index = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+        triangles = index.ravel()[mesh.triangles]
+        a, b, c = triangles.T
+        mesh = TriangleMesh(mesh.vertices[kept], triangles[(a != b) & (b != c) & (c != a)])
+        cells //= 2
+    return mesh
+
+
+def _placed(mesh: TriangleMesh, T: FloatArray) -> FloatArray:
+    corners: FloatArray = (mesh.vertices @ T[:3, :3].T + T[:3, 3])[mesh.triangles]
+    return corners
+
+
+def _surface(parts: Sequence[tuple[FloatArray, str, int]]) -> Surface:
+    counts = [len(corners) for corners, _, _ in parts]
+    corners = np.concatenate([c for c, _, _ in parts]) if parts else np.empty((0, 3, 3))
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.linalg.norm(normals, axis=1)
+    rgb = np.array([[int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)] for _, color, _ in parts]).reshape(-1, 3)
+    groups = np.array([g for _, _, g in parts], dtype=np.int64)
+    return Surface(
+        corners,
+        normals / np.where(sizes > 0.0, sizes, 1.0)[:, None],
+        np.repeat(rgb, counts, axis=0),
+        np.repeat(groups, counts),
+    )
+
+
+def _focus(body: Surface, things: Surface) -> tuple[FloatArray, float]:
+    """Return middle and radius of what must be seen: the hand, and the object as far as it is near the hand."""
+    points = body.corners.reshape(-1, 3) if len(body.corners) else things.corners.reshape(-1, 3)
+    graspable = things.corners.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    reach = 0.5 * float((high - low).max())
+    if len(graspable):
+        low = np.maximum(np.minimum(low, graspable.min(axis=0)), low - reach)
+        high = np.minimum(np.maximum(high, graspable.max(axis=0)), high + reach)
+    near = np.concatenate([points, graspable])
+    near = near[((near >= low) & (near <= high)).all(axis=1)]
+    middle = 0.5 * (low + high)
+    return middle, float(np.linalg.norm(near - middle, axis=1).max())
+
+
+def _camera(towards: FloatArray, focus: tuple[FloatArray, float], size: tuple[int, int]) -> Camera:
+    axes = look_along(towards, np.array([0.0, 0.0, 1.0]))
+    return Camera(*axes, focus[0], 0.49 * min(size) / focus[1], *size)
+
+
+def viewpoints(
+    body: Surface, things: Surface, focus: tuple[FloatArray, float], solution: GraspSolution
+) -> list[FloatArray]:
+    """Choose two directions that show most contacts, well apart, and at least 60 degrees from each other."""
+    azimuth = np.arange(12) * (np.pi / 6.0)
+    heights = np.where(np.arange(12) % 2 == 0, 0.35, 0.75)
+    level = np.sqrt(1.0 - heights**2)
+    directions = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
+    corners = np.concatenate([body.corners, things.corners])
+    coarse = corners[:: max(len(corners) // 60_000, 1)]
+    points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
+    scores = np.array([_score(coarse, _camera(d, focus, (140, 140)), points) for d in directions])
+    first = int(np.argmax(scores))
+    apart = directions @ directions[first] < 0.5
+    second = int(np.argmax(np.where(apart, scores, -np.inf)))
+    return [directions[first], directions[second]]
+
+
+def _score(corners: FloatArray, camera: Camera, points: FloatArray) -> float:
+    """Return how well a view shows contacts: the number not hidden, and a little for how wide they spread."""
+    if not len(points):
+        return float(np.count_nonzero(rasterise(corners, camera).triangle >= 0))
+    seen = ~_hidden(rasterise(corners, camera).nearness, camera, points)
+    spread = float(np.ptp(camera.project(points)[:, :2], axis=0).sum()) / camera.width
+    return float(seen.sum()) + spread
+
+
+def _hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray[np.bool_]:
+    """Say which points lie behind what is seen at their pixel, shape (N,)."""
+    p = camera.project(points)
+    column = np.clip(p[:, 0].astype(np.int64), 0, camera.width - 1)
+    row = np.clip(p[:, 1].astype(np.int64), 0, camera.height - 1)
+    result: NDArray[np.bool_] = nearness[row, column] > p[:, 2] + _HIDDEN
+    return result
+
+
+def render(body: Surface, things: Surface, camera: Camera) -> tuple[FloatArray, FloatArray]:
+    """Return the picture, shape (H, W, 3), and the nearness of what is seen [m]; the hand shows through the object."""
+    front, back = rasterise(things.corners, camera), rasterise(body.corners, camera)
+    lit = [_lit(front, things, camera), _lit(back, body, camera)]
+    covered = (front.nearness > back.nearness) & (back.triangle >= 0)
+    mixed = (1.0 - _THROUGH) * lit[0] + _THROUGH * lit[1]
+    image = np.where(((front.triangle >= 0) & (back.triangle < 0))[..., None], lit[0], lit[1])
+    image = np.where(covered[..., None], mixed, image)
+    return image, np.maximum(front.nearness, back.nearness)
+
+
+def _lit(picture: Picture, surface: Surface, camera: Camera) -> FloatArray:
+    image = shade(picture, surface.normals, surface.colors, camera)
+    edge = borders(picture, surface.groups, 4e-3) & (picture.triangle >= 0)
+    image[edge] *= 0.45
+    return image
+
+
+def _layout() -> tuple[Figure, list[Axes]]:
+    width, height = 2 * _VIEW[0] + _TEXT + 4 * _GAP, _VIEW[1] + _TOP + _BOTTOM
+    figure = style.new_figure(width, height)
+    views = [
+        figure.add_axes(
+            (
+                (_GAP + k * (_VIEW[0] + _GAP)) / width,
+                _BOTTOM / height,
+                _VIEW[0] / width,
+                _VIEW[1] / height,
+            )
+        )
+        for k in range(2)
+    ]
+    return figure, views
+
+
+def _mark(axes: Axes, camera: Camera, nearness: FloatArray, contacts: Sequence[Contact]) -> None:
+    """Mark contacts with dots (rings where hidden), their normals with arrows, and number them."""
+    if not contacts:
+        return
+    points = np.array([c.position for c in contacts])
+    normals = np.array([c.normal for c in contacts])
+    hidden = _hidden(nearness, camera, points)
+    p = camera.project(points)[:, :2]
+    tips = camera.project(points + _ARROW * normals)[:, :2]
+    for k, (x, y) in enumerate(p):
+        alpha = 0.55 if hidden[k] else 1.0
+        arrow = {"arrowstyle": "-|>", "color": style.CONTACT, "lw": 1.8, "alpha": alpha, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", tuple(tips[k]), (x, y), arrowprops=arrow, zorder=5)
+        face = style.PAPER if hidden[k] else style.CONTACT
+        axes.plot(x, y, "o", ms=8, mfc=face, mec=style.CONTACT if hidden[k] else style.PAPER, mew=1.6, zorder=6)
+    for (x, y), at, k in zip(_labels(p, tips), p, range(len(contacts)), strict=True):
+        axes.plot([at[0], x], [at[1], y], "-", color=style.INK, lw=0.8, zorder=5.5)
+        label = style.write(axes, float(x), float(y), str(k + 1), fontsize=10, color=style.PAPER, zorder=8)
+        label.set(ha="center", va="center", fontweight="bold")
+        label.set_bbox({"boxstyle": "circle,pad=0.25", "facecolor": style.CONTACT, "edgecolor": style.PAPER})
+
+
+def _labels(points: FloatArray, tips: FloatArray) -> FloatArray:
+    """Place labels near their points and off the arrows, pushed apart until none overlap, shape (N, 2) in pixels."""
+    middle = points.mean(axis=0)
+    away = points - middle
+    size = np.linalg.norm(away, axis=1, keepdims=True)
+    spread = np.column_stack([np.cos(np.arange(len(points))), np.sin(np.arange(len(points)))])
+    away = np.where(size > 1.0, away / np.maximum(size, 1.0), spread)
+    places = points + 30.0 * away + 1e-3 * spread
+    fixed = np.vstack([points, tips])
+    for _ in range(80):
+        push = np.zeros_like(places)
+        for others, room in ((places, 25.0), (fixed, 18.0)):
+            gap = places[:, None] - others[None]
+            distance = np.linalg.norm(gap, axis=2)
+            close = (distance < room) & (distance > 0.0)
+            push += (np.where(close, (room - distance) / np.maximum(distance, 1e-9), 0.0)[..., None] * gap).sum(axis=1)
+        if not push.any():
+            break
+        places = places + 0.4 * push
+    margin = 14.0
+    bounded: FloatArray = np.clip(places, margin, np.array(_VIEW) - margin)
+    return bounded
+
+
+def _world_axes(axes: Axes, camera: Camera) -> None:
+    """Draw the directions of the world's axes in the lower left corner."""
+    origin = np.array([46.0, _VIEW[1] - 46.0])
+    for name, axis in zip("xyz", np.eye(3), strict=True):
+        step = 32.0 * np.array([axis @ camera.right, -(axis @ camera.up)])
+        if np.linalg.norm(step) < 6.0:
+            continue  # it points at the viewer
+        arrow = {"arrowstyle": "-|>", "color": style.FAINT, "lw": 1.2, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", tuple(origin + step), tuple(origin), arrowprops=arrow)
+        place = origin + 1.3 * step
+        style.write(axes, place[0], place[1], name, fontsize=9, color=style.FAINT, ha="center", va="center")
+
+
+def _scale_bar(axes: Axes, scale: float) -> None:
+    length = next(mm for mm in (200, 100, 50, 20, 10, 5, 2, 1) if mm * 1e-3 * scale < 0.3 * _VIEW[0] or mm == 1)
+    right, row = _VIEW[0] - 20.0, _VIEW[1] - 18.0
+    left = right - length * 1e-3 * scale
+    axes.plot([left, right], [row, row], "-", color=style.INK, lw=2.5, solid_capstyle="butt")
+    style.write(axes, 0.5 * (left + right), row - 8.0, f"{length} mm", fontsize=9, ha="center")
+
+
+def _explain(figure: Figure, hand: Hand, solution: GraspSolution) -> None:
+    width, height = figure.get_size_inches() * style.DPI
+    left = (2 * _VIEW[0] + 3 * _GAP) / width
+    title = f"{solution.hand} holding {solution.object}: the closed hand from two sides"
+    style.write(figure, _GAP / width, 1.0 - 16 / height, title, fontsize=14, fontweight="bold", va="top")
+    text = str(solution.reason.get("text", ""))
+    answer = f"{solution.status.value.replace('_', ' ')}{': ' if text else ''}{text}"
+    style.write(figure, _GAP / width, 1.0 - 44 / height, answer, fontsize=10, va="top", color=style.CHOSEN)
+    row = 70.0
+
+    def line(words: str, step: float, **options: Any) -> None:
+        nonlocal row
+        style.write(figure, left, 1.0 - row / height, words, va="top", **options)
+        row += step
+
+    line("Contacts", 20.0, fontsize=11, fontweight="bold")
+    step = min(17.0, (height - 250.0) / max(len(solution.contacts), 1))
+    for k, c in enumerate(solution.contacts):
+        passed = " (opened again)" if c.passed else ""
+        line(f"{k + 1}  {c.link}{passed}", step, fontsize=min(10.0, 0.6 * step), color=style.CONTACT)
+    if not solution.contacts:
+        line("none", 17.0)
+    _legend(figure, left - 0.004)
+
+
+def _legend(figure: Figure, left: float) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    names = ("first closing joint", "second", "third")
+    handles: list[Any] = [Patch(facecolor=_PALM, label="palm and what does not close")]
+    for k, name in enumerate(names):
+        color = style.mixed(style.joint_color(k), style.PAPER, 0.3)
+        handles.append(Patch(facecolor=color, label=f"links after the {name}" + ("" if k == 0 else " closing joint")))
+    handles += [
+        Patch(facecolor=_OBJECT, label="object (the hand shows through)"),
+        Line2D([], [], color=style.CONTACT, marker="o", ls="", label="contact, and its number"),
+        Line2D([], [], color=style.CONTACT, marker="o", mfc=style.PAPER, ls="", label="contact, hidden from this side"),
+        Line2D(
+            [], [], color=style.CONTACT, marker=r"$\rightarrow$", ms=12, ls="", label="normal, from object into link"
+        ),
+        Line2D([], [], color=style.FAINT, marker=r"$\rightarrow$", ms=12, ls="", label="axes of the world frame"),
+    ]
+    figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(left, 0.02), fontsize=9, frameon=False)
