@@ -43,6 +43,6 @@ def draw_solution(
         stem = re.sub(r"[^\w.-]+", "_", name)
         scenes = FingerScenes(hand, obj, command, solution, name, result.candidates[result.chosen])
         files.append(draw_finger(scenes, result, hand.name, obj.name, folder / f"{stem}_plane.png"))
-        files.append(draw_sets(hand, obj, command, solution, result, folder / f"{stem}_sets.png"))
+        files.append(draw_sets(scenes, result, hand.name, obj.name, folder / f"{stem}_sets.png"))
     files.append(draw_hand(hand, obj, solution, folder / "grasp.png"))
     return files

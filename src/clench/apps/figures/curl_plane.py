@@ -13,7 +13,7 @@ from clench.solve.solution import Candidate, FingerResult
 
 from . import style
 from .loops import Loop
-from .plane_scene import FingerScenes, JointMotion, LinkSection, PlaneScene, bounds
+from .plane_scene import FingerScenes, JointMotion, LinkSection, PlaneContact, PlaneScene, bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -255,11 +255,7 @@ def _numbers(axes: Axes, contacts: Sequence[PlaneContact], distance: float) -> N
         else:
             near.append(c.number + 1)
     for place, numbers in placed:
-        label = style.write(axes, float(place[0]), float(place[1]), ", ".join(map(str, numbers)), fontsize=10)
-        label.set(ha="center", va="center", fontweight="bold", color=style.PAPER, zorder=11, clip_on=True)
-        label.set_bbox(
-            {"boxstyle": "round,pad=0.25,rounding_size=0.7", "facecolor": style.CONTACT, "edgecolor": style.PAPER}
-        )
+        style.number_label(axes, (float(place[0]), float(place[1])), numbers)
 
 
 def set_name(candidate: Candidate) -> str:
@@ -353,8 +349,6 @@ def _legend(figure: Figure, left: float) -> None:
         Line2D(
             [], [], color=style.CONTACT, marker="o", mec=style.PAPER, label="contact, tangent of the object's curve"
         ),
-        Line2D(
-            [], [], color=style.CONTACT, marker=r"$\rightarrow$", ms=12, ls="", label="normal, from object into link"
-        ),
+        Line2D([], [], color=style.CONTACT, marker=r"$\rightarrow$", ms=12, ls="", label="normal, out of the object"),
     ]
     figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(left - 0.004, 0.02), fontsize=9, frameon=False)

@@ -18,7 +18,7 @@ from clench.models.shapes import CollisionSource, ShapeKind
 from clench.solve.solution import Contact, GraspSolution
 
 from . import style
-from .raster import Camera, Picture, borders, halved, look_along, rasterise, shade
+from .raster import Camera, Image, Picture, borders, halved, look_along, rasterise, shade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,6 +33,8 @@ _TOP: Final = 70
 _BOTTOM: Final = 60
 #: Round shapes are drawn with facets off by at most this [m].
 _DEVIATION: Final = 5e-5
+#: The same while looking for viewpoints [m].
+_COARSE: Final = 5e-4
 #: A contact farther than this behind the nearest surface is hidden [m].
 _HIDDEN: Final = 2e-3
 _ARROW: Final = 0.016
@@ -63,23 +65,24 @@ def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path)
     body, things = hand_surface(hand, solution), object_surface(obj, solution)
     figure, views = _layout()
     focus = _focus(body, things)
-    directions = viewpoints(body, things, focus, solution)
+    coarse = np.concatenate([hand_surface(hand, solution, _COARSE).corners, things.corners])
+    directions = viewpoints(coarse, focus, solution)
+    scale = min(_camera(d, focus, _VIEW).scale for d in directions)
     for axes, direction in zip(views, directions, strict=True):
-        camera = _camera(direction, focus, (2 * _VIEW[0], 2 * _VIEW[1]))
-        image, nearness = render(body, things, camera)
+        image, nearness = render(body, things, _camera(direction, focus, (2 * _VIEW[0], 2 * _VIEW[1]), 2.0 * scale))
         axes.imshow(halved(image), extent=(0, _VIEW[0], _VIEW[1], 0), interpolation="nearest")
-        small = _camera(direction, focus, _VIEW)
-        _mark(axes, small, nearness[::2, ::2], solution.contacts)
-        _world_axes(axes, small)
+        camera = _camera(direction, focus, _VIEW, scale)
+        _mark(axes, camera, nearness[::2, ::2], solution.contacts)
+        _world_axes(axes, camera)
         axes.set_xlim(0, _VIEW[0])
         axes.set_ylim(_VIEW[1], 0)
         axes.set_axis_off()
-    _scale_bar(views[0], small.scale)
+    _scale_bar(views[0], scale)
     _explain(figure, hand, solution)
     return style.save_figure(figure, path)
 
 
-def hand_surface(hand: Hand, solution: GraspSolution) -> Surface:
+def hand_surface(hand: Hand, solution: GraspSolution, deviation: float = _DEVIATION) -> Surface:
     """Return the hand's geometry at the chosen joint angles, each finger's links in the colours of their joints."""
     source = CollisionSource(solution.collision_source)
     q = np.array([solution.joint_angles.get(j.name, j.open_value) for j in hand.joints])
@@ -88,7 +91,7 @@ def hand_surface(hand: Hand, solution: GraspSolution) -> Surface:
     parts = []
     for i, link in enumerate(hand.links):
         for shape in link.shapes.get(source, ()):
-            parts.append((_placed(shape.to_mesh(_DEVIATION), poses[i]), colors[i], i))
+            parts.append((_placed(shape.to_mesh(deviation), poses[i]), colors[i], i))
     return _surface(parts)
 
 
@@ -160,38 +163,36 @@ def _surface(parts: Sequence[tuple[FloatArray, str, int]]) -> Surface:
     )
 
 
-def _focus(body: Surface, things: Surface) -> tuple[FloatArray, float]:
-    """Return middle and radius of what must be seen: the hand, and the object as far as it is near the hand."""
-    points = body.corners.reshape(-1, 3) if len(body.corners) else things.corners.reshape(-1, 3)
-    graspable = things.corners.reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
+def _focus(body: Surface, things: Surface) -> FloatArray:
+    """Return the points that must be seen: the hand, and the object as far as it is near the hand, shape (N, 3)."""
+    hand, others = body.corners.reshape(-1, 3), things.corners.reshape(-1, 3)
+    if not len(hand) or not len(others):
+        return hand if len(hand) else others
+    low, high = hand.min(axis=0), hand.max(axis=0)
     reach = 0.5 * float((high - low).max())
-    if len(graspable):
-        low = np.maximum(np.minimum(low, graspable.min(axis=0)), low - reach)
-        high = np.minimum(np.maximum(high, graspable.max(axis=0)), high + reach)
-    near = np.concatenate([points, graspable])
-    near = near[((near >= low) & (near <= high)).all(axis=1)]
+    near = ((others >= low - reach) & (others <= high + reach)).all(axis=1)
+    return np.concatenate([hand, others[near]])
+
+
+def _camera(towards: FloatArray, focus: FloatArray, size: tuple[int, int], scale: float | None = None) -> Camera:
+    """Return a camera that shows all points of the focus, as large as the picture allows or at a given scale."""
+    right, up, back = look_along(towards, np.array([0.0, 0.0, 1.0]))
+    across = np.column_stack([focus @ right, focus @ up])
+    low, high = across.min(axis=0), across.max(axis=0)
+    fitting = float((0.9 * np.array(size) / np.maximum(high - low, 1e-6)).min())
     middle = 0.5 * (low + high)
-    return middle, float(np.linalg.norm(near - middle, axis=1).max())
+    center = right * middle[0] + up * middle[1]
+    return Camera(right, up, back, center, scale or fitting, *size)
 
 
-def _camera(towards: FloatArray, focus: tuple[FloatArray, float], size: tuple[int, int]) -> Camera:
-    axes = look_along(towards, np.array([0.0, 0.0, 1.0]))
-    return Camera(*axes, focus[0], 0.49 * min(size) / focus[1], *size)
-
-
-def viewpoints(
-    body: Surface, things: Surface, focus: tuple[FloatArray, float], solution: GraspSolution
-) -> list[FloatArray]:
-    """Choose two directions that show most contacts, well apart, and at least 60 degrees from each other."""
+def viewpoints(corners: FloatArray, focus: FloatArray, solution: GraspSolution) -> list[FloatArray]:
+    """Choose two directions that show most contacts, at least 60 degrees from each other."""
     azimuth = np.arange(12) * (np.pi / 6.0)
     heights = np.where(np.arange(12) % 2 == 0, 0.35, 0.75)
     level = np.sqrt(1.0 - heights**2)
     directions = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
-    corners = np.concatenate([body.corners, things.corners])
-    coarse = corners[:: max(len(corners) // 60_000, 1)]
     points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
-    scores = np.array([_score(coarse, _camera(d, focus, (140, 140)), points) for d in directions])
+    scores = np.array([_score(corners, _camera(d, focus, (140, 140)), points) for d in directions])
     first = int(np.argmax(scores))
     apart = directions @ directions[first] < 0.5
     second = int(np.argmax(np.where(apart, scores, -np.inf)))
@@ -216,21 +217,22 @@ def _hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray
     return result
 
 
-def render(body: Surface, things: Surface, camera: Camera) -> tuple[FloatArray, FloatArray]:
+def render(body: Surface, things: Surface, camera: Camera) -> tuple[Image, FloatArray]:
     """Return the picture, shape (H, W, 3), and the nearness of what is seen [m]; the hand shows through the object."""
     front, back = rasterise(things.corners, camera), rasterise(body.corners, camera)
-    lit = [_lit(front, things, camera), _lit(back, body, camera)]
+    image = _lit(back, body, camera)
+    over = _lit(front, things, camera)
+    alone = (front.triangle >= 0) & (back.triangle < 0)
     covered = (front.nearness > back.nearness) & (back.triangle >= 0)
-    mixed = (1.0 - _THROUGH) * lit[0] + _THROUGH * lit[1]
-    image = np.where(((front.triangle >= 0) & (back.triangle < 0))[..., None], lit[0], lit[1])
-    image = np.where(covered[..., None], mixed, image)
+    image[alone] = over[alone]
+    image[covered] = (1.0 - _THROUGH) * over[covered] + _THROUGH * image[covered]
     return image, np.maximum(front.nearness, back.nearness)
 
 
-def _lit(picture: Picture, surface: Surface, camera: Camera) -> FloatArray:
+def _lit(picture: Picture, surface: Surface, camera: Camera) -> Image:
     image = shade(picture, surface.normals, surface.colors, camera)
     edge = borders(picture, surface.groups, 4e-3) & (picture.triangle >= 0)
-    image[edge] *= 0.45
+    image[edge] *= np.float32(0.45)
     return image
 
 
@@ -266,11 +268,24 @@ def _mark(axes: Axes, camera: Camera, nearness: FloatArray, contacts: Sequence[C
         axes.annotate("", tuple(tips[k]), (x, y), arrowprops=arrow, zorder=5)
         face = style.PAPER if hidden[k] else style.CONTACT
         axes.plot(x, y, "o", ms=8, mfc=face, mec=style.CONTACT if hidden[k] else style.PAPER, mew=1.6, zorder=6)
-    for (x, y), at, k in zip(_labels(p, tips), p, range(len(contacts)), strict=True):
-        axes.plot([at[0], x], [at[1], y], "-", color=style.INK, lw=0.8, zorder=5.5)
-        label = style.write(axes, float(x), float(y), str(k + 1), fontsize=10, color=style.PAPER, zorder=8)
-        label.set(ha="center", va="center", fontweight="bold")
-        label.set_bbox({"boxstyle": "circle,pad=0.25", "facecolor": style.CONTACT, "edgecolor": style.PAPER})
+    shared = _together(points)
+    firsts = [numbers[0] for numbers in shared]
+    for (x, y), numbers in zip(_labels(p[firsts], tips[firsts]), shared, strict=True):
+        axes.plot([p[numbers[0], 0], x], [p[numbers[0], 1], y], "-", color=style.INK, lw=0.8, zorder=5.5)
+        style.number_label(axes, (float(x), float(y)), [k + 1 for k in numbers])
+
+
+def _together(points: FloatArray) -> list[list[int]]:
+    """Group points that are closer than a millimetre to the first of their group."""
+    groups: list[list[int]] = []
+    for k, point in enumerate(points):
+        near = (g for g in groups if np.linalg.norm(points[g[0]] - point) < 1e-3)
+        group = next(near, None)
+        if group is None:
+            groups.append([k])
+        else:
+            group.append(k)
+    return groups
 
 
 def _labels(points: FloatArray, tips: FloatArray) -> FloatArray:
@@ -356,9 +371,7 @@ def _legend(figure: Figure, left: float) -> None:
         Patch(facecolor=_OBJECT, label="object (the hand shows through)"),
         Line2D([], [], color=style.CONTACT, marker="o", ls="", label="contact, and its number"),
         Line2D([], [], color=style.CONTACT, marker="o", mfc=style.PAPER, ls="", label="contact, hidden from this side"),
-        Line2D(
-            [], [], color=style.CONTACT, marker=r"$\rightarrow$", ms=12, ls="", label="normal, from object into link"
-        ),
+        Line2D([], [], color=style.CONTACT, marker=r"$\rightarrow$", ms=12, ls="", label="normal, out of the object"),
         Line2D([], [], color=style.FAINT, marker=r"$\rightarrow$", ms=12, ls="", label="axes of the world frame"),
     ]
     figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(left, 0.02), fontsize=9, frameon=False)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from clench.base.pose import FloatArray, invert
+from clench.grasp.motion import alternatives
 from clench.grasp.outlines import cut_shape
 from clench.grasp.plan import FingerPlan, plan_finger
 from clench.grasp.scene import PackedObject, pack_object
 from clench.models.command import GraspCommand
-from clench.models.hand.hand import Hand, JointRole
+from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
 from clench.solve.solution import Candidate, Contact, GraspSolution
@@ -61,7 +63,7 @@ class JointMotion:
 
 @dataclass(frozen=True, eq=False)
 class PlaneContact:
-    """Place a contact in a plane: point [m] and in-plane unit normal, shape (2,) each, and its index in its set."""
+    """Place a contact in a plane: point [m] and in-plane unit normal, shape (2,) each; `number` counts from 0."""
 
     contact: Contact
     number: int
@@ -111,25 +113,35 @@ class FingerScenes:
         name: str,
         candidate: Candidate,
     ) -> None:
-        self.hand = hand
-        self.candidate = candidate
+        self.hand, self.solution = hand, solution
         self.source = CollisionSource(solution.collision_source)
         self.packed: PackedObject = pack_object(replace(obj, collision_source=_object_source(obj, solution)))
         self.T_palm_world = invert(solution.hand_pose.matrix)
         self.T_palm_object = self.T_palm_world @ solution.object_pose.matrix
-        self.closed = _posture(hand, solution, {**solution.open_angles, **candidate.joint_angles})
         finger = hand.finger(name)
-        kept = {
-            joint: angle
-            for joint, angle in candidate.joint_angles.items()
-            if hand.joints[hand.joint_index(joint)].role is not JointRole.CLOSING
-        }
-        posture = _posture(hand, solution, {**solution.open_angles, **kept})
+        start = _posture(hand, solution, solution.open_angles)
+        postures = alternatives(hand, finger, start, command)
+        posture = postures[min(candidate.posture, len(postures) - 1)]
         self.plan: FingerPlan = plan_finger(hand, finger, posture, command.planes, self.source)
-        self.poses_open, self.poses_closed = hand.link_poses(posture), hand.link_poses(self.closed)
+        self.poses_open = hand.link_poses(posture)
         self.moved_by = self._moved_by()
+        self._palms: dict[float, tuple[Loop, ...]] = {}
+        self._close(candidate)
+
+    def showing(self, candidate: Candidate) -> FingerScenes:
+        """Return the scenes of another set at the same posture, without planning the finger again."""
+        other = copy(self)
+        other._close(candidate)
+        return other
+
+    def _close(self, candidate: Candidate) -> None:
+        self.candidate = candidate
+        self.closed = _posture(self.hand, self.solution, {**self.solution.open_angles, **candidate.joint_angles})
+        self.poses_closed = self.hand.link_poses(self.closed)
         self.frames = [self._frame_now(f) for f in range(len(self.plan.families))]
-        self.contacts = tuple(self._placed(i, c) for i, c in enumerate(candidate.contacts))
+        listed = self.solution.contacts
+        numbers = [listed.index(c) if c in listed else i for i, c in enumerate(candidate.contacts)]
+        self.contacts = tuple(self._placed(k, c) for k, c in zip(numbers, candidate.contacts, strict=True))
 
     def _moved_by(self) -> dict[int, int]:
         """Return, for every link, the last of the plan's joints before it (index in the plan)."""
@@ -172,7 +184,7 @@ class FingerScenes:
         )
 
     def touched_planes(self, most: int) -> list[tuple[int, int]]:
-        """Return the (family, plane) pairs worth a picture, at most `most`: where the set touches, every family once."""
+        """Return (family, plane) pairs worth a picture, at most `most`: where the set touches, and every family."""
         result: list[tuple[int, int]] = []
         for family in range(len(self.plan.families)):
             planes = [c.plane for c in self.contacts if self.family_of(c.contact) == family]
@@ -221,6 +233,8 @@ class FingerScenes:
 
     def _palm(self, family: int, offset: float) -> tuple[Loop, ...]:
         """Cut what stands still beside the family's links: fixed links, and links of this finger before its joints."""
+        if family == 0 and offset in self._palms:
+            return self._palms[offset]
         still = set(self.hand.fixed_links) | {i for i in self.plan.finger.links if i not in self.moved_by}
         before = {i for i, j in self.moved_by.items() if self.plan.joints[j].family < family}
         T_family_palm = invert(self.frames[family])
@@ -229,6 +243,8 @@ class FingerScenes:
             for shape in self.hand.links[i].shapes.get(self.source, ()):
                 outline = cut_shape(shape, T_family_palm @ self.poses_closed[i], offset)
                 loops += outline_loops(outline) if outline is not None else []
+        if family == 0:  # the first family's planes stand still, so every set sees the same
+            self._palms[offset] = tuple(loops)
         return tuple(loops)
 
     def _places(self, family: int, turns: dict[int, float]) -> dict[int, tuple[FloatArray, float]]:
@@ -292,7 +308,7 @@ def _object_source(obj: GraspObject, solution: GraspSolution) -> CollisionSource
     return CollisionSource(solution.object_collision_source or obj.collision_source)
 
 
-def _posture(hand: Hand, solution: GraspSolution, angles: dict[str, float]) -> FloatArray:
+def _posture(hand: Hand, solution: GraspSolution, angles: Mapping[str, float]) -> FloatArray:
     known = {**solution.joint_angles, **angles}
     return np.array([known.get(j.name, j.open_value) for j in hand.joints], dtype=np.float64)
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import os.path
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.models.command import GraspCommand
-from clench.models.hand.hand import Hand
-from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import Candidate, FingerResult, GraspSolution
+from clench.solve.solution import Candidate, FingerResult
 
 from . import style
 from .curl_plane import draw_plane, frame_plane, overlap, set_name
@@ -28,20 +24,22 @@ _COLUMNS: Final = 4
 _PANEL: Final = 370
 _GAP: Final = 20
 #: Height of the lines below a panel, in pixels.
-_LINES: Final = 58
+_LINES: Final = 70
 _TOP: Final = 92
 _TITLE: Final = 24
 _BOTTOM: Final = 42
 
 
-def draw_sets(
-    hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, result: FingerResult, path: Path
-) -> Path:
-    """Write a figure with one panel per set at the chosen posture, the chosen one framed."""
+def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
+    """Write a figure with one panel per set at the chosen posture, the chosen one framed.
+
+    Args:
+        scenes_of: of the chosen set. result: of the finger. hand, obj: names. path: of the PNG file.
+    """
     chosen = result.candidates[result.chosen]
     alike = [c for c in result.candidates if c.posture == chosen.posture]
     shown = _selected(alike, chosen)
-    made = [FingerScenes(hand, obj, command, solution, result.name, c) for c in shown]
+    made = [scenes_of.showing(c) for c in shown]
     family = _busiest_family(made[0])
     scenes = [m.scene(family, dict(m.touched_planes(99)[::-1])[family], with_open=False) for m in made]
     low, high = bounds(scenes)
@@ -62,11 +60,13 @@ def draw_sets(
         if k == 0:
             _scale_bar(axes)
     more = f" ({len(shown)} of {len(alike)} shown)" if len(shown) < len(alike) else ""
-    title = f"Finger '{result.name}' of {hand.name} on {obj.name}: the sets of joint angles to choose from{more}"
+    title = f"Finger '{result.name}' of {hand} on {obj}: the sets of joint angles to choose from{more}"
     style.write(figure, _GAP / width, 1.0 - 14 / height, title, fontsize=14, fontweight="bold", va="top")
     for i, text in enumerate(_explanation(made[0], scenes[0], result, chosen)):
-        y = 1.0 - (40 + 18 * i) / height
-        style.write(figure, _GAP / width, y, text, fontsize=10, va="top", color=style.INK if i == 0 else style.CHOSEN)
+        below = 1.0 - (40 + 18 * i) / height
+        style.write(
+            figure, _GAP / width, below, text, fontsize=10, va="top", color=style.INK if i == 0 else style.CHOSEN
+        )
     note = "●  touches on the plane that is drawn     ○  touches on another plane of this finger     "
     note += "thin line: joints, also where the plane misses a link"
     style.write(figure, _GAP / width, 16 / height, note, fontsize=9.5, color=style.CONTACT)
@@ -116,8 +116,9 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
         for text, down, size in ((names[i], 6.0, 8.5), (f"{np.degrees(joint.angle):.1f}°", 19.0, 11.0)):
             label = style.write(axes, x, -down / box.height, text, fontsize=size, color=shade, fontweight="bold")
             label.set(transform=axes.transAxes, va="top")
-    label = style.write(axes, 0.0, -39.0 / box.height, _verdict(candidate), fontsize=9)
-    label.set(transform=axes.transAxes, va="top")
+    for i, text in enumerate(_verdict(candidate)):
+        label = style.write(axes, 0.0, -(37.0 + 15.0 * i) / box.height, text, fontsize=9)
+        label.set(transform=axes.transAxes, va="top")
 
 
 def _frame(axes: Axes, chosen: bool) -> None:
@@ -133,16 +134,20 @@ def _frame(axes: Axes, chosen: bool) -> None:
 
 def _short(names: list[str]) -> list[str]:
     """Return names without the words that all of them start with."""
-    start = os.path.commonprefix(names)
-    cut = start.rfind("_") + 1 if len(names) > 1 else 0
-    return [name[cut:] for name in names]
+    words = [name.split("_") for name in names]
+    alike = 0
+    while len(names) > 1 and min(map(len, words)) > alike + 1 and len({w[alike] for w in words}) == 1:
+        alike += 1
+    return ["_".join(w[alike:]) for w in words]
 
 
-def _verdict(candidate: Candidate) -> str:
-    touching = "" if candidate.contacts else "no contact; "
-    if candidate.penetration is None or candidate.feasible is None:
-        return f"{touching}overlap not checked"
-    return f"{touching}{overlap(candidate.penetration)}"
+def _verdict(candidate: Candidate) -> list[str]:
+    """Return up to two lines: how the set scores, and what is known of its overlap."""
+    scores = "  ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in candidate.scores.items())
+    known = [] if candidate.contacts else ["no contact"]
+    if candidate.penetration is not None:
+        known.append(overlap(candidate.penetration))
+    return [line for line in (scores, "; ".join(known)) if line]
 
 
 def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, chosen: Candidate) -> list[str]:
@@ -155,8 +160,7 @@ def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, 
         True: "it stops at the first touch anywhere across the finger's width",
         False: "it scores best among the sets",
     }[chosen.plane is None]
-    score = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in chosen.scores.items())
-    second = f"Chosen: {set_name(chosen)}: {why}" + (f" ({score})." if score else ".")
+    second = f"Chosen: {set_name(chosen)}: {why}."
     return [first + family, second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
 
 

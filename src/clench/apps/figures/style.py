@@ -53,7 +53,7 @@ def save_figure(figure: Figure, path: Path) -> Path:
         FileError: the file cannot be written.
     """
     try:
-        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 2})
+        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 1})
     except OSError as error:
         raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
     return path
@@ -71,3 +71,10 @@ def halo(width: float = 3.0) -> list[Any]:
     from matplotlib.patheffects import withStroke
 
     return [withStroke(linewidth=width, foreground=PAPER)]
+
+
+def number_label(target: Any, place: tuple[float, float], numbers: list[int]) -> None:
+    """Put the numbers of contacts into a rounded box."""
+    label = write(target, *place, ", ".join(map(str, numbers)), color=PAPER, zorder=11, clip_on=True)
+    label.set(ha="center", va="center", fontweight="bold")
+    label.set_bbox({"boxstyle": "round,pad=0.25,rounding_size=0.7", "facecolor": CONTACT, "edgecolor": PAPER})
