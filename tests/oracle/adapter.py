@@ -90,9 +90,10 @@ def pack_finger(finger: PlanarFinger) -> HandArrays:
 
 def pack_curve(curve: PlanarCurve) -> SectionArrays:
     """Return the kernel's arena with one plane that holds the curve."""
-    segments = len(curve.segments)
-    sections = make_sections(1, segments, len(curve.disks))
     rows = np.concatenate([curve.segments.reshape(-1, 4), curve.normals], axis=1)
+    rows = rows[np.linalg.norm(rows[:, 4:], axis=1) > 0.5]  # sections have no segment without a normal
+    segments = len(rows)
+    sections = make_sections(1, segments, len(curve.disks))
     sections.segments[0, :segments] = rows
     sections.sources[0] = np.arange(sections.sources.shape[1])
     sections.disks[0, : len(curve.disks)] = curve.disks

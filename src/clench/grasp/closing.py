@@ -100,7 +100,7 @@ def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, 
         wanted = cut_first_families(plan.arrays, packed.tree, shapes, T, shared)
         if not wanted:
             answer = empty_answer(plan, rounds)
-            find_overlaps(plan.arrays, packed.tree, packed.closed, T, shared, overlaps)
+            find_overlaps(plan.arrays, packed.tree, shapes, packed.closed, T, shared, overlaps)
             close_items(plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer)
             wanted = int(answer.overflow.max(initial=0))
             if not wanted:

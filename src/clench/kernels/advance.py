@@ -10,6 +10,7 @@ from clench.base.tolerances import TOUCH_FRACTION
 
 from .compiling import kernel
 from .conics import sweep_region
+from .corners import sharp_blocks
 from .coupled_pairs import sweep_disk, sweep_segment
 from .layout import (
     KIND_EDGE,
@@ -42,7 +43,7 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
         np.empty((rows, 3)),
         np.empty((rows * (rows + 1), 3)),
         np.empty(8),
-        np.zeros(6, dtype=np.int64),
+        np.zeros(13, dtype=np.int64),
     )
 
 
@@ -129,6 +130,42 @@ def misses(
 
 
 @kernel
+def deferred_blocks(
+    outline: Outline,
+    sections: SectionArrays,
+    row: int,
+    px: float,
+    pz: float,
+    mirror: float,
+    closed: bool,
+    touch: float,
+    count: int,
+    work: Work,
+) -> bool:
+    """Decide on sharp pairs that touch at the start; if they block, make the last of them the winner."""
+    work.best[6] = 0
+    if not sharp_blocks(
+        outline,
+        sections.segments[row],
+        sections.counts[row, 0],
+        px,
+        pz,
+        mirror,
+        closed,
+        touch,
+        work.vertex,
+        work.side,
+        work.chain,
+        work.terms,
+        count,
+    ):
+        return False
+    for k in range(6):
+        work.best[k] = work.best[7 + k]
+    return True
+
+
+@kernel
 def turn_outline(
     outline: Outline,
     sections: SectionArrays,
@@ -161,6 +198,8 @@ def turn_outline(
             best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, vertex, side, pair)
             if best == 0.0:
                 return best
+    if pair[6] and deferred_blocks(outline, sections, row, px, pz, mirror, closed, touch, 1, work):
+        return 0.0
     for i in range(sections.counts[row, 1]):
         qx, qz = disks[row, i, 0] - px, (disks[row, i, 1] - pz) * mirror
         best = turn_disk(outline, i, qx, qz, disks[row, i, 2], touch, rate, best, vertex, side, pair)
@@ -197,13 +236,17 @@ def sweep_outline(
         if (0.5 * (ax + bx) - x) ** 2 + (0.5 * (az + bz) - z) ** 2 <= near * near:
             nx, nz = segments[row, i, 4], segments[row, i, 5]
             best = sweep_segment(
-                outline, i, ax, az, bx, bz, nx, nz, closed, touch, count, best, vertex, side, chain, terms, pair
+                outline, i, ax, az, bx, bz, nx, nz, closed, touch, count, speed, best, vertex, side, chain, terms, pair
             )
             if best == 0.0:
                 return best
+    if pair[6] and deferred_blocks(outline, sections, row, px, pz, 1.0, closed, touch, count, work):
+        return 0.0
     for i in range(sections.counts[row, 1]):
         qx, qz = disks[row, i, 0] - px, disks[row, i, 1] - pz
-        best = sweep_disk(outline, i, qx, qz, disks[row, i, 2], touch, count, best, vertex, side, chain, terms, pair)
+        best = sweep_disk(
+            outline, i, qx, qz, disks[row, i, 2], touch, count, speed, best, vertex, side, chain, terms, pair
+        )
     return best
 
 

@@ -69,7 +69,7 @@ def touch_segment(
     outlines: OutlineArrays, segment: Floats, work: Work
 ) -> tuple[float, float, float, float, float, float]:
     """Return point, object normal and curve normal of a touch on a segment or its ends."""
-    kind, o, feature, _, which, _ = work.best
+    kind, o, feature, which = work.best[0], work.best[1], work.best[2], work.best[4]
     cx, cz = segment[4], segment[5]
     end = which & 1
     ox, oz = segment[2 * end], segment[2 * end + 1]
@@ -95,7 +95,8 @@ def touch_round(
     outlines: OutlineArrays, sections: SectionArrays, row: int, work: Work
 ) -> tuple[float, float, float, float]:
     """Return point and normal of a touch on a disk or an ellipse of the object."""
-    kind, o, feature, source, which, shape = work.best
+    kind, o, feature = work.best[0], work.best[1], work.best[2]
+    source, which, shape = work.best[3], work.best[4], work.best[5]
     nx, nz = 0.0, 0.0
     vx, vz = 0.0, 0.0
     if kind == KIND_SIDE:

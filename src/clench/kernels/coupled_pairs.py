@@ -9,7 +9,7 @@ from clench.base.tolerances import FOOT_FRACTION
 from .compiling import kernel
 from .coupled import at_start, bounds, line_on_point, next_root, place, point_on_line, point_on_point
 from .layout import KIND_SIDE, Floats, Ints, Outline
-from .turning_pairs import note
+from .turning_pairs import defer, note
 
 
 @kernel
@@ -127,6 +127,7 @@ def sweep_segment(
     closed: bool,
     touch: float,
     count: int,
+    speed: float,
     best: float,
     vertex: Floats,
     side: Floats,
@@ -146,12 +147,16 @@ def sweep_segment(
     for v in range(outline.v0, outline.v1):
         vx, vz = vertex[v, 0], vertex[v, 1]
         found = sweep_vertex_line(chain, terms, count, vx, vz, w, nx, nz, h, ta, tb, touch, best)
-        if found < best:
+        if w == 0.0 and found * speed <= touch:
+            defer(pair, outline.tip, outline.index, v, i, 0)
+        elif found < best:
             best = found
             note(pair, outline.tip, outline.index, v, i, 0, 0)
         if not closed:
             found = sweep_vertex_line(chain, terms, count, vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, best)
-            if found < best:
+            if w == 0.0 and found * speed <= touch:
+                defer(pair, outline.tip, outline.index, v, i, 1)
+            elif found < best:
                 best = found
                 note(pair, outline.tip, outline.index, v, i, 1, 0)
         if w > 0.0:
@@ -163,8 +168,8 @@ def sweep_segment(
             if found < best:
                 best = found
                 note(pair, outline.tip, outline.index, v, i, 3, 0)
-    best = sweep_sides(outline, i, 0, ax, az, 0.0, 0, touch, count, best, side, chain, terms, pair)
-    return sweep_sides(outline, i, 1, bx, bz, 0.0, 0, touch, count, best, side, chain, terms, pair)
+    best = sweep_sides(outline, i, 0, ax, az, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
+    return sweep_sides(outline, i, 1, bx, bz, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
 
 
 @kernel
@@ -178,6 +183,7 @@ def sweep_sides(
     disk: int,
     touch: float,
     count: int,
+    speed: float,
     best: float,
     side: Floats,
     chain: Floats,
@@ -189,12 +195,16 @@ def sweep_sides(
     for k in range(outline.s0, outline.s1):
         nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
         found = sweep_side_point(chain, terms, count, nx, nz, g, ta, tb, qx, qz, w, touch, best)
-        if found < best:
+        if w == 0.0 and found * speed <= touch:
+            defer(pair, KIND_SIDE, outline.index, k, i, end)
+        elif found < best:
             best = found
             note(pair, KIND_SIDE, outline.index, k, i, end, disk)
         if outline.both:
             found = sweep_side_point(chain, terms, count, -nx, -nz, -g, -tb, -ta, qx, qz, w, touch, best)
-            if found < best:
+            if w == 0.0 and found * speed <= touch:
+                defer(pair, KIND_SIDE, outline.index, k, i, end + 2)
+            elif found < best:
                 best = found
                 note(pair, KIND_SIDE, outline.index, k, i, end + 2, disk)
     return best
@@ -209,6 +219,7 @@ def sweep_disk(
     radius: float,
     touch: float,
     count: int,
+    speed: float,
     best: float,
     vertex: Floats,
     side: Floats,
@@ -223,4 +234,4 @@ def sweep_disk(
         if found < best:
             best = found
             note(pair, outline.tip, outline.index, v, i, 0, 1)
-    return sweep_sides(outline, i, 0, qx, qz, radius, 1, touch, count, best, side, chain, terms, pair)
+    return sweep_sides(outline, i, 0, qx, qz, radius, 1, touch, count, speed, best, side, chain, terms, pair)

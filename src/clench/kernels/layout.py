@@ -112,7 +112,7 @@ class Work(NamedTuple):
             column of `vertex` is the distance from that centre.
         chain: rows (Ω, e_x, e_z), (J + 1, 3). terms: sums of `coupled`, (N, 3). ellipse: one, relative, (8,).
         best: the winner: kind, outline, feature, object feature, which end or orientation, 0 segment, 1 disk
-            or 2 ellipse, (6,).
+            or 2 ellipse; whether sharp pairs touch at the start; the last of these in the same six columns, (13,).
     """
 
     place: Floats

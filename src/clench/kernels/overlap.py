@@ -12,8 +12,9 @@ from .advance import make_work, place_joints, put_outline
 from .compiling import kernel
 from .distance import is_inside
 from .family_pose import compose_inverse, pose_family
-from .layout import Floats, HandArrays, Ints, Outline, SectionArrays, Work
+from .layout import Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
 from .outline_gap import core_distance, point_segment, round_distance, side_ends
+from .round_section import CAPSULE, CYLINDER, ELLIPSOID
 from .tree import MeshTree
 
 
@@ -94,8 +95,28 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
 
 
 @kernel
-def starts_inside(tree: MeshTree, closed: bool, T_family_object: Floats, x: float, y: float, z: float) -> bool:
-    """Say whether a point given in a family's frame lies inside the object's mesh."""
+def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
+    """Say whether a point of the object's frame lies inside a round primitive."""
+    pose, size = rounds.pose[i], rounds.size[i]
+    x, y, z = 0.0, 0.0, 0.0
+    for k in range(3):
+        d = p[k] - pose[k, 3]
+        x += pose[k, 0] * d
+        y += pose[k, 1] * d
+        z += pose[k, 2] * d
+    if rounds.kind[i] == ELLIPSOID:
+        return (x / size[0]) ** 2 + (y / size[1]) ** 2 + (z / size[2]) ** 2 < 1.0
+    if rounds.kind[i] == CYLINDER:
+        return abs(z) < size[1] and x * x + y * y < size[0] ** 2
+    beyond = max(abs(z) - size[1], 0.0) if rounds.kind[i] == CAPSULE else z
+    return x * x + y * y + beyond * beyond < size[0] ** 2
+
+
+@kernel
+def starts_inside(
+    tree: MeshTree, rounds: RoundArrays, closed: bool, T_family_object: Floats, x: float, y: float, z: float
+) -> bool:
+    """Say whether a point given in a family's frame lies inside the object's mesh or one of its round primitives."""
     p = np.empty(3)
     for k in range(3):
         p[k] = (
@@ -103,14 +124,26 @@ def starts_inside(tree: MeshTree, closed: bool, T_family_object: Floats, x: floa
             + T_family_object[1, k] * (y - T_family_object[1, 3])
             + T_family_object[2, k] * (z - T_family_object[2, 3])
         )
-        if tree.low.shape[0] == 0 or p[k] < tree.low[0, k] or p[k] > tree.high[0, k]:
+    for i in range(rounds.kind.shape[0]):
+        if inside_round(rounds, i, p):
+            return True
+    if tree.low.shape[0] == 0:
+        return False
+    for k in range(3):
+        if p[k] < tree.low[0, k] or p[k] > tree.high[0, k]:
             return False
     return bool(is_inside(tree, p, closed))
 
 
 @kernel
 def find_overlaps(
-    hand: HandArrays, tree: MeshTree, closed: bool, T_palm_object: Floats, sections: SectionArrays, overlaps: Ints
+    hand: HandArrays,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    closed: bool,
+    T_palm_object: Floats,
+    sections: SectionArrays,
+    overlaps: Ints,
 ) -> None:
     """Write, for every entry, an outline that overlaps the object before anything moves, or -1, shape (E,)."""
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
@@ -129,7 +162,7 @@ def find_overlaps(
                 outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
                 x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
                 if (
-                    starts_inside(tree, closed, T, x, hand.plane_offset[plane], z)
+                    starts_inside(tree, rounds, closed, T, x, hand.plane_offset[plane], z)
                     and not closer_than(outline, sections, plane, 4.0 * touch, work)
                 ) or curves_overlap(outline, sections, plane, touch, work):
                     overlaps[entry] = o

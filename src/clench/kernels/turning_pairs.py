@@ -16,6 +16,13 @@ def note(pair: Ints, kind: int, outline: int, feature: int, source: int, which: 
 
 
 @kernel
+def defer(pair: Ints, kind: int, outline: int, feature: int, source: int, which: int) -> None:
+    """Write a sharp pair that touches at the start; `corners` decides whether it blocks."""
+    pair[6] = 1
+    pair[7], pair[8], pair[9], pair[10], pair[11], pair[12] = kind, outline, feature, source, which, 0
+
+
+@kernel
 def turn_segment(
     outline: Outline,
     i: int,
@@ -50,12 +57,16 @@ def turn_segment(
     for v in range(outline.v0, outline.v1):
         vx, vz, rho = vertex[v, 0], vertex[v, 1], vertex[v, 2]
         found = disk_on_segment(vx, vz, w, nx, nz, h, ta, tb, touch, turn)
-        if found < turn:
+        if found == 0.0 and w == 0.0:
+            defer(pair, outline.tip, outline.index, v, i, 0)
+        elif found < turn:
             turn = found
             note(pair, outline.tip, outline.index, v, i, 0, 0)
         if not closed:
             found = disk_on_segment(vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, turn)
-            if found < turn:
+            if found == 0.0 and w == 0.0:
+                defer(pair, outline.tip, outline.index, v, i, 1)
+            elif found < turn:
                 turn = found
                 note(pair, outline.tip, outline.index, v, i, 1, 0)
         if w > 0.0:
@@ -92,12 +103,16 @@ def turn_sides(
         nx, nz, g = side[s, 0], side[s, 1], side[s, 2]
         ta, tb = side[s, 3], side[s, 4]
         found = side_on_vertex(nx, nz, g, ta, tb, qx, qz, w, touch, turn)
-        if found < turn:
+        if found == 0.0 and w == 0.0:
+            defer(pair, KIND_SIDE, outline.index, s, i, end)
+        elif found < turn:
             turn = found
             note(pair, KIND_SIDE, outline.index, s, i, end, disk)
         if outline.both:
             found = side_on_vertex(-nx, -nz, -g, -tb, -ta, qx, qz, w, touch, turn)
-            if found < turn:
+            if found == 0.0 and w == 0.0:
+                defer(pair, KIND_SIDE, outline.index, s, i, end + 2)
+            elif found < turn:
                 turn = found
                 note(pair, KIND_SIDE, outline.index, s, i, end + 2, disk)
     return turn
