@@ -125,7 +125,7 @@ def solve_planar(finger: PlanarFinger, curve: PlanarCurve) -> tuple[tuple[StageA
     closed = not curve.two_sided
     T = np.eye(4)[:3].copy()
     close_items(hand, EMPTY_TREE, NO_ROUNDS, closed, T, sections, sections, items, 1, answer)
-    stopped = {int(h[4]) for h in answer.hit[0, : answer.count[0]]}
+    stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
     stages = tuple(
         StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)
     )

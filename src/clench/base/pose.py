@@ -143,7 +143,8 @@ def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
     """Return the rotation matrix about a unit axis by an angle [rad] (Rodrigues), shape (3, 3)."""
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+    rotation: FloatArray = np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+    return rotation
 
 
 def quaternion_from_rotation(rotation: FloatArray) -> FloatArray:

@@ -98,7 +98,7 @@ def _candidate(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedH
         plane=None if plan.whole[i] else int(plan.items.low[i]),
         travel=travel,
         q=finger.angles(hand, travel),
-        touches=tuple(_touch(plan, packed, closed, i, n, entry) for n in range(closed.answer.count[i])),
+        touches=tuple(_touch(plan, packed, closed, i, n, entry) for n in range(closed.answer.contacts[i])),
         overlap=int(plan.arrays.outlines.link[overlap]) if overlap >= 0 else None,
     )
 

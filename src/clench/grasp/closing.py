@@ -117,7 +117,7 @@ def empty_answer(plan: HandPlan, rounds: int) -> ClosingArrays:
     return ClosingArrays(
         travel=np.zeros((items, len(plan.arrays.chain.group_length))),
         turn=np.zeros((items, len(plan.arrays.chain.rate))),
-        count=np.zeros(items, dtype=np.int64),
+        contacts=np.zeros(items, dtype=np.int64),
         hit=np.zeros((items, contacts, HIT_INTEGERS), dtype=np.int64),
         point=np.zeros((items, contacts, HIT_FLOATS)),
         pose=np.zeros((items, len(plan.arrays.family_pose), 3, 4)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from clench.models.mesh import TriangleMesh
 from clench.models.objects.topology import edge_defects
 from clench.models.shapes import Shape, ShapeKind
 from clench.models.tessellation import tessellate
+
+if TYPE_CHECKING:
+    from clench.kernels.tree import MeshTree
 
 #: Axes closer than this to the plane count as lying in it [rad].
 ALIGNED = 1e-9
@@ -111,7 +115,7 @@ def _cut_mesh(mesh: TriangleMesh, T: FloatArray, offset: float) -> RoundedOutlin
 
 
 @lru_cache(maxsize=512)
-def _tree(mesh: TriangleMesh) -> tuple[object, bool]:
+def _tree(mesh: TriangleMesh) -> tuple[MeshTree, bool]:
     from clench.kernels.tree import build_tree
 
     return build_tree(mesh.vertices, mesh.triangles), _winds_outwards(mesh)
@@ -159,7 +163,7 @@ def _round_section(shape: Shape, T: FloatArray, offset: float) -> tuple[FloatArr
     from clench.kernels.family_section import cut_rounds, make_sections
     from clench.kernels.layout import RoundArrays
 
-    kind = np.array([_ROUND[shape.kind]], dtype=np.int32)
+    kind = np.array([_ROUND[shape.kind]], dtype=np.int64)
     rounds = RoundArrays(kind, np.array([shape.size]), np.ascontiguousarray(T[None, :3]))
     sections = make_sections(1, 0, 1)
     cut_rounds(rounds, np.eye(4)[:3].copy(), offset, 0, sections)
@@ -169,7 +173,8 @@ def _round_section(shape: Shape, T: FloatArray, offset: float) -> tuple[FloatArr
 
 def _circle_points(disk: FloatArray) -> FloatArray:
     t = _steps(disk[2])
-    return disk[:2] + disk[2] * np.column_stack([np.cos(t), np.sin(t)])
+    points: FloatArray = disk[:2] + disk[2] * np.column_stack([np.cos(t), np.sin(t)])
+    return points
 
 
 def _ellipse_points(e: FloatArray) -> FloatArray:
@@ -178,7 +183,8 @@ def _ellipse_points(e: FloatArray) -> FloatArray:
     keep = (along >= e[6]) & (along <= e[7])
     ends = [(x, s * e[5] * np.sqrt(max(1 - (x / e[4]) ** 2, 0.0))) for x in e[6:8] for s in (1, -1)]
     local = np.vstack([np.column_stack([along, across])[keep], ends])
-    return e[:2] + local @ np.array([[e[2], e[3]], [-e[3], e[2]]])
+    points: FloatArray = e[:2] + local @ np.array([[e[2], e[3]], [-e[3], e[2]]])
+    return points
 
 
 def _steps(radius: float) -> FloatArray:

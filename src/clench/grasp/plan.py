@@ -233,7 +233,7 @@ def _farthest(
 def _travel(hand: Hand, posture: FloatArray, leader: int) -> float:
     joint = hand.joints[leader]
     limit = joint.upper if joint.direction > 0 else joint.lower
-    return max(joint.direction * (limit - posture[leader]), 0.0)
+    return max(float(joint.direction * (limit - posture[leader])), 0.0)
 
 
 def _planned(

@@ -182,7 +182,7 @@ def turn_outline(
     """Return the first contact of an outline behind one active joint with a plane's section, before `best`."""
     segments, disks = sections.segments, sections.disks
     vertex, side, pair = work.vertex, work.side, work.best
-    cx, cz, reach = work.disk[outline.index, 0], work.disk[outline.index, 1], work.disk[outline.index, 2] + touch
+    cx, cz, reach = work.disk[outline.number, 0], work.disk[outline.number, 1], work.disk[outline.number, 2] + touch
     d = math.sqrt(cx * cx + cz * cz)
     before, ex, ez, wide = -1.0, 0.0, 0.0, False
     for i in range(sections.counts[row, 0]):
@@ -224,11 +224,11 @@ def sweep_outline(
     segments, disks = sections.segments, sections.disks
     vertex, side, chain, terms, pair = work.vertex, work.side, work.chain, work.terms, work.best
     # The outline's enclosing circle, relative to the first pivot, and how far it gets.
-    x, z = work.disk[outline.index, 0], work.disk[outline.index, 1]
+    x, z = work.disk[outline.number, 0], work.disk[outline.number, 1]
     for k in range(count - 1):
         x += chain[k, 1]
         z += chain[k, 2]
-    reach = work.disk[outline.index, 2] + touch + speed * best
+    reach = work.disk[outline.number, 2] + touch + speed * best
     for i in range(sections.counts[row, 0]):
         ax, az = segments[row, i, 0] - px, segments[row, i, 1] - pz
         bx, bz = segments[row, i, 2] - px, segments[row, i, 3] - pz

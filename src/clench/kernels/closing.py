@@ -229,7 +229,7 @@ def settle_hits(
     hand: HandArrays, start: int, shared: SectionArrays, own: SectionArrays, i: int, work: Work, answer: ClosingArrays
 ) -> None:
     """Evaluate an item's contacts again at its final posture; what later motions carried along gets its new place."""
-    for n in range(answer.count[i]):
+    for n in range(answer.contacts[i]):
         family, plane, o = answer.hit[i, n, HIT_FAMILY], answer.hit[i, n, HIT_PLANE], answer.hit[i, n, HIT_OUTLINE]
         sections, row = shared, plane
         if family > start:
@@ -291,7 +291,7 @@ def close_item(
                 work,
             )
             answer.travel[i, group] = travel
-            n = answer.count[i]
+            n = answer.contacts[i]
             if plane >= 0 and n < answer.hit.shape[1]:
                 describe_hit(
                     hand,
@@ -306,7 +306,7 @@ def close_item(
                     answer.hit[i, n],
                     answer.point[i, n],
                 )
-                answer.count[i] = n + 1
+                answer.contacts[i] = n + 1
     settle_hits(hand, start, shared, own, i, work, answer)
 
 
@@ -331,7 +331,7 @@ def close_items(
         shared: sections with every entry's first family, by global plane. own: arena for later families, with a row for
             every plane of the largest entry.
         items: what to close. times: how often all groups are gone through.
-        answer: written; `travel`, `turn`, `count` and `overflow` must be zero.
+        answer: written; `travel`, `turn`, `contacts` and `overflow` must be zero.
     """
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
     for i in range(items.entry.shape[0]):

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TypeVar, cast
 
 from numba import njit
 
-kernel: Any = njit(cache=True, nogil=True, error_model="numpy")
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+
+def kernel(function: Kernel) -> Kernel:
+    """Compile a function on its first call; it keeps its signature."""
+    return cast(Kernel, njit(cache=True, nogil=True, error_model="numpy")(function))

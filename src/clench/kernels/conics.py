@@ -182,16 +182,16 @@ def sweep_region(
         found = sweep_vertex_region(chain, count, vertex[v, 0], vertex[v, 1], w, e, touch, best)
         if found < best:
             best = found
-            note(pair, outline.tip, outline.index, v, i, 0, 2)
+            note(pair, outline.tip, outline.number, v, i, 0, 2)
     for k in range(outline.s0, outline.s1):
         nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
         found = sweep_side_region(chain, terms, count, nx, nz, g, ta, tb, w, e, touch, best)
         if found < best:
             best = found
-            note(pair, KIND_SIDE, outline.index, k, i, 0, 2)
+            note(pair, KIND_SIDE, outline.number, k, i, 0, 2)
         if outline.both:
             found = sweep_side_region(chain, terms, count, -nx, -nz, -g, -tb, -ta, w, e, touch, best)
             if found < best:
                 best = found
-                note(pair, KIND_SIDE, outline.index, k, i, 2, 2)
+                note(pair, KIND_SIDE, outline.number, k, i, 2, 2)
     return best

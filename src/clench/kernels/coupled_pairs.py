@@ -148,26 +148,26 @@ def sweep_segment(
         vx, vz = vertex[v, 0], vertex[v, 1]
         found = sweep_vertex_line(chain, terms, count, vx, vz, w, nx, nz, h, ta, tb, touch, best)
         if w == 0.0 and found * speed <= touch:
-            defer(pair, outline.tip, outline.index, v, i, 0)
+            defer(pair, outline.tip, outline.number, v, i, 0)
         elif found < best:
             best = found
-            note(pair, outline.tip, outline.index, v, i, 0, 0)
+            note(pair, outline.tip, outline.number, v, i, 0, 0)
         if not closed:
             found = sweep_vertex_line(chain, terms, count, vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, best)
             if w == 0.0 and found * speed <= touch:
-                defer(pair, outline.tip, outline.index, v, i, 1)
+                defer(pair, outline.tip, outline.number, v, i, 1)
             elif found < best:
                 best = found
-                note(pair, outline.tip, outline.index, v, i, 1, 0)
+                note(pair, outline.tip, outline.number, v, i, 1, 0)
         if w > 0.0:
             found = sweep_vertex_point(chain, terms, count, vx, vz, ax, az, w, touch, best)
             if found < best:
                 best = found
-                note(pair, outline.tip, outline.index, v, i, 2, 0)
+                note(pair, outline.tip, outline.number, v, i, 2, 0)
             found = sweep_vertex_point(chain, terms, count, vx, vz, bx, bz, w, touch, best)
             if found < best:
                 best = found
-                note(pair, outline.tip, outline.index, v, i, 3, 0)
+                note(pair, outline.tip, outline.number, v, i, 3, 0)
     best = sweep_sides(outline, i, 0, ax, az, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
     return sweep_sides(outline, i, 1, bx, bz, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
 
@@ -196,17 +196,17 @@ def sweep_sides(
         nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
         found = sweep_side_point(chain, terms, count, nx, nz, g, ta, tb, qx, qz, w, touch, best)
         if w == 0.0 and found * speed <= touch:
-            defer(pair, KIND_SIDE, outline.index, k, i, end)
+            defer(pair, KIND_SIDE, outline.number, k, i, end)
         elif found < best:
             best = found
-            note(pair, KIND_SIDE, outline.index, k, i, end, disk)
+            note(pair, KIND_SIDE, outline.number, k, i, end, disk)
         if outline.both:
             found = sweep_side_point(chain, terms, count, -nx, -nz, -g, -tb, -ta, qx, qz, w, touch, best)
             if w == 0.0 and found * speed <= touch:
-                defer(pair, KIND_SIDE, outline.index, k, i, end + 2)
+                defer(pair, KIND_SIDE, outline.number, k, i, end + 2)
             elif found < best:
                 best = found
-                note(pair, KIND_SIDE, outline.index, k, i, end + 2, disk)
+                note(pair, KIND_SIDE, outline.number, k, i, end + 2, disk)
     return best
 
 
@@ -233,5 +233,5 @@ def sweep_disk(
         found = sweep_vertex_point(chain, terms, count, vertex[v, 0], vertex[v, 1], qx, qz, w, touch, best)
         if found < best:
             best = found
-            note(pair, outline.tip, outline.index, v, i, 0, 1)
+            note(pair, outline.tip, outline.number, v, i, 0, 1)
     return sweep_sides(outline, i, 0, qx, qz, radius, 1, touch, count, speed, best, side, chain, terms, pair)

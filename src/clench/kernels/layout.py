@@ -61,9 +61,9 @@ class OutlineArrays(NamedTuple):
 
 
 class Outline(NamedTuple):
-    """Name one outline: its index, its ranges of vertices and sides, radius, `both`, and the kind of its vertices."""
+    """Name one outline: its number, its ranges of vertices and sides, radius, `both`, and the kind of its vertices."""
 
-    index: int
+    number: int
     v0: int
     v1: int
     s0: int
@@ -179,7 +179,7 @@ class ClosingArrays(NamedTuple):
 
     Args:
         travel: of every group [rad], (I, G). turn: of every joint [rad], (I, J); only the entry's own are set.
-        count: number of contacts, (I,). hit: integers of each contact, (I, S, 6), see below.
+        contacts: how many there are, (I,). hit: integers of each contact, (I, S, 6), see below.
         point: numbers of each contact in its family's plane, (I, S, 8), see below.
         pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
         overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
@@ -187,7 +187,7 @@ class ClosingArrays(NamedTuple):
 
     travel: Floats
     turn: Floats
-    count: Ints
+    contacts: Ints
     hit: Ints
     point: Floats
     pose: Floats

@@ -71,7 +71,7 @@ def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: floa
 def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> bool:
     """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
     margin = 4.0 * touch
-    x, z, reach = work.disk[outline.index, 0], work.disk[outline.index, 1], work.disk[outline.index, 2]
+    x, z, reach = work.disk[outline.number, 0], work.disk[outline.number, 1], work.disk[outline.number, 2]
     segments = sections.segments
     for i in range(sections.counts[row, 0]):
         ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
@@ -105,11 +105,11 @@ def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
         y += pose[k, 1] * d
         z += pose[k, 2] * d
     if rounds.kind[i] == ELLIPSOID:
-        return (x / size[0]) ** 2 + (y / size[1]) ** 2 + (z / size[2]) ** 2 < 1.0
+        return bool((x / size[0]) ** 2 + (y / size[1]) ** 2 + (z / size[2]) ** 2 < 1.0)
     if rounds.kind[i] == CYLINDER:
-        return abs(z) < size[1] and x * x + y * y < size[0] ** 2
+        return bool(abs(z) < size[1] and x * x + y * y < size[0] ** 2)
     beyond = max(abs(z) - size[1], 0.0) if rounds.kind[i] == CAPSULE else z
-    return x * x + y * y + beyond * beyond < size[0] ** 2
+    return bool(x * x + y * y + beyond * beyond < size[0] ** 2)
 
 
 @kernel

@@ -58,26 +58,26 @@ def turn_segment(
         vx, vz, rho = vertex[v, 0], vertex[v, 1], vertex[v, 2]
         found = disk_on_segment(vx, vz, w, nx, nz, h, ta, tb, touch, turn)
         if found == 0.0 and w == 0.0:
-            defer(pair, outline.tip, outline.index, v, i, 0)
+            defer(pair, outline.tip, outline.number, v, i, 0)
         elif found < turn:
             turn = found
-            note(pair, outline.tip, outline.index, v, i, 0, 0)
+            note(pair, outline.tip, outline.number, v, i, 0, 0)
         if not closed:
             found = disk_on_segment(vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, turn)
             if found == 0.0 and w == 0.0:
-                defer(pair, outline.tip, outline.index, v, i, 1)
+                defer(pair, outline.tip, outline.number, v, i, 1)
             elif found < turn:
                 turn = found
-                note(pair, outline.tip, outline.index, v, i, 1, 0)
+                note(pair, outline.tip, outline.number, v, i, 1, 0)
         if w > 0.0:
             found = disk_on_vertex(vx, vz, rho, ax, az, ra, w, touch, turn)
             if found < turn:
                 turn = found
-                note(pair, outline.tip, outline.index, v, i, 2, 0)
+                note(pair, outline.tip, outline.number, v, i, 2, 0)
             found = disk_on_vertex(vx, vz, rho, bx, bz, rb, w, touch, turn)
             if found < turn:
                 turn = found
-                note(pair, outline.tip, outline.index, v, i, 3, 0)
+                note(pair, outline.tip, outline.number, v, i, 3, 0)
     found = turn_sides(outline, i, 0, ax, az, 0.0, 0, touch, turn, side, pair)
     turn = turn_sides(outline, i, 1, bx, bz, 0.0, 0, touch, found, side, pair)
     return turn / rate if turn < limit else best
@@ -104,17 +104,17 @@ def turn_sides(
         ta, tb = side[s, 3], side[s, 4]
         found = side_on_vertex(nx, nz, g, ta, tb, qx, qz, w, touch, turn)
         if found == 0.0 and w == 0.0:
-            defer(pair, KIND_SIDE, outline.index, s, i, end)
+            defer(pair, KIND_SIDE, outline.number, s, i, end)
         elif found < turn:
             turn = found
-            note(pair, KIND_SIDE, outline.index, s, i, end, disk)
+            note(pair, KIND_SIDE, outline.number, s, i, end, disk)
         if outline.both:
             found = side_on_vertex(-nx, -nz, -g, -tb, -ta, qx, qz, w, touch, turn)
             if found == 0.0 and w == 0.0:
-                defer(pair, KIND_SIDE, outline.index, s, i, end + 2)
+                defer(pair, KIND_SIDE, outline.number, s, i, end + 2)
             elif found < turn:
                 turn = found
-                note(pair, KIND_SIDE, outline.index, s, i, end + 2, disk)
+                note(pair, KIND_SIDE, outline.number, s, i, end + 2, disk)
     return turn
 
 
@@ -142,6 +142,6 @@ def turn_disk(
         found = disk_on_vertex(vx, vz, rho, qx, qz, r, w + radius, touch, turn)
         if found < turn:
             turn = found
-            note(pair, outline.tip, outline.index, v, i, 0, 1)
+            note(pair, outline.tip, outline.number, v, i, 0, 1)
     turn = turn_sides(outline, i, 0, qx, qz, radius, 1, touch, turn, side, pair)
     return turn / rate if turn < limit else best
