@@ -6,7 +6,6 @@ execution; 2 = bad input; 70 = a mistake in this program.
 
 from __future__ import annotations
 
-import functools
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from clench import __version__
 from clench.base.errors import ClenchError, UnknownNameError
 
-EXIT_BAD_INPUT = 2
+from .parsing import EXIT_BAD_INPUT, parse_call
+
 EXIT_INTERNAL = 70
 EXIT_INTERRUPTED = 130
 
@@ -66,7 +66,7 @@ def _run(arguments: list[str]) -> int:
         raise UnknownNameError("command", name, "clench", COMMANDS)
     if name == "bench" and not {"-h", "--help"} & set(rest[:1]):
         return bench(*rest)  # has options of its own
-    return _parse(name, COMMANDS[name], rest)()
+    return parse_call(f"clench {name}", COMMANDS[name], rest)()
 
 
 def _overview(commands: Mapping[str, Callable[..., int]]) -> str:
@@ -74,27 +74,6 @@ def _overview(commands: Mapping[str, Callable[..., int]]) -> str:
     lines = [f"  {name:<10}{(command.__doc__ or '').splitlines()[0]}" for name, command in commands.items()]
     listed = "\n".join(lines)
     return f"usage: clench COMMAND ...\n\n{DESCRIPTION}\n\ncommands (clench COMMAND --help tells more):\n{listed}\n"
-
-
-def _parse(name: str, command: Callable[..., int], arguments: list[str]) -> Callable[[], int]:
-    """Return the call that the arguments ask for; a wrong argument gives exit code 2, `--help` gives 0."""
-    import tyro
-
-    @functools.wraps(command)
-    def call(*values: object, **options: object) -> Callable[[], int]:
-        # Deferred, so that the command's own errors are not taken for wrong arguments.
-        return functools.partial(command, *values, **options)
-
-    try:
-        return tyro.cli(
-            call,
-            prog=f"clench {name}",
-            args=arguments,
-            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
-        )
-    except SystemExit as finished:
-        code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
-        return lambda: code
 
 
 def _say(sentence: str, code: int) -> int:

@@ -1,0 +1,80 @@
+"""Entry point of `clench bench NAME`: choose the benchmark, print what it measured."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+
+from clench.apps.cli.parsing import parse_call
+from clench.apps.cli.results import print_json
+from clench.base.errors import CommandError, UnknownNameError
+
+from .report import BenchReport
+
+SCHEMA = "clench.bench/1"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run a benchmark.
+
+    Args:
+        argv: its name and its options.
+
+    Returns:
+        0; 1 when its answers are wrong, which it says before it measures anything; 2 for wrong options.
+
+    Raises:
+        ClenchError: bad input.
+    """
+    name, *rest = list(argv) or ["--help"]
+    if name in ("-h", "--help"):
+        lines = [f"  {n:<8}{(b.__doc__ or '').splitlines()[0]}" for n, b in BENCHMARKS.items()]
+        sys.stdout.write("usage: clench bench NAME ...\n\nbenchmarks:\n" + "\n".join(lines) + "\n")
+        return 0
+    if name not in BENCHMARKS:
+        raise UnknownNameError("benchmark", name, "clench bench", BENCHMARKS)
+    return parse_call(f"clench bench {name}", BENCHMARKS[name], rest)()
+
+
+def solve(
+    *,
+    hand: str = "patent15",
+    object: str = "mug",
+    scale: float = 1.0,
+    planes: int = 5,
+    poses: int = 100,
+    passes: int = 5,
+    seed: int = 0,
+    json: bool = False,
+) -> int:
+    """Time solves of a whole hand from many approach poses, with their stages.
+
+    Args:
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
+        scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        planes: curl planes per finger.
+        poses: how many approach poses are solved.
+        passes: how often each is timed.
+        seed: of the approach poses.
+        json: print one JSON document on standard output.
+    """
+    from .solving import bench_solve
+
+    for key, count in (("planes", planes), ("poses", poses), ("passes", passes)):
+        if count < 1:
+            raise CommandError(f"--{key}: expected at least 1, got {count}.")
+    return _print(bench_solve(hand, object, scale, planes, poses, passes, seed), json)
+
+
+BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve}
+
+
+def _print(report: BenchReport, json: bool) -> int:
+    if json:
+        print_json({"schema": SCHEMA, **report.values, "errors": list(report.errors)})
+    else:
+        sys.stdout.write("".join(f"{line}\n" for line in report.lines()))
+    for error in report.errors:
+        sys.stderr.write(f"clench: wrong answer: {error}\n")
+    return 1 if report.errors else 0

@@ -1,0 +1,187 @@
+"""The benchmark of one solve: a whole hand, many approach poses, every stage."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import clench
+from clench.models.command import GraspCommand
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.solution import GraspSolution
+
+from .checking import Checked, Surface, check_answer
+from .report import BenchReport, describe_place
+
+#: Wrong answers told before the rest is only counted.
+_TOLD = 5
+#: The kernels that stage `close` calls: name of the part, module, function.
+_KERNELS = (
+    ("cut", "clench.kernels.family_section", "cut_first_families"),
+    ("overlap", "clench.kernels.overlap", "find_overlaps"),
+    ("fingers", "clench.kernels.closing", "close_items"),
+)
+
+
+def bench_solve(
+    hand_model: str, object_model: str, scale: float, planes: int, count: int, passes: int, seed: int
+) -> BenchReport:
+    """Check the answers for many approach poses, then time them.
+
+    Args:
+        hand_model, object_model, scale: what is loaded. planes: per finger.
+        count: number of poses. passes: how often each is timed. seed: of the poses.
+
+    Returns:
+        the report; with errors, and without times of solves, when an answer is wrong.
+    """
+    report = BenchReport(values={"benchmark": "solve", **describe_place()})
+    hand, load_hand = _timed(lambda: clench.Hand.load(hand_model))
+    obj, load_object = _timed(lambda: clench.GraspObject.load(object_model, scale=scale))
+    poses, approach = _timed(lambda: clench.approach_poses(hand, obj, count, seed))
+    commands = [GraspCommand(hand_pose=pose, planes=planes, seed=seed) for pose in poses]
+    _, first = _timed(lambda: clench.solve(hand, obj, commands[0]))
+    _describe_problem(report, hand, obj, planes, count, passes, seed)
+    _check(report, hand, obj, commands)
+    if report.errors:
+        return report
+    # Compiling, or reading compiled code, falls into the first approach pose and the first solve.
+    for key, seconds in (
+        ("warmup_load_hand", load_hand),
+        ("warmup_load_object", load_object),
+        ("warmup_approach_poses", approach),
+        ("warmup_first_solve", first),
+    ):
+        report.values[f"{key}_s"] = seconds
+    _time_preparation(report, hand, obj, commands[0])
+    _time_solves(report, hand, obj, commands, passes)
+    _time_kernels(report, hand, obj, commands, passes)
+    return report
+
+
+def _describe_problem(
+    report: BenchReport, hand: Hand, obj: GraspObject, planes: int, count: int, passes: int, seed: int
+) -> None:
+    meshes = [shape.mesh for body in obj.bodies for shape in body.shapes if shape.mesh is not None]
+    report.values |= {
+        "hand": hand.name,
+        "fingers": len(hand.fingers),
+        "joints": len(hand.joints),
+        "degrees_of_freedom": len(hand.joints) - len(hand.couplings),
+        "object": obj.name,
+        "object_triangles": sum(len(mesh.triangles) for mesh in meshes),
+        "planes": planes,
+        "poses": count,
+        "passes": passes,
+        "seed": seed,
+    }
+
+
+def _check(report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand]) -> None:
+    checked, surface, wrong = Checked(), Surface(obj), []
+    solutions = [clench.solve(hand, obj, command) for command in commands]
+    for i, (command, solution) in enumerate(zip(commands, solutions, strict=True)):
+        again = clench.solve(hand, obj, command)
+        wrong += [f"pose {i}: {sentence}" for sentence in check_answer(solution, again, surface, checked)]
+    if not checked.contacts:
+        wrong.append("no pose gives a single contact, so nothing could be checked.")
+    report.errors += wrong[:_TOLD]
+    if len(wrong) > _TOLD:
+        report.errors.append(f"and {len(wrong) - _TOLD} more.")
+    report.values |= {
+        "answers_right": not wrong,
+        "checked_contacts": checked.contacts,
+        "worst_gap_m": checked.worst_gap,
+        "checked_surface_contacts": checked.surface_contacts,
+        "worst_surface_distance_m": checked.worst_surface,
+    }
+    _describe_answers(report, solutions)
+
+
+def _describe_answers(report: BenchReport, solutions: Sequence[GraspSolution]) -> None:
+    statuses = Counter(s.status.value for s in solutions)
+    depths = np.array([s.max_penetration or 0.0 for s in solutions])
+    for status in ("grasp", "partial", "no_contact", "blocked"):
+        report.values[f"status_{status}"] = statuses[status]
+    report.values |= {
+        "valid": sum(s.is_valid() for s in solutions),
+        "penetration_median_mm": float(np.median(depths)) * 1e3,
+        "penetration_p90_mm": float(np.percentile(depths, 90)) * 1e3,
+        "penetration_max_mm": float(depths.max()) * 1e3,
+    }
+
+
+def _time_preparation(report: BenchReport, hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
+    """Time what is computed once per hand and posture, and once per object, with everything compiled."""
+    fresh = clench.solve(replace(hand), obj, command)
+    report.values["prepare_hand_ms"] = fresh.timing["plan"] * 1e3
+    body = obj.bodies[0]
+    # A body of another name is another one, so the object is packed anew.
+    renamed = replace(obj, bodies=(replace(body, name=f"{body.name} again"), *obj.bodies[1:]))
+    report.values["prepare_object_ms"] = clench.solve(hand, renamed, command).timing["read"] * 1e3
+
+
+def _time_solves(
+    report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
+) -> None:
+    whole: list[float] = []
+    stages: dict[str, list[float]] = defaultdict(list)
+    for command in [command for _ in range(passes) for command in commands]:
+        solution, seconds = _timed(lambda command=command: clench.solve(hand, obj, command))  # type: ignore[misc]
+        whole.append(seconds)
+        for stage, taken in solution.timing.items():
+            stages[stage].append(taken)
+        stages["assemble"].append(seconds - solution.timing["total"])
+    report.distribution("solve", whole)
+    for stage, taken in stages.items():
+        if stage != "total":
+            report.values[f"stage_{stage}_median_ms"] = float(np.median(taken)) * 1e3
+
+
+def _time_kernels(
+    report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
+) -> None:
+    with _listening() as spent:
+        for command in [command for _ in range(passes) for command in commands]:
+            clench.solve(hand, obj, command)
+    for part, times in spent.items():
+        report.distribution(f"close_{part}", times)
+
+
+@contextmanager
+def _listening() -> Iterator[dict[str, list[float]]]:
+    """Put a stop watch around every kernel that stage `close` calls; the lists fill while the context lasts."""
+    import importlib
+
+    spent: dict[str, list[float]] = {part: [] for part, _, _ in _KERNELS}
+
+    def watched(kernel: Callable[..., Any], times: list[float]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            result, seconds = _timed(lambda: kernel(*arguments))
+            times.append(seconds)
+            return result
+
+        return call
+
+    places = [(part, importlib.import_module(module), name) for part, module, name in _KERNELS]
+    kept = [(module, name, getattr(module, name)) for _, module, name in places]
+    try:
+        for part, module, name in places:
+            setattr(module, name, watched(getattr(module, name), spent[part]))
+        yield spent
+    finally:
+        for module, name, kernel in kept:
+            setattr(module, name, kernel)
+
+
+def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
+    start = time.perf_counter()
+    result = call()
+    return result, time.perf_counter() - start

@@ -1,0 +1,149 @@
+"""The benchmark: it checks its answers, refuses to time wrong ones, and prints what can be read by a program."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clench
+from clench.apps.bench import solving
+from clench.apps.bench.checking import Checked, Surface, check_answer
+from clench.apps.bench.main import BENCHMARKS, main
+from clench.apps.bench.report import BenchReport, describe_place
+from clench.base.errors import CommandError, UnknownNameError
+from clench.solve.solution import GraspSolution
+from handmade import make_solution
+
+SMALL = ["solve", "--poses", "2", "--passes", "2", "--planes", "3"]
+
+
+@pytest.fixture(scope="module")
+def problem() -> tuple[clench.Hand, clench.GraspObject, GraspSolution]:
+    hand, obj = clench.Hand.load("patent15"), clench.GraspObject.load("mug")
+    pose = clench.approach_poses(hand, obj, 1, 0)[0]
+    return hand, obj, clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=2))
+
+
+def wrong(solution: GraspSolution, again: GraspSolution, obj: clench.GraspObject) -> list[str]:
+    return list(check_answer(solution, again, Surface(obj), Checked()))
+
+
+def test_solve_prints_flat_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(SMALL) == 0
+    lines = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines())
+    assert lines["answers_right"] == "True"
+    assert int(lines["checked_contacts"]) > 0
+    assert lines["fingers"] == "5"
+    assert lines["degrees_of_freedom"] == "15"
+    times = [float(lines[f"solve_{name}_ms"]) for name in ("median", "p90", "p99", "max")]
+    assert 0.0 < times[0] <= times[1] <= times[2] <= times[3]
+    for part in ("read", "plan", "close", "choose", "judge", "assemble"):
+        assert float(lines[f"stage_{part}_median_ms"]) >= 0.0
+    parts = [float(lines[f"close_{part}_median_ms"]) for part in ("cut", "overlap", "fingers")]
+    assert 0.0 < sum(parts) < 2.0 * float(lines["solve_max_ms"])
+    statuses = [int(lines[f"status_{s}"]) for s in ("grasp", "partial", "no_contact", "blocked")]
+    assert sum(statuses) == 2
+
+
+def test_solve_prints_one_json_document(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SMALL, "--object", "cylinder:r=0.03,h=0.1", "--hand", "robonaut2", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "clench.bench/1"
+    assert document["errors"] == []
+    assert document["hand"] == "robonaut2"
+    assert document["checked_surface_contacts"] == 0  # round objects have no triangles to compare with
+    assert {"commit", "python_version", "numba_version", "processor", "cores"} <= set(document)
+
+
+def test_wrong_answers_are_not_timed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(solving, "check_answer", lambda *_: iter(["a link floats."]))
+    assert main(SMALL) == 1
+    captured = capsys.readouterr()
+    assert "wrong answer: pose 0: a link floats." in captured.err
+    assert "answers_right False" in captured.out
+    assert "solve_median_ms" not in captured.out
+
+
+def test_a_right_answer_passes(problem: tuple[clench.Hand, clench.GraspObject, GraspSolution]) -> None:
+    _, obj, solution = problem
+    checked = Checked()
+    assert list(check_answer(solution, solution, Surface(obj), checked)) == []
+    assert checked.contacts >= checked.surface_contacts > 0
+
+
+def test_the_check_sees_what_is_wrong(problem: tuple[clench.Hand, clench.GraspObject, GraspSolution]) -> None:
+    _, obj, solution = problem
+    joint = next(iter(solution.joint_angles))
+    beyond = replace(solution, joint_angles={**solution.joint_angles, joint: solution.joint_limits[joint][1] + 1e-6})
+    assert any("outside its limits" in s for s in wrong(beyond, beyond, obj))
+    nan = replace(solution, joint_angles={**solution.joint_angles, joint: np.nan})
+    assert wrong(nan, nan, obj) == [f"joint_angles.{joint} is not a finite number."]
+    assert wrong(solution, replace(solution, max_penetration=1.0), obj) == ["the same question gave another answer."]
+    moved = replace(solution.contacts[0], position=solution.contacts[0].position + 0.2)
+    floating = replace(solution, contacts=(moved,))
+    assert any("from the object's surface" in s for s in wrong(floating, floating, obj))
+
+
+def test_the_check_sees_an_open_gap() -> None:
+    solution = make_solution()
+    ball = clench.GraspObject.load("sphere:r=0.03")
+    fingers = {}
+    for name, finger in solution.fingers.items():
+        opened = [replace(c, contacts=tuple(replace(t, gap=2e-9) for t in c.contacts)) for c in finger.candidates]
+        fingers[name] = replace(finger, candidates=tuple(opened))
+    opened_all = replace(solution, fingers=fingers)
+    assert any("with a gap of 2e-09 m" in s for s in wrong(opened_all, opened_all, ball))
+
+
+def test_the_surface_is_the_posed_one() -> None:
+    box = clench.GraspObject.load("box:x=0.1,y=0.1,z=0.1", pose=clench.Pose([1.0, 0.0, 0.0]))
+    assert Surface(box).distance(np.array([1.07, 0.0, 0.0])) == pytest.approx(0.02)
+    assert Surface(clench.GraspObject.load("sphere:r=0.03")).distance(np.zeros(3)) is None
+
+
+def test_the_stop_watches_are_taken_off() -> None:
+    import clench.kernels.closing as closing
+
+    kernel = closing.close_items
+    with solving._listening():
+        assert closing.close_items is not kernel
+    assert closing.close_items is kernel
+
+
+def test_distribution_is_in_milliseconds() -> None:
+    report = BenchReport()
+    report.distribution("t", [0.001] * 98 + [0.002, 0.5])
+    assert report.values["t_median_ms"] == pytest.approx(1.0)
+    assert report.values["t_p90_ms"] == pytest.approx(1.0)
+    assert report.values["t_max_ms"] == pytest.approx(500.0)
+    assert next(report.lines()) == "t_median_ms 1"
+
+
+def test_the_place_is_described() -> None:
+    place: dict[str, Any] = describe_place()
+    assert place["clench_version"] == clench.__version__
+    assert all(value != "" for value in place.values())
+    assert int(place["cores"]) >= 1
+
+
+@pytest.mark.parametrize("option", ["--planes", "--poses", "--passes"])
+def test_counts_of_nothing_are_refused(option: str) -> None:
+    with pytest.raises(CommandError, match=f"{option}: expected at least 1, got 0"):
+        main(["solve", option, "0"])
+
+
+def test_unknown_benchmark_names_those_there_are() -> None:
+    with pytest.raises(UnknownNameError, match="solve"):
+        main(["solv"])
+
+
+def test_help_lists_the_benchmarks(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert all(f"\n  {name} " in out for name in BENCHMARKS)
+    assert main(["solve", "--help"]) == 0
+    assert "--passes" in capsys.readouterr().out
