@@ -63,13 +63,14 @@ def depth_inside(shape, points):
 @given(kind=st.sampled_from(ROUND), a=LENGTH, b=LENGTH, c=LENGTH, fraction=st.floats(1e-3, 0.9))
 def test_round_shapes_are_closed_inscribed_and_within_the_deviation(kind, a, b, c, fraction):
     shape = made(kind, a, b, c)
-    deviation = fraction * min(v for v in shape.size if v > 0)
+    # Below 2e-5 of the largest size the number of facets is capped (another test); 1e-4 keeps this one small.
+    deviation = max(fraction * min(v for v in shape.size if v > 0), 1e-4 * max(shape.size))
     mesh = tessellate(shape, deviation)
     assert edge_defects(mesh.triangles).none
     assert 0 < signed_volume(mesh) < exact_volume(shape)
     scale = max(shape.size)
     assert np.abs(depth_inside(shape, mesh.vertices)).max() < 1e-12 * scale
-    weights = RNG.dirichlet(np.ones(3), size=(20, len(mesh.triangles)))
+    weights = RNG.dirichlet(np.ones(3), size=(3, len(mesh.triangles)))
     inner = np.einsum("stk,tkx->stx", weights, mesh.vertices[mesh.triangles]).reshape(-1, 3)
     depth = depth_inside(shape, inner)
     assert depth.min() > -1e-12 * scale

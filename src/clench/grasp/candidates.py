@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.base.pose import FloatArray, invert
 from clench.base.tolerances import PASSED_GAP
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole
@@ -14,6 +15,7 @@ from clench.models.objects.grasp_object import BodyRole
 from .closing import ClosedHand, HandPlan
 from .plan import FingerPlan
 from .scene import PackedObject
+from .surface import surface_normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +26,7 @@ class Touch:
         link, joint: indices in the hand: the touching link, and the leader of the group it stopped.
         body: index of the touched body. graspable: whether that body is to be grasped.
         plane: of the family. offset: its place along y [m]. kind: 0 side, 1 tip, 2 edge.
-        position: [m], normal: out of the object, unit, shape (3,). gap: at the final posture [m].
+        position: [m], normal: of the object's surface there, outward unit, shape (3,). gap: at the final posture [m].
         curve_angle: tangent angle of the object's curve [rad]. link_angle: of the touching side [rad], else None.
     """
 
@@ -98,29 +100,50 @@ def _candidate(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedH
         plane=None if plan.whole[i] else int(plan.items.low[i]),
         travel=travel,
         q=finger.angles(hand, travel),
-        touches=tuple(_touch(plan, packed, closed, i, n, entry) for n in range(closed.answer.contacts[i])),
+        touches=tuple(_touch(hand, plan, packed, closed, i, n, travel) for n in range(closed.answer.contacts[i])),
         overlap=int(plan.arrays.outlines.link[overlap]) if overlap >= 0 else None,
     )
 
 
-def _touch(plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int, entry: int) -> Touch:
+def _touch(
+    hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int, travel: FloatArray
+) -> Touch:
     answer, arrays = closed.answer, plan.arrays
-    plane, outline, kind, source, group, family = (int(v) for v in answer.hit[i, n])
-    x, z, nx, nz, cx, cz, _, gap = answer.point[i, n]
+    plane, outline, kind, source, group, family = answer.hit[i, n].tolist()
+    x, z, nx, nz, cx, cz, _, gap = answer.point[i, n].tolist()
+    entry = int(plan.items.entry[i])
     pose = answer.pose[i, family]
     offset = float(arrays.plane_offset[plane])
+    position = pose[:, :3] @ (x, offset, z) + pose[:, 3]
+    link = int(arrays.outlines.link[outline])
+    own_group, own_family = group - int(arrays.entry_group[entry]), family - int(arrays.entry_family[entry])
     body = int(packed.tree.body[source]) if source >= 0 else int(packed.rounds.body[-1 - source])
     return Touch(
-        link=int(arrays.outlines.link[outline]),
-        joint=plan.plans[entry].leaders[group - int(arrays.entry_group[entry])],
+        link=link,
+        joint=plan.plans[entry].leaders[own_group],
         body=body,
         graspable=packed.body_roles[body] is BodyRole.GRASPABLE,
         plane=plane - int(arrays.family_plane[family]),
         offset=offset,
         kind=kind,
-        position=pose[:, :3] @ np.array([x, offset, z]) + pose[:, 3],
-        normal=pose[:, :3] @ np.array([nx, 0.0, nz]),
-        gap=float(gap),
-        curve_angle=float(np.arctan2(cx, -cz)),
-        link_angle=float(np.arctan2(nx, -nz)) if kind == 0 else None,
+        position=position,
+        normal=closed.T_palm_object[:3, :3] @ surface_normal(packed, source, closed.T_palm_object, position),
+        gap=max(gap, _carried(hand, plan.plans[entry], link, own_family, travel, position)),
+        curve_angle=math.atan2(cx, -cz),
+        link_angle=math.atan2(nx, -nz) if kind == 0 else None,
     )
+
+
+def _carried(hand: Hand, plan: FingerPlan, link: int, family: int, travel: FloatArray, position: FloatArray) -> float:
+    """Return how far the joints of later families carried the point of a link that touched [m].
+
+    Their planes are not those of the touch, so its outline does not tell; the distance is an upper bound of the gap.
+    """
+    later = {p.group for p in plan.joints if p.family > family and travel[p.group] > 0.0}
+    if not later:
+        return 0.0
+    before = travel.copy()
+    before[list(later)] = 0.0
+    T_before, T_after = (hand.link_poses(plan.angles(hand, s))[link] for s in (before, travel))
+    moved = (T_after @ invert(T_before) @ np.append(position, 1.0))[:3]
+    return float(np.linalg.norm(moved - position))

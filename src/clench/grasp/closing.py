@@ -51,12 +51,13 @@ class ClosedHand:
 
     Args:
         answer: per item, see `ClosingArrays`. overlaps: per entry, an outline that overlaps at the start, or -1.
-        sections: of every entry's first family.
+        sections: of every entry's first family. T_palm_object: where the object is, shape (4, 4).
     """
 
     answer: ClosingArrays
     overlaps: np.ndarray
     sections: SectionArrays
+    T_palm_object: FloatArray
 
 
 def make_hand_plan(
@@ -104,7 +105,7 @@ def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, 
             close_items(plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer)
             wanted = int(answer.overflow.max(initial=0))
             if not wanted:
-                return ClosedHand(answer, overlaps, shared)
+                return ClosedHand(answer, overlaps, shared, T_palm_object)
         capacity = 2 * wanted
 
 

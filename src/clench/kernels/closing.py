@@ -39,7 +39,7 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .outline_gap import core_distance, outline_distance
+from .outline_gap import core_distance, outline_distance, point_segment
 from .tree import MeshTree
 
 
@@ -84,7 +84,8 @@ def touch_segment(
         else:
             nx, nz = (-cx, -cz) if which == 1 else (cx, cz)
             w = outlines.radius[o]
-            ox, oz = vx - w * nx, vz - w * nz
+            # At a grazing touch the foot is known to the root of the tolerance only: keep the point on the segment.
+            _, ox, oz = point_segment(vx - w * nx, vz - w * nz, segment[0], segment[1], segment[2], segment[3])
     if cx * nx + cz * nz < 0.0:
         cx, cz = -cx, -cz
     return ox, oz, nx, nz, cx, cz

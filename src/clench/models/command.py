@@ -36,6 +36,7 @@ class GraspCommand:
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
         check_sets: measure the penetration of every alternative set, which costs more than the solve.
+        measure: measure the penetration of the chosen set over the whole width, which costs as much as the solve.
         collision_source: geometry of the hand; None is the hand's default.
         criteria: weights by criterion name; None is the default calibration. A path names a calibration file.
         seed: recorded with the result; nothing random depends on it.
@@ -53,6 +54,7 @@ class GraspCommand:
     yaw_grid: tuple[float, ...] = (0.0,)
     open_variants: tuple[float, ...] = (0.0,)
     check_sets: bool = False
+    measure: bool = True
     collision_source: CollisionSource | None = None
     criteria: Mapping[str, float] | Path | None = None
     seed: int | None = None

@@ -28,7 +28,7 @@ LIMIT_TOLERANCE: Final = 1e-9
 
 KEYS: Final = (
     *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "planes", "full_width"),
-    *("yaw_grid", "open_variants", "collision_source", "criteria", "seed"),
+    *("yaw_grid", "open_variants", "check_sets", "measure", "collision_source", "criteria", "seed"),
 )
 
 
@@ -162,6 +162,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "yaw_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
         "open_variants": lambda v, key: _numbers(v, key, "offsets in rad"),
         "check_sets": _flag,
+        "measure": _flag,
         "collision_source": lambda v, key: _choice(v, CollisionSource, key),
         "criteria": lambda v, key: _criteria(v, key, folder),
         "seed": _whole,

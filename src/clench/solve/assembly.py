@@ -39,14 +39,15 @@ class Answer:
     Args:
         fingers: candidates of each finger that closes. chosen: index of the chosen one of each.
         final: posture of the hand, shape (J,) [rad].
-        at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the end.
+        at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the
+            end; None when not measured.
     """
 
     fingers: Sequence[Sequence[FingerCandidate]]
     chosen: Sequence[int]
     final: FloatArray
     at_start: Sequence[LinkDepth]
-    at_end: Sequence[LinkDepth]
+    at_end: Sequence[LinkDepth] | None
 
     @property
     def best(self) -> list[FingerCandidate]:
@@ -84,7 +85,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         certified=False,
         collision_source=str(problem.source),
         object_collision_source=str(problem.obj.collision_source),
-        max_penetration=max((d.depth for d in answer.at_end), default=0.0),
+        max_penetration=None if answer.at_end is None else max((d.depth for d in answer.at_end), default=0.0),
         fingers=results,
         contacts=tuple(c for r in results.values() if r.candidates for c in r.candidates[r.chosen].contacts),
         timing=dict(timing),

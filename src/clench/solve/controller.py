@@ -168,7 +168,11 @@ def judge_answer(
     at_start = hand_depths(
         hand, problem.start, problem.packed, problem.T_palm_object, problem.source, links=hand.fixed_links
     )
-    at_end = hand_depths(hand, final, problem.packed, problem.T_palm_object, problem.source)
+    at_end = (
+        hand_depths(hand, final, problem.packed, problem.T_palm_object, problem.source)
+        if problem.command.measure
+        else None
+    )
     return Answer(fingers, chosen, final, at_start, at_end)
 
 

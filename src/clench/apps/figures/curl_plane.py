@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -29,28 +30,29 @@ _MARGIN: Final = 62
 def draw_finger(scenes: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
     """Write the curl-plane figure of a finger's chosen set."""
     shown = [scenes.scene(family, plane) for family, plane in scenes.touched_planes(MOST_PANELS)]
-    figure, panels = _panels(shown)
+    text = 370.0 + 37.0 * (len(scenes.plan.joints) + len(scenes.contacts))
+    figure, panels = _panels(shown, text)
     low, high = bounds(shown)
     for axes, scene in zip(panels, shown, strict=True):
         draw_plane(axes, scene)
         frame_plane(axes, low, high)
-        axes.set_title(plane_title(scene, len(scenes.plan.families)), fontsize=11, loc="left", color=style.INK, y=1.0)
+        axes.set_title(plane_title(scene, len(scenes.plan.families)), fontsize=10.5, loc="left", color=style.INK, y=1.0)
         axes.set_xlabel("x, in the plane [mm]", fontsize=9)
     panels[0].set_ylabel("z, the way the finger closes [mm]", fontsize=9)
     width = figure.get_figwidth() * style.DPI
-    title = f"Finger '{result.name}' of {hand} closing on {obj}, seen across its curl plane"
+    title = f"Finger '{result.name}' of {hand} closing on {obj}, seen along y, across its curl planes"
     style.write(figure, _MARGIN / width, 0.975, title, fontsize=14, fontweight="bold", va="top")
     _explain(figure, scenes, shown, result, 1.0 - _TEXT_WIDTH / width)
     return style.save_figure(figure, path)
 
 
-def _panels(shown: Sequence[PlaneScene]) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one panel per plane, as large as its 1600 pixels allow, and room for text on the right."""
+def _panels(shown: Sequence[PlaneScene], text: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with one panel per plane, as large as 1600 pixels allow, beside a column of text of a height."""
     low, high = bounds(shown)
     aspect = float((high[1] - low[1]) / (high[0] - low[0]))
     count = len(shown)
     each = min(820.0, (1600.0 - _TEXT_WIDTH - _MARGIN) / count - 30.0)
-    tall = float(np.clip(each * aspect, 430.0, 700.0))
+    tall = float(np.clip(each * aspect, max(430.0, text - 150.0), 700.0))
     each = min(each, max(tall / aspect, 300.0))
     width = _MARGIN + count * (each + 30.0) + _TEXT_WIDTH
     height = tall + 150.0
@@ -66,8 +68,13 @@ def _panels(shown: Sequence[PlaneScene]) -> tuple[Figure, list[Axes]]:
 
 def plane_title(scene: PlaneScene, families: int) -> str:
     """Return a title that says which plane is seen."""
-    family = f", joints {', '.join(j.name for j in scene.joints)}" if families > 1 else ""
-    return f"plane {scene.plane + 1} of {scene.planes}, at y = {scene.offset * _MM:+.1f} mm across the finger{family}"
+    place = f"plane {scene.plane + 1} of {scene.planes}, y = {scene.offset * _MM:+.1f} mm"
+    if families == 1:
+        return place
+    names = ", ".join(j.name for j in scene.joints)
+    return (
+        f"{place}\nturned by {names if len(names) < 40 else f'{len(scene.joints)} joints from {scene.joints[0].name}'}"
+    )
 
 
 def frame_plane(axes: Axes, low: FloatArray, high: FloatArray) -> None:
@@ -190,7 +197,8 @@ def _angle_label(axes: Axes, joint: JointMotion, scene: PlaneScene) -> None:
     """Write a joint's angle beside it, on the outer side of the finger, where no wedge is."""
     color = style.mixed(style.joint_color(joint.position), "#000000", 0.25)
     away = outer_side(joint, scene.joints)
-    borders = [loop.points for link in scene.closed_links if link.joint == joint.position for loop in link.loops]
+    near = (joint.position, joint.position - 1)
+    borders = [loop.points for link in scene.closed_links if link.joint in near for loop in link.loops]
     thickness = float(((np.vstack(borders) - joint.pivot) @ away).max()) if borders else 0.0
     axes.annotate(
         f"{np.degrees(joint.angle):.1f}°",
@@ -278,7 +286,7 @@ def _explain(
     line("Joint angles", fontsize=11, fontweight="bold")
     for joint in (j for f in range(len(scenes.plan.families)) for j in scenes.scene(f, 0, with_open=False).joints):
         color = style.mixed(style.joint_color(joint.position), "#000000", 0.2)
-        line(joint.name, 17.0, color=color, fontweight="bold")
+        line(f"joint {joint.name}", 17.0, color=color, fontweight="bold")
         line(
             f"   open {_deg(joint.open_angle)}  →  closed {_deg(joint.angle)}   (limit {_deg(joint.limit)})",
             20.0,
@@ -294,7 +302,8 @@ def _explain(
         line(f"{c.number + 1}  {c.contact.link}", 17.0, color=style.CONTACT, fontweight="bold")
         line(f"    {_KIND[c.contact.kind.value]}, {where}{stops}{passed}", 20.0, fontsize=9.5)
     if not scenes.contacts:
-        line(f"none: {result.reason}"[:60], fontsize=9.5)
+        for text in textwrap.wrap(f"none: {result.reason}", 58)[:4]:
+            line(text, 16.0, fontsize=9.5)
     top -= 6.0
     line(f"Chosen set: {set_name(scenes.candidate)}", fontsize=11, fontweight="bold", color=style.CHOSEN)
     for text in _meaning(scenes.candidate):
@@ -337,7 +346,7 @@ def _legend(figure: Figure, left: float) -> None:
     blue = style.JOINT_COLORS[0]
     handles: list[Any] = [
         Patch(facecolor=style.OBJECT_FILL, edgecolor=style.OBJECT_EDGE, label="object, cut by the plane"),
-        Patch(facecolor=style.PALM_FILL, edgecolor=style.FAINT, label="palm, and parts that stand still"),
+        Patch(facecolor=style.PALM_FILL, edgecolor=style.FAINT, label="palm, and links that these joints do not move"),
         Patch(
             facecolor=style.mixed(blue, style.PAPER, 0.93),
             edgecolor=style.mixed(blue, style.PAPER, 0.5),

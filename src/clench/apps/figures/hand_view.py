@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,61 +11,36 @@ from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.models.mesh import TriangleMesh
-from clench.models.objects.grasp_object import BodyRole, GraspObject
-from clench.models.shapes import CollisionSource, ShapeKind
+from clench.models.objects.grasp_object import GraspObject
 from clench.solve.solution import Contact, GraspSolution
 
 from . import style
 from .raster import Camera, Image, Picture, borders, halved, look_along, rasterise, shade
+from .surfaces import COARSE, OBJECT_COLOR, PALM_COLOR, Surface, hand_surface, object_surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Meshes of more triangles are thinned out before they are drawn.
-MOST_TRIANGLES: Final = 120_000
 _VIEW: Final = (590, 620)
 _TEXT: Final = 330
 _GAP: Final = 20
 _TOP: Final = 70
 _BOTTOM: Final = 60
-#: Round shapes are drawn with facets off by at most this [m].
-_DEVIATION: Final = 5e-5
-#: The same while looking for viewpoints [m].
-_COARSE: Final = 5e-4
 #: A contact farther than this behind the nearest surface is hidden [m].
 _HIDDEN: Final = 2e-3
 _ARROW: Final = 0.016
 #: How much of the hand shows through the object in front of it [-].
 _THROUGH: Final = 0.3
-_OBJECT: Final = "#e3cf92"
-_OBSTACLE: Final = "#c4c4c4"
-_PALM: Final = "#a9b0b7"
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Hold triangles to draw.
-
-    Args:
-        corners: in the world [m], shape (T, 3, 3). normals: unit, shape (T, 3). colors: shape (T, 3).
-        groups: number of the body of each triangle, shape (T,).
-    """
-
-    corners: FloatArray
-    normals: FloatArray
-    colors: FloatArray
-    groups: NDArray[np.int64]
 
 
 def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path) -> Path:
     """Write a figure of the closed hand on the object from two sides, with every contact and its normal."""
     body, things = hand_surface(hand, solution), object_surface(obj, solution)
     figure, views = _layout()
-    focus = _focus(body, things)
-    coarse = np.concatenate([hand_surface(hand, solution, _COARSE).corners, things.corners])
-    directions = viewpoints(coarse, focus, solution)
+    coarse = (hand_surface(hand, solution, COARSE).corners, object_surface(obj, solution, COARSE).corners)
+    focus = _focus(*coarse)
+    directions = viewpoints(*coarse, focus, solution)
     scale = min(_camera(d, focus, _VIEW).scale for d in directions)
     for axes, direction in zip(views, directions, strict=True):
         image, nearness = render(body, things, _camera(direction, focus, (2 * _VIEW[0], 2 * _VIEW[1]), 2.0 * scale))
@@ -82,90 +56,9 @@ def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path)
     return style.save_figure(figure, path)
 
 
-def hand_surface(hand: Hand, solution: GraspSolution, deviation: float = _DEVIATION) -> Surface:
-    """Return the hand's geometry at the chosen joint angles, each finger's links in the colours of their joints."""
-    source = CollisionSource(solution.collision_source)
-    q = np.array([solution.joint_angles.get(j.name, j.open_value) for j in hand.joints])
-    poses = solution.hand_pose.matrix @ hand.link_poses(q)
-    colors = link_colors(hand)
-    parts = []
-    for i, link in enumerate(hand.links):
-        for shape in link.shapes.get(source, ()):
-            parts.append((_placed(shape.to_mesh(deviation), poses[i]), colors[i], i))
-    return _surface(parts)
-
-
-def link_colors(hand: Hand) -> list[str]:
-    """Return the colour of every link: of the closing joint that moves it, as in the planar figures, or grey."""
-    colors = [_PALM] * len(hand.links)
-    for finger in hand.fingers:
-        closing = [j for j in finger.joints if hand.joints[j].role.value == "closing"]
-        for i in finger.links:
-            k = i
-            while k >= 0 and hand.links[k].joint not in closing:
-                k = hand.links[k].parent
-            if k >= 0:
-                color = style.joint_color(closing.index(hand.links[k].joint))
-                colors[i] = style.mixed(color, style.PAPER, 0.3)
-    return colors
-
-
-def object_surface(obj: GraspObject, solution: GraspSolution) -> Surface:
-    """Return the geometry of the object and its obstacles where the solution has it."""
-    from clench.models.tessellation import convex_hull
-
-    T = solution.object_pose.matrix
-    engine = solution.object_collision_source == CollisionSource.ENGINE.value
-    parts = []
-    for number, body in enumerate(obj.bodies):
-        color = _OBSTACLE if body.role is BodyRole.OBSTACLE else _OBJECT
-        for shape in body.shapes:
-            if shape.kind is ShapeKind.MESH and engine and shape.mesh is not None:
-                mesh = convex_hull(shape.mesh).transformed(shape.pose)
-            else:
-                mesh = shape.to_mesh(_DEVIATION)
-            parts.append((_placed(thinned(mesh, MOST_TRIANGLES), T), color, 10_000 + number))
-    return _surface(parts)
-
-
-def thinned(mesh: TriangleMesh, most: int) -> TriangleMesh:
-    """Return a mesh with fewer triangles: vertices of the same cell of a grid become one, until it is small enough."""
-    cells = 512
-    while len(mesh.triangles) > most and cells >= 16:
-        low = mesh.vertices.min(axis=0)
-        size = float(np.ptp(mesh.vertices, axis=0).max()) or 1.0
-        cell = np.floor((mesh.vertices - low) / size * cells).astype(np.int64)
-        _, kept, index = np.unique(cell, axis=0, return_index=True, return_inverse=True)
-        triangles = index.ravel()[mesh.triangles]
-        a, b, c = triangles.T
-        mesh = TriangleMesh(mesh.vertices[kept], triangles[(a != b) & (b != c) & (c != a)])
-        cells //= 2
-    return mesh
-
-
-def _placed(mesh: TriangleMesh, T: FloatArray) -> FloatArray:
-    corners: FloatArray = (mesh.vertices @ T[:3, :3].T + T[:3, 3])[mesh.triangles]
-    return corners
-
-
-def _surface(parts: Sequence[tuple[FloatArray, str, int]]) -> Surface:
-    counts = [len(corners) for corners, _, _ in parts]
-    corners = np.concatenate([c for c, _, _ in parts]) if parts else np.empty((0, 3, 3))
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sizes = np.linalg.norm(normals, axis=1)
-    rgb = np.array([[int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)] for _, color, _ in parts]).reshape(-1, 3)
-    groups = np.array([g for _, _, g in parts], dtype=np.int64)
-    return Surface(
-        corners,
-        normals / np.where(sizes > 0.0, sizes, 1.0)[:, None],
-        np.repeat(rgb, counts, axis=0),
-        np.repeat(groups, counts),
-    )
-
-
-def _focus(body: Surface, things: Surface) -> FloatArray:
+def _focus(body: FloatArray, things: FloatArray) -> FloatArray:
     """Return the points that must be seen: the hand, and the object as far as it is near the hand, shape (N, 3)."""
-    hand, others = body.corners.reshape(-1, 3), things.corners.reshape(-1, 3)
+    hand, others = body.reshape(-1, 3), things.reshape(-1, 3)
     if not len(hand) or not len(others):
         return hand if len(hand) else others
     low, high = hand.min(axis=0), hand.max(axis=0)
@@ -185,27 +78,34 @@ def _camera(towards: FloatArray, focus: FloatArray, size: tuple[int, int], scale
     return Camera(right, up, back, center, scale or fitting, *size)
 
 
-def viewpoints(corners: FloatArray, focus: FloatArray, solution: GraspSolution) -> list[FloatArray]:
-    """Choose two directions that show most contacts, at least 60 degrees from each other."""
-    azimuth = np.arange(12) * (np.pi / 6.0)
-    heights = np.where(np.arange(12) % 2 == 0, 0.35, 0.75)
+def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution: GraspSolution) -> list[FloatArray]:
+    """Choose two directions that show contacts and object well, at least 60 degrees from each other.
+
+    Args:
+        body, things: corners of hand and object [m], shape (T, 3, 3). focus: points that must be seen, shape (N, 3).
+    """
+    azimuth = np.arange(16) * (np.pi / 8.0)
+    heights = np.array([0.3, 0.7, 0.0, -0.4])[np.arange(16) % 4]
     level = np.sqrt(1.0 - heights**2)
     directions = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
     points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
-    scores = np.array([_score(corners, _camera(d, focus, (140, 140)), points) for d in directions])
+    corners = np.concatenate([body, things])
+    scores = np.array([_score(corners, len(body), _camera(d, focus, (140, 140)), points) for d in directions])
     first = int(np.argmax(scores))
     apart = directions @ directions[first] < 0.5
     second = int(np.argmax(np.where(apart, scores, -np.inf)))
     return [directions[first], directions[second]]
 
 
-def _score(corners: FloatArray, camera: Camera, points: FloatArray) -> float:
-    """Return how well a view shows contacts: the number not hidden, and a little for how wide they spread."""
-    if not len(points):
-        return float(np.count_nonzero(rasterise(corners, camera).triangle >= 0))
-    seen = ~_hidden(rasterise(corners, camera).nearness, camera, points)
-    spread = float(np.ptp(camera.project(points)[:, :2], axis=0).sum()) / camera.width
-    return float(seen.sum()) + spread
+def _score(corners: FloatArray, hand: int, camera: Camera, points: FloatArray) -> float:
+    """Return how well a view shows a grasp: share of contacts not hidden, their spread, share of the object in it."""
+    picture = rasterise(corners, camera)
+    seen = int(np.count_nonzero(picture.triangle >= 0))
+    score = int(np.count_nonzero(picture.triangle >= hand)) / max(seen, 1)
+    if len(points):
+        score += float((~_hidden(picture.nearness, camera, points)).mean())
+        score += float(np.ptp(camera.project(points)[:, :2], axis=0).sum()) / camera.width
+    return score
 
 
 def _hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray[np.bool_]:
@@ -317,7 +217,7 @@ def _world_axes(axes: Axes, camera: Camera) -> None:
     origin = np.array([46.0, _VIEW[1] - 46.0])
     for name, axis in zip("xyz", np.eye(3), strict=True):
         step = 32.0 * np.array([axis @ camera.right, -(axis @ camera.up)])
-        if np.linalg.norm(step) < 6.0:
+        if np.linalg.norm(step) < 14.0:
             continue  # it points at the viewer
         arrow = {"arrowstyle": "-|>", "color": style.FAINT, "lw": 1.2, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tuple(origin + step), tuple(origin), arrowprops=arrow)
@@ -336,7 +236,7 @@ def _scale_bar(axes: Axes, scale: float) -> None:
 def _explain(figure: Figure, hand: Hand, solution: GraspSolution) -> None:
     width, height = figure.get_size_inches() * style.DPI
     left = (2 * _VIEW[0] + 3 * _GAP) / width
-    title = f"{solution.hand} holding {solution.object}: the closed hand from two sides"
+    title = f"{solution.hand} and {solution.object}: the closed hand from two sides"
     style.write(figure, _GAP / width, 1.0 - 16 / height, title, fontsize=14, fontweight="bold", va="top")
     text = str(solution.reason.get("text", ""))
     answer = f"{solution.status.value.replace('_', ' ')}{': ' if text else ''}{text}"
@@ -363,12 +263,12 @@ def _legend(figure: Figure, left: float) -> None:
     from matplotlib.patches import Patch
 
     names = ("first closing joint", "second", "third")
-    handles: list[Any] = [Patch(facecolor=_PALM, label="palm and what does not close")]
+    handles: list[Any] = [Patch(facecolor=PALM_COLOR, label="palm and what does not close")]
     for k, name in enumerate(names):
         color = style.mixed(style.joint_color(k), style.PAPER, 0.3)
         handles.append(Patch(facecolor=color, label=f"links after the {name}" + ("" if k == 0 else " closing joint")))
     handles += [
-        Patch(facecolor=_OBJECT, label="object (the hand shows through)"),
+        Patch(facecolor=OBJECT_COLOR, label="object (the hand shows through)"),
         Line2D([], [], color=style.CONTACT, marker="o", ls="", label="contact, and its number"),
         Line2D([], [], color=style.CONTACT, marker="o", mfc=style.PAPER, ls="", label="contact, hidden from this side"),
         Line2D([], [], color=style.CONTACT, marker=r"$\rightarrow$", ms=12, ls="", label="normal, out of the object"),

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from clench.base.pose import FloatArray, invert
-from clench.grasp.motion import alternatives
-from clench.grasp.outlines import cut_shape
-from clench.grasp.plan import FingerPlan, plan_finger
-from clench.grasp.scene import PackedObject, pack_object
+from clench.grasp.outlines import cut_shape, extent
+from clench.grasp.plan import FingerPlan
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
-from clench.models.shapes import CollisionSource
+from clench.solve.controller import make_problem, plan_hand
 from clench.solve.solution import Candidate, Contact, GraspSolution
 
 from .loops import Loop, join_segments, outline_loops
+
+#: Links that end sooner than this after their joint are drawn as if they reached so far [m].
+_SHORT: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,17 +115,15 @@ class FingerScenes:
         name: str,
         candidate: Candidate,
     ) -> None:
+        problem = make_problem(hand, obj, command)
         self.hand, self.solution = hand, solution
-        self.source = CollisionSource(solution.collision_source)
-        self.packed: PackedObject = pack_object(replace(obj, collision_source=_object_source(obj, solution)))
+        self.source, self.packed = problem.source, problem.packed
         self.T_palm_world = invert(solution.hand_pose.matrix)
         self.T_palm_object = self.T_palm_world @ solution.object_pose.matrix
-        finger = hand.finger(name)
-        start = _posture(hand, solution, solution.open_angles)
-        postures = alternatives(hand, finger, start, command)
-        posture = postures[min(candidate.posture, len(postures) - 1)]
-        self.plan: FingerPlan = plan_finger(hand, finger, posture, command.planes, self.source)
-        self.poses_open = hand.link_poses(posture)
+        # The planes that the solve used: planned once for a hand and a posture, and kept.
+        plans = [plan for plan in plan_hand(problem).plans if plan.finger.name == name]
+        self.plan: FingerPlan = plans[min(candidate.posture, len(plans) - 1)]
+        self.poses_open = hand.link_poses(self.plan.posture)
         self.moved_by = self._moved_by()
         self._palms: dict[float, tuple[Loop, ...]] = {}
         self._close(candidate)
@@ -241,7 +241,9 @@ class FingerScenes:
         loops = []
         for i in sorted(still | before):
             for shape in self.hand.links[i].shapes.get(self.source, ()):
-                outline = cut_shape(shape, T_family_palm @ self.poses_closed[i], offset)
+                T = T_family_palm @ self.poses_closed[i]
+                low, high = extent(shape, T)
+                outline = cut_shape(shape, T, offset) if low <= offset <= high else None
                 loops += outline_loops(outline) if outline is not None else []
         if family == 0:  # the first family's planes stand still, so every set sees the same
             self._palms[offset] = tuple(loops)
@@ -295,17 +297,13 @@ class FingerScenes:
     def _tip(self, family: int, joint: int, places: dict[int, tuple[FloatArray, float]]) -> FloatArray:
         """Return the point farthest from a joint on the links that it moves, over all planes, at the end."""
         pivot, total = places[joint]
-        best = np.array([1e-3, 0.0])
+        best = np.array([_SHORT, 0.0])
         for row in self.plan.families[family].outlines:
             for item in row:
-                if item.joint == joint and len(item.outline.vertices):
+                if item.joint == joint == self.moved_by[item.link] and len(item.outline.vertices):
                     far = item.outline.vertices[np.argmax(np.linalg.norm(item.outline.vertices, axis=1))]
                     best = max(best, far, key=lambda v: float(np.linalg.norm(v)))
         return pivot + _turned(best, total)
-
-
-def _object_source(obj: GraspObject, solution: GraspSolution) -> CollisionSource:
-    return CollisionSource(solution.object_collision_source or obj.collision_source)
 
 
 def _posture(hand: Hand, solution: GraspSolution, angles: Mapping[str, float]) -> FloatArray:
@@ -322,7 +320,7 @@ def bounds(scenes: Sequence[PlaneScene]) -> tuple[FloatArray, FloatArray]:
     """Return the corners of a box around the finger, open and closed, and the part of the object within its reach."""
     loops = [loop for s in scenes for link in (*s.open_links, *s.closed_links) for loop in link.loops]
     points = [loop.points for loop in loops]
-    points += [np.array([j.pivot]) for s in scenes for j in s.joints]
+    points += [np.array([j.pivot, j.pivot + 0.7 * _turned(j.arm, -j.turn)]) for s in scenes for j in s.joints]
     points += [np.array([c.point]) for s in scenes for c in s.contacts]
     links = np.vstack(points)
     low, high = links.min(axis=0), links.max(axis=0)

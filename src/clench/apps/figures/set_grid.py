@@ -95,7 +95,7 @@ def _busiest_family(scenes: FingerScenes) -> int:
 
 def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) -> None:
     """Title a panel, write its joint angles, and frame the chosen one."""
-    where = "" if candidate.offset is None else f" (y = {candidate.offset * 1e3:+.1f} mm)"
+    where = "" if candidate.plane is None else f" (y = {scene.offset * 1e3:+.1f} mm)"
     title = f"{set_name(candidate)}{where}"
     color = style.CHOSEN if chosen else style.INK
     axes.set_title(
@@ -117,7 +117,7 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
             label = style.write(axes, x, -down / box.height, text, fontsize=size, color=shade, fontweight="bold")
             label.set(transform=axes.transAxes, va="top")
     for i, text in enumerate(_verdict(candidate)):
-        label = style.write(axes, 0.0, -(37.0 + 15.0 * i) / box.height, text, fontsize=9)
+        label = style.write(axes, 0.0, -(37.0 + 15.0 * i) / box.height, text, fontsize=8.5)
         label.set(transform=axes.transAxes, va="top")
 
 
