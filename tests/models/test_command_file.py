@@ -37,6 +37,8 @@ def test_a_full_file_is_read_and_written_back(tmp_path):
         "full_width": False,
         "yaw_grid": [0.0, -0.1],
         "open_variants": [0.0, 0.2],
+        "check_sets": True,
+        "measure": False,
         "collision_source": "raw",
         "criteria": {"range_of_motion": 1, "limit_distance": 0.5},
         "seed": 7,

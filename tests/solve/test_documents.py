@@ -199,7 +199,8 @@ def with_chosen(**changes: object) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"max_penetration": 1.1e-6}, "penetrates the object by 1.1e-06 m"),
+        ({"max_penetration": 1.1e-6, "certified": True}, "penetrates the object by 1.1e-06 m"),
+        ({"max_penetration": 1.1e-3}, "penetrates the object by 0.0011 m"),
         ({"joint_limits": {"index_curl": (0.0, 0.3)}}, "Joint 'index_curl' is at 0.333333 rad, outside its limits"),
         (with_chosen(feasible=False, penetration=2e-3), "finger 'index' is not feasible: .* by 0.002 m"),
         (with_chosen(joint_angles={"index_curl": 0.1}), "Joint 'index_curl' is at 0.333333333 rad in the solution"),

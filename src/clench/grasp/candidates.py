@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +14,7 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole
 
 from .closing import ClosedHand, HandPlan
+from .depths import LinkDepth
 from .plan import FingerPlan
 from .scene import PackedObject
 from .surface import surface_normal
@@ -57,7 +59,8 @@ class FingerCandidate:
         plan: the finger at its posture. posture: index of the posture alternative.
         plane: index, or None for the full width. travel: of the plan's groups [rad].
         q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
-        touches: in stage order. overlap: link that overlaps the object at the start, or None.
+        touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
+            or None; then nothing moves.
         feasible, penetration: None when not checked. scores: criterion name to value.
     """
 
@@ -67,7 +70,7 @@ class FingerCandidate:
     travel: FloatArray
     q: FloatArray
     touches: tuple[Touch, ...]
-    overlap: int | None
+    overlap: LinkDepth | None
     feasible: bool | None = None
     penetration: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
@@ -83,25 +86,35 @@ class FingerCandidate:
         return tuple(t for t in self.touches if t.graspable and not t.passed)
 
 
-def read_candidates(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand) -> list[FingerCandidate]:
-    """Return one candidate per item, in item order."""
-    return [_candidate(hand, plan, packed, closed, i) for i in range(len(plan.items.entry))]
+def read_candidates(
+    hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, overlaps: Sequence[LinkDepth | None]
+) -> list[FingerCandidate]:
+    """Return one candidate per item, in item order; `overlaps` as `start_overlaps` gives them, per entry."""
+    return [_candidate(hand, plan, packed, closed, overlaps, i) for i in range(len(plan.items.entry))]
 
 
-def _candidate(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int) -> FingerCandidate:
+def _candidate(
+    hand: Hand,
+    plan: HandPlan,
+    packed: PackedObject,
+    closed: ClosedHand,
+    overlaps: Sequence[LinkDepth | None],
+    i: int,
+) -> FingerCandidate:
     entry = int(plan.items.entry[i])
     finger = plan.plans[entry]
     first, last = plan.arrays.entry_group[entry : entry + 2]
-    travel = closed.answer.travel[i, first:last].copy()
-    overlap = int(closed.overlaps[entry])
+    overlap = overlaps[entry]
+    travel = np.zeros(last - first) if overlap else closed.answer.travel[i, first:last].copy()
+    contacts = 0 if overlap else closed.answer.contacts[i]
     return FingerCandidate(
         plan=finger,
         posture=plan.posture[entry],
         plane=None if plan.whole[i] else int(plan.items.low[i]),
         travel=travel,
         q=finger.angles(hand, travel),
-        touches=tuple(_touch(hand, plan, packed, closed, i, n, travel) for n in range(closed.answer.contacts[i])),
-        overlap=int(plan.arrays.outlines.link[overlap]) if overlap >= 0 else None,
+        touches=tuple(_touch(hand, plan, packed, closed, i, n, travel) for n in range(contacts)),
+        overlap=overlap,
     )
 
 

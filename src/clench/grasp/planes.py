@@ -51,21 +51,21 @@ def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
             inset = EDGE_INSET * (b - a)
             offsets += [a + inset, b - inset]
     offsets.sort()
-    kept = [offsets[0]]
+    groups: list[list[float]] = [[offsets[0]]]
     for offset in offsets[1:]:
-        if offset - kept[-1] > _SAME * width:
-            kept.append(offset)
-    return np.array(kept)
+        if offset - groups[-1][0] > _SAME * width:
+            groups.append([])
+        groups[-1].append(offset)
+    # The middle of each group, so that a mirrored hand gets mirrored planes.
+    return np.array([0.5 * (g[0] + g[-1]) for g in groups])
 
 
 def refined(offsets: FloatArray, count: int) -> FloatArray:
-    """Return at least `count` planes, by halving the widest gaps, so that all families of a finger have as many."""
-    result = list(offsets)
-    while len(result) < count:
-        gaps = np.diff(result)
-        if not len(gaps) or gaps.max() <= 0.0:
-            result.append(result[-1])
-            continue
-        i = int(np.argmax(gaps))
-        result.insert(i + 1, 0.5 * (result[i] + result[i + 1]))
-    return np.array(result)
+    """Return `count` planes: the given ones, and as many evenly spaced ones as are missing.
+
+    All families of a finger have as many, so that plane k means the same part of the width in each. A plane that
+    comes up twice is harmless.
+    """
+    missing = count - len(offsets)
+    between = np.linspace(offsets[0], offsets[-1], missing + 2)[1:-1]
+    return np.sort(np.concatenate([offsets, between]))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clench.base.pose import FloatArray
+from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate, Touch
 from clench.grasp.depths import LinkDepth, retreat_distance
 from clench.grasp.motion import asked_fingers, decompose
@@ -140,8 +141,7 @@ def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
 def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, str]:
     hand, name = problem.hand, c.plan.finger.name
     if c.overlap is not None:
-        link = hand.links[c.overlap].name
-        return FingerStatus.BLOCKED, f"{link} overlaps {problem.obj.name} before {name} moves."
+        return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} before {name} moves."
     if c.holding:
         links = list(dict.fromkeys(hand.links[t.link].name for t in c.holding))
         return FingerStatus.TOUCH, f"{', '.join(links)} touches {problem.packed.body_names[c.holding[0].body]}."
@@ -161,13 +161,12 @@ def _status(
     answer: Answer, results: Mapping[str, FingerResult], problem: Problem
 ) -> tuple[SolutionStatus, dict[str, Any]]:
     deepest = max(answer.at_start, key=lambda d: d.depth, default=None)
-    if deepest is not None and deepest.depth > 0.0:
+    if deepest is not None and deepest.depth > ALLOWED_PENETRATION:
         return SolutionStatus.BLOCKED, _overlap_reason(deepest, problem)
     statuses = [r.status for r in results.values()]
     if all(s is FingerStatus.BLOCKED for s in statuses):
-        reasons = [_finger_overlap(c, problem) for c in answer.best]
-        worst = max(reasons, key=lambda r: float(r.get("depth") or 0.0))
-        return SolutionStatus.BLOCKED, {**worst, "retreat": _retreat(problem)}
+        worst = max((c.overlap for c in answer.best if c.overlap), key=lambda d: d.depth)
+        return SolutionStatus.BLOCKED, _overlap_reason(worst, problem)
     touching = [r.name for r in results.values() if r.status is FingerStatus.TOUCH]
     if not touching:
         text = "No finger touches: " + " ".join(r.reason for r in results.values())
@@ -183,30 +182,22 @@ def _status(
 
 
 def _overlap_reason(found: LinkDepth, problem: Problem) -> dict[str, Any]:
-    link = problem.hand.links[found.link].name
     retreat = _retreat(problem)
     place = None if found.place is None else problem.T_world_object.apply(found.place).tolist()
     text = (
-        f"{link} overlaps {problem.obj.name} by {found.depth * 1e3:.2f} mm before anything moves; "
-        f"moving the hand back along its palm normal by {retreat * 1e3:.2f} mm frees it."
+        f"{_overlap_text(found, problem)} before anything moves; moving the hand back along its palm normal "
+        f"by {retreat * 1e3:.2f} mm frees it."
     )
-    return {
-        "code": "overlap", "text": text, "link": link, "depth": found.depth, "place": place, "retreat": retreat,
-    }  # fmt: skip
+    link = problem.hand.links[found.link].name
+    return {"code": "overlap", "text": text, "link": link, "depth": found.depth, "place": place, "retreat": retreat}
 
 
-def _finger_overlap(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
-    from clench.grasp.depths import hand_depths
-
-    links = c.plan.finger.links
-    depths = hand_depths(
-        problem.hand, c.plan.posture, problem.packed, problem.T_palm_object, problem.source, links=links
-    )
-    deepest = max(depths, key=lambda d: d.depth, default=None)
-    if deepest is None or deepest.depth <= 0.0:
-        link = problem.hand.links[c.overlap if c.overlap is not None else links[0]].name
-        return {"code": "overlap", "text": f"{link} overlaps {problem.obj.name}.", "link": link, "depth": 0.0}
-    return _overlap_reason(deepest, problem)
+def _overlap_text(found: LinkDepth, problem: Problem) -> str:
+    link = problem.hand.links[found.link].name
+    if found.place is None:
+        return f"{link} overlaps {problem.obj.name}"
+    x, y, z = problem.T_world_object.apply(found.place)
+    return f"{link} overlaps {problem.obj.name} by {found.depth * 1e3:.2f} mm at [{x:.4f}, {y:.4f}, {z:.4f}] m"
 
 
 def _retreat(problem: Problem) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from clench.base.errors import HandError, ObjectError
 from clench.base.pose import FloatArray, Pose, invert
+from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import weights_of
 from clench.grasp.candidates import FingerCandidate, read_candidates
 from clench.grasp.choice import choose
@@ -80,7 +81,8 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     clock.lap("plan")
     closed = close_hand(plan, problem.packed, problem.T_palm_object, command.rounds)
     clock.lap("close")
-    candidates = read_candidates(hand, plan, problem.packed, closed)
+    overlaps = start_overlaps(hand, plan, closed.overlaps, problem.packed, problem.T_palm_object, problem.source)
+    candidates = read_candidates(hand, plan, problem.packed, closed, overlaps)
     judged = judge_sets(hand, candidates, problem.packed, problem.T_palm_object, problem.source, command.check_sets)
     setting = Setting(hand, problem.start)
     scored = [replace(c, scores=score_all(c, setting)) for c in judged]

@@ -212,7 +212,7 @@ class FingerScenes:
             section=self._section(family, offset),
             palm=self._palm(family, offset),
             open_links=self._links(family, plane, dict.fromkeys(turns, 0.0)) if with_open else (),
-            closed_links=self._links(family, plane, turns),
+            closed_links=(*self._links(family, plane, turns), *self._later_links(family, offset)),
             joints=tuple(joints),
             contacts=tuple(c for c in mine if c.plane == plane),
             others=tuple(c for c in mine if c.plane != plane),
@@ -238,13 +238,7 @@ class FingerScenes:
         still = set(self.hand.fixed_links) | {i for i in self.plan.finger.links if i not in self.moved_by}
         before = {i for i, j in self.moved_by.items() if self.plan.joints[j].family < family}
         T_family_palm = invert(self.frames[family])
-        loops = []
-        for i in sorted(still | before):
-            for shape in self.hand.links[i].shapes.get(self.source, ()):
-                T = T_family_palm @ self.poses_closed[i]
-                low, high = extent(shape, T)
-                outline = cut_shape(shape, T, offset) if low <= offset <= high else None
-                loops += outline_loops(outline) if outline is not None else []
+        loops = [loop for i in sorted(still | before) for loop in self._cut(i, T_family_palm, offset)]
         if family == 0:  # the first family's planes stand still, so every set sees the same
             self._palms[offset] = tuple(loops)
         return tuple(loops)
@@ -273,6 +267,26 @@ class FingerScenes:
         return tuple(
             LinkSection(self.hand.links[i].name, self.moved_by[i], tuple(loops)) for i, loops in borders.items()
         )
+
+    def _later_links(self, family: int, offset: float) -> list[LinkSection]:
+        """Cut the links that joints of later families move, where they are at the end."""
+        T_family_palm = invert(self.frames[family])
+        sections = []
+        for i, joint in self.moved_by.items():
+            if self.plan.joints[joint].family > family:
+                loops = self._cut(i, T_family_palm, offset)
+                sections += [LinkSection(self.hand.links[i].name, joint, tuple(loops))] if loops else []
+        return sections
+
+    def _cut(self, link: int, T_family_palm: FloatArray, offset: float) -> list[Loop]:
+        """Return the borders of a link's section with a plane, at the end."""
+        T = T_family_palm @ self.poses_closed[link]
+        loops = []
+        for shape in self.hand.links[link].shapes.get(self.source, ()):
+            low, high = extent(shape, T)
+            outline = cut_shape(shape, T, offset) if low <= offset <= high else None
+            loops += outline_loops(outline) if outline is not None else []
+        return loops
 
     def _joints(self, family: int) -> list[JointMotion]:
         turns, full = {}, {}

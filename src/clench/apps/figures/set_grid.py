@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -80,9 +79,12 @@ def _selected(alike: list[Candidate], chosen: Candidate) -> list[Candidate]:
     if chosen not in kept:
         kept[-1] = chosen
     room = MOST_SETS - len(kept)
-    while len(planes) > room:
-        gaps = [abs((after.offset or 0.0) - (c.offset or 0.0)) for c, after in pairwise(planes)]
-        planes.pop(max(int(np.argmin(gaps)), 1))  # the first one is an edge of the finger
+    if len(planes) > room:
+        offsets = np.array([c.offset or 0.0 for c in planes])
+        taken = [0, len(planes) - 1]  # the edges of the finger, then always the plane farthest from those taken
+        while len(taken) < room:
+            taken.append(int(np.argmax(np.abs(offsets[:, None] - offsets[taken]).min(axis=1))))
+        planes = [planes[i] for i in taken]
     wanted = {id(c) for c in planes + kept}
     return [c for c in alike if id(c) in wanted]
 

@@ -1,0 +1,55 @@
+"""Find the fingers that overlap the object before anything moves (METHOD.md section 3, *overlap at the start*)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.base.tolerances import ALLOWED_PENETRATION
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+from .closing import HandPlan
+from .depths import LinkDepth, hand_depths
+from .plan import FingerPlan
+from .scene import PackedObject
+
+
+def start_overlaps(
+    hand: Hand,
+    plan: HandPlan,
+    found: np.ndarray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource,
+) -> list[LinkDepth | None]:
+    """Return, for every entry, the link that overlaps the object deepest at the start, or None.
+
+    Args:
+        hand: the hand. plan: of its fingers. found: per entry, an outline that overlaps on a plane, or -1.
+        packed, T_palm_object: the object, shape (4, 4). source: geometry of the hand.
+    """
+    result: list[LinkDepth | None] = []
+    for entry, finger in enumerate(plan.plans):
+        crossed = int(found[entry])
+        # Links that closing moves are judged on the planes; those that only the posture moves lie on none.
+        links = finger.finger.links if crossed >= 0 else _resting_links(hand, finger)
+        depths = hand_depths(hand, finger.posture, packed, T_palm_object, source, links=links) if links else ()
+        deepest = max(depths, key=lambda d: d.depth, default=None)
+        if deepest is not None and deepest.depth > ALLOWED_PENETRATION:
+            result.append(deepest)
+        elif crossed >= 0:
+            result.append(LinkDepth(int(plan.arrays.outlines.link[crossed]), 0.0, None))
+        else:
+            result.append(None)
+    return result
+
+
+def _resting_links(hand: Hand, plan: FingerPlan) -> tuple[int, ...]:
+    """Return the finger's links that no closing joint moves."""
+    closing = {p.joint for p in plan.joints}
+    moved: set[int] = set()
+    for i in plan.finger.links:
+        if hand.links[i].joint in closing or hand.links[i].parent in moved:
+            moved.add(i)
+    return tuple(i for i in plan.finger.links if i not in moved)
