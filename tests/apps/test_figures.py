@@ -1,0 +1,325 @@
+"""Pictures: what they show agrees with the solution, and every kind of answer can be drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clench
+from clench.apps.figures import draw_solution
+from clench.apps.figures.hand_view import _labels, viewpoints
+from clench.apps.figures.plane_scene import FingerScenes, bounds
+from clench.apps.figures.set_grid import MOST_SETS, _selected, _short
+from clench.apps.figures.surfaces import hand_surface, object_surface, thinned
+from clench.base.errors import FileError
+from clench.models.command import GraspCommand
+from clench.models.mesh import TriangleMesh
+from clench.models.objects.obstacles import table
+from clench.solve.solution import FingerStatus, GraspSolution
+from handmade import make_candidate, make_contact
+
+
+def grasp(hand: clench.Hand, obj: clench.GraspObject, **options: object) -> tuple[GraspCommand, GraspSolution]:
+    """Return a command and its solution that touches with at least one finger."""
+    for pose in clench.approach_poses(hand, obj, 8, 0):
+        command = GraspCommand(hand_pose=pose, **options)  # type: ignore[arg-type]
+        solution = clench.solve(hand, obj, command)
+        if solution.contacts:
+            return command, solution
+    raise AssertionError("no approach pose gives a contact")
+
+
+@pytest.fixture(scope="module")
+def hand() -> clench.Hand:
+    return clench.Hand.load("robonaut2")
+
+
+@pytest.fixture(scope="module")
+def ball() -> clench.GraspObject:
+    return clench.GraspObject.load("ball")
+
+
+@pytest.fixture(scope="module")
+def answer(hand: clench.Hand, ball: clench.GraspObject) -> tuple[GraspCommand, GraspSolution]:
+    return grasp(hand, ball, planes=3, fingers=("index", "thumb"))
+
+
+def distance(point: np.ndarray, loop: np.ndarray) -> float:
+    """Return the distance from a point to a closed polygon's border [m]."""
+    a, b = loop, np.roll(loop, -1, axis=0)
+    along = b - a
+    s = np.clip(((point - a) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-30), 0.0, 1.0)
+    return float(np.linalg.norm(a + s[:, None] * along - point, axis=1).min())
+
+
+def check_contacts(hand: clench.Hand, obj: clench.GraspObject, command: GraspCommand, solution: GraspSolution) -> int:
+    """Assert that every drawn contact lies on the drawn link and on the drawn section. Return how many."""
+    checked = 0
+    for name, result in solution.fingers.items():
+        scenes = FingerScenes(hand, obj, command, solution, name, result.candidates[result.chosen])
+        for candidate in result.candidates:
+            shown = scenes.showing(candidate)
+            for family, plane in shown.touched_planes(99):
+                scene = shown.scene(family, plane)
+                for c in scene.contacts:
+                    later = candidate.contacts[candidate.contacts.index(c.contact) + 1 :]
+                    if c.contact.passed or c.contact.link in {other.link for other in later}:
+                        continue  # a later joint carried the link on
+                    links = [loop for s in scene.closed_links if s.name == c.contact.link for loop in s.loops]
+                    assert min(distance(c.point, loop.points) for loop in links) < 5e-5, (name, candidate.plane)
+                    section = [curve.loop.points for curve in scene.section]
+                    assert min(distance(c.point, points) for points in section) < 5e-5, (name, candidate.plane)
+                    checked += 1
+    return checked
+
+
+def size_of(path: Path) -> tuple[int, int]:
+    from PIL import Image
+
+    with Image.open(path) as image:
+        assert image.format == "PNG"
+        pixels = np.asarray(image.convert("RGB"))
+    assert (pixels != pixels[0, 0]).any(axis=2).mean() > 0.02, f"{path.name} is nearly blank"
+    return pixels.shape[1], pixels.shape[0]
+
+
+def test_a_solve_gives_two_pictures_per_finger_and_one_of_the_hand(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
+) -> None:
+    files = draw_solution(hand, ball, *answer, tmp_path)
+    names = ["index_plane.png", "index_sets.png", "thumb_plane.png", "thumb_sets.png", "grasp.png"]
+    assert [f.name for f in files] == names
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(names)
+    for file in files:
+        width, height = size_of(file)
+        assert 600 <= width <= 1600
+        assert 400 <= height <= 1300
+
+
+def test_pictures_repeat_to_the_bit(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
+) -> None:
+    command, solution = answer
+    one = replace(solution, fingers={"index": solution.fingers["index"]})
+    first = [f.read_bytes() for f in draw_solution(hand, ball, command, one, tmp_path)]
+    second = [f.read_bytes() for f in draw_solution(hand, ball, command, one, tmp_path)]
+    assert first == second
+
+
+def test_drawn_contacts_lie_on_drawn_link_and_section(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    assert check_contacts(hand, ball, *answer) >= 4
+
+
+def test_alternative_postures_are_drawn_where_they_were_solved(hand: clench.Hand, ball: clench.GraspObject) -> None:
+    command, solution = grasp(hand, ball, planes=2, fingers=("index",), yaw_grid=(0.1,), open_variants=(0.2,))
+    result = solution.fingers["index"]
+    looked_at = 0
+    for k, candidate in enumerate(result.candidates):
+        if candidate.posture and candidate.contacts:
+            other = replace(solution, fingers={"index": replace(result, candidates=(candidate,), chosen=0)})
+            looked_at += check_contacts(hand, ball, command, other)
+            assert k
+    assert looked_at >= 2
+
+
+def test_joint_motion_agrees_with_the_solution(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    command, solution = answer
+    result = solution.fingers["index"]
+    scenes = FingerScenes(hand, ball, command, solution, "index", result.candidates[result.chosen])
+    joints = scenes.scene(0, 0).joints
+    assert [j.name for j in joints] == ["index_proximal", "index_medial", "index_distal"]
+    for joint in joints:
+        model = hand.joints[hand.joint_index(joint.name)]
+        assert joint.angle == pytest.approx(solution.joint_angles[joint.name], abs=1e-12)
+        assert abs(joint.turn) == pytest.approx(abs(joint.angle - joint.open_angle), abs=1e-12)
+        assert joint.limit == pytest.approx(model.upper, abs=1e-9)
+        assert 0.0 <= joint.turn <= joint.full_turn + 1e-12
+    for before, after in pairwise(joints):
+        np.testing.assert_allclose(before.pivot + before.arm, after.pivot, atol=1e-12)
+
+
+def test_drawn_pivots_agree_with_the_hands_own_kinematics(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    command, solution = answer
+    q = np.array([solution.joint_angles[n] for n in hand.joint_names])
+    poses = solution.hand_pose.matrix @ hand.link_poses(q)
+    for name, result in solution.fingers.items():
+        scenes = FingerScenes(hand, ball, command, solution, name, result.candidates[result.chosen])
+        T = solution.hand_pose.matrix @ scenes.frames[0]
+        for joint in scenes.scene(0, 0).joints:
+            index = hand.joint_index(joint.name)
+            link = next(i for i, link in enumerate(hand.links) if link.joint == index)
+            anchor = (poses[link] @ np.append(hand.joints[index].anchor, 1.0))[:3]
+            local = T[:3, :3].T @ (anchor - T[:3, 3])
+            np.testing.assert_allclose(local[[0, 2]], joint.pivot, atol=1e-9)
+
+
+@pytest.mark.shared
+def test_a_finger_of_two_families_is_drawn_where_it_touches(shared_data: Path, tmp_path: Path) -> None:
+    leap = clench.Hand.load(shared_data / "hands" / "leap_hand_urdf" / "leap_hand_right.urdf")
+    can = clench.GraspObject.load("cylinder:r=0.03,h=0.1")
+    command, solution = grasp(leap, can, planes=3, fingers=("index", "middle"))
+    assert check_contacts(leap, can, command, solution) >= 2
+    result = solution.fingers["index"]
+    scenes = FingerScenes(leap, can, command, solution, "index", result.candidates[result.chosen])
+    assert {family for family, _ in scenes.touched_planes(3)} == {0, 1}
+    assert len(draw_solution(leap, can, command, solution, tmp_path)) == 5
+
+
+def test_answers_without_contact_are_drawn(hand: clench.Hand, ball: clench.GraspObject, tmp_path: Path) -> None:
+    far = GraspCommand(hand_pose=clench.Pose([1.0, 0.0, 0.0]), planes=1, fingers=("ring",), full_width=False)
+    solution = clench.solve(hand, ball, far)
+    assert not solution.contacts
+    files = draw_solution(hand, ball, far, solution, tmp_path)
+    assert [f.name for f in files] == ["ring_plane.png", "ring_sets.png", "grasp.png"]
+    assert all(size_of(f)[0] <= 1600 for f in files)
+
+
+def test_a_finger_that_overlaps_at_the_start_is_drawn(
+    hand: clench.Hand, ball: clench.GraspObject, tmp_path: Path
+) -> None:
+    tip = hand.link_poses(hand.open_angles())[hand.link_index("index_distal")][:3, 3]
+    inside = GraspCommand(hand_pose=clench.Pose(-tip), planes=2, fingers=("index",))
+    solution = clench.solve(hand, ball, inside)
+    assert solution.fingers["index"].status is FingerStatus.BLOCKED
+    assert all(size_of(f)[0] <= 1600 for f in draw_solution(hand, ball, inside, solution, tmp_path))
+
+
+def test_obstacles_are_told_from_the_object(hand: clench.Hand, tmp_path: Path) -> None:
+    box = clench.GraspObject.load("box:x=0.04,y=0.06,z=0.08")
+    scene = box.with_body(table(-0.04))
+    command, solution = grasp(hand, scene, planes=1, fingers=("index",))
+    result = solution.fingers["index"]
+    scenes = FingerScenes(hand, scene, command, solution, "index", result.candidates[result.chosen])
+    kinds = {c.obstacle for p in range(len(scenes.plan.families[0].offsets)) for c in scenes.scene(0, p).section}
+    assert kinds == {True, False}
+    low, high = bounds([scenes.scene(0, 0)])
+    assert (high - low).max() < 0.5, "the table does not decide how much is shown"
+    draw_solution(hand, scene, command, solution, tmp_path)
+
+
+def test_a_finger_without_sets_has_no_picture(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
+) -> None:
+    command, solution = answer
+    idle = replace(solution.fingers["thumb"], candidates=(), chosen=0, status=FingerStatus.NO_MOTION)
+    files = draw_solution(hand, ball, command, replace(solution, fingers={"thumb": idle}), tmp_path)
+    assert [f.name for f in files] == ["grasp.png"]
+
+
+def test_a_folder_that_is_missing_is_one_sentence(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
+) -> None:
+    with pytest.raises(FileError, match=r"index_plane\.png: cannot be written \(No such file or directory\)"):
+        draw_solution(hand, ball, *answer, tmp_path / "missing")
+
+
+def test_drawing_leaves_global_state_alone(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
+) -> None:
+    import matplotlib as mpl
+
+    before = (mpl.rcParams.copy(), mpl.get_backend(auto_select=False))
+    command, solution = answer
+    draw_solution(hand, ball, command, replace(solution, fingers={}), tmp_path)
+    assert (mpl.rcParams.copy(), mpl.get_backend(auto_select=False)) == before
+
+
+def test_many_sets_are_thinned_evenly_and_keep_the_chosen_one() -> None:
+    alike = [make_candidate(plane=k, offset=0.001 * k) for k in range(30)] + [make_candidate()]
+    for chosen in (alike[0], alike[17], alike[-1]):
+        shown = _selected(alike, chosen)
+        assert len(shown) == MOST_SETS
+        assert chosen in shown
+        assert alike[-1] in shown
+        offsets = [c.offset for c in shown if c.offset is not None]
+        assert offsets == sorted(offsets)
+        assert min(offsets) == 0.0
+        assert max(offsets) == pytest.approx(0.029)
+        assert np.diff(offsets).max() < 0.012
+    assert _selected(alike[:2], alike[0]) == alike[:2]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["index_proximal", "index_medial"], ["proximal", "medial"]),
+        (["ff_j_1", "ff_j_2"], ["1", "2"]),
+        (["a", "b"], ["a", "b"]),
+        (["index_curl"], ["index_curl"]),
+        (["curl", "curl_tip"], ["curl", "curl_tip"]),
+        (["same", "same"], ["same", "same"]),
+    ],
+)
+def test_shared_words_are_left_out_of_joint_names(names: list[str], expected: list[str]) -> None:
+    assert _short(names) == expected
+
+
+def test_contact_numbers_do_not_overlap_even_at_one_place() -> None:
+    rng = np.random.default_rng(0)
+    points = np.vstack([np.full((4, 2), 300.0), rng.uniform(200.0, 400.0, (8, 2))])
+    places = _labels(points, points + 20.0)
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)[~np.eye(len(places), dtype=bool)]
+    assert gaps.min() > 15.0
+    alone = _labels(points[:1], points[:1])
+    assert np.isfinite(alone).all()
+
+
+def test_viewpoints_differ_and_are_the_same_each_time(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    _, solution = answer
+    body, things = hand_surface(hand, solution).corners, object_surface(ball, solution).corners
+    focus = np.concatenate([body.reshape(-1, 3), things.reshape(-1, 3)])
+    for contacts in (solution.contacts, ()):
+        first, second = viewpoints(body, things, focus, replace(solution, contacts=contacts))
+        assert first @ second < 0.5
+        again = viewpoints(body, things, focus, replace(solution, contacts=contacts))
+        np.testing.assert_array_equal([first, second], again)
+
+
+def test_surfaces_stand_where_the_solution_has_them(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    _, solution = answer
+    moved = replace(solution, object_pose=clench.Pose([0.3, 0.0, 0.0]) @ solution.object_pose)
+    shift = object_surface(ball, moved).corners - object_surface(ball, solution).corners
+    np.testing.assert_allclose(shift, np.broadcast_to([0.3, 0.0, 0.0], shift.shape), atol=1e-12)
+    body = hand_surface(hand, solution)
+    for contact in solution.contacts:
+        if not contact.passed:
+            nearest = np.linalg.norm(body.corners.reshape(-1, 3) - contact.position, axis=1).min()
+            assert nearest < 0.01, "a link stands at its contact"
+
+
+def test_huge_meshes_are_thinned_without_changing_their_shape() -> None:
+    ball = clench.GraspObject.load("sphere:r=0.05").bodies[0].shapes[0].to_mesh(2e-7)
+    assert len(ball.triangles) > 50_000
+    few = thinned(ball, 5_000)
+    assert 500 < len(few.triangles) <= 5_000
+    radii = np.linalg.norm(few.vertices[np.unique(few.triangles)], axis=1)
+    np.testing.assert_allclose(radii, 0.05, atol=1e-5)
+    small = TriangleMesh(np.eye(3), [[0, 1, 2]])
+    assert thinned(small, 5_000) is small
+
+
+def test_a_contact_keeps_the_number_it_has_in_the_solution(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    command, solution = answer
+    before = make_contact(finger="thumb", link="thumb_distal", stops_joint=None)
+    listed = replace(solution, contacts=(before, *solution.contacts))
+    name = solution.contacts[0].finger
+    result = solution.fingers[name]
+    scenes = FingerScenes(hand, ball, command, listed, name, result.candidates[result.chosen])
+    assert [listed.contacts[c.number] for c in scenes.contacts] == [c.contact for c in scenes.contacts]
+    assert scenes.contacts[0].number == 1
