@@ -84,7 +84,7 @@ def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution
     Args:
         body, things: corners of hand and object [m], shape (T, 3, 3). focus: points that must be seen, shape (N, 3).
     """
-    azimuth = np.arange(16) * (np.pi / 8.0)
+    azimuth = 0.2 + np.arange(16) * (np.pi / 8.0)  # off the diagonals, where two world axes would coincide
     heights = np.array([0.3, 0.7, 0.0, -0.4])[np.arange(16) % 4]
     level = np.sqrt(1.0 - heights**2)
     directions = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
@@ -199,7 +199,7 @@ def _labels(points: FloatArray, tips: FloatArray) -> FloatArray:
     fixed = np.vstack([points, tips])
     for _ in range(80):
         push = np.zeros_like(places)
-        for others, room in ((places, 25.0), (fixed, 18.0)):
+        for others, room in ((places, 34.0), (fixed, 18.0)):
             gap = places[:, None] - others[None]
             distance = np.linalg.norm(gap, axis=2)
             close = (distance < room) & (distance > 0.0)

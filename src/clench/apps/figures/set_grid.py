@@ -24,6 +24,8 @@ _PANEL: Final = 370
 _GAP: Final = 20
 #: Height of the lines below a panel, in pixels.
 _LINES: Final = 70
+#: Units of scores that have one.
+_UNITS: Final = {"range_of_motion": " rad"}
 _TOP: Final = 92
 _TITLE: Final = 24
 _BOTTOM: Final = 42
@@ -145,7 +147,9 @@ def _short(names: list[str]) -> list[str]:
 
 def _verdict(candidate: Candidate) -> list[str]:
     """Return up to two lines: how the set scores, and what is known of its overlap."""
-    scores = "  ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in candidate.scores.items())
+    scores = "  ".join(
+        f"{name.replace('_', ' ')} {value:.3g}{_UNITS.get(name, '')}" for name, value in candidate.scores.items()
+    )
     known = [] if candidate.contacts else ["no contact"]
     if candidate.penetration is not None:
         known.append(overlap(candidate.penetration))
