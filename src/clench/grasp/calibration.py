@@ -11,7 +11,7 @@ from clench.base.errors import ClenchError, FileError
 from .criteria import DEFAULT_WEIGHTS, check_weights
 
 
-def weights_of(criteria: Mapping[str, float] | Path | None) -> dict[str, float]:
+def weights_of(criteria: Mapping[str, float] | Path | str | None) -> dict[str, float]:
     """Return the weights that a command asks for: given ones, those of a file, or the default.
 
     Raises:
@@ -21,7 +21,7 @@ def weights_of(criteria: Mapping[str, float] | Path | None) -> dict[str, float]:
         return dict(DEFAULT_WEIGHTS)
     if isinstance(criteria, Mapping):
         return check_weights(criteria, "criteria")
-    return load_calibration(criteria)
+    return load_calibration(Path(criteria))
 
 
 def load_calibration(path: Path) -> dict[str, float]:

@@ -61,7 +61,9 @@ class FingerCandidate:
         q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
         touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
             or None; then nothing moves.
-        feasible, penetration: None when not checked. scores: criterion name to value.
+        clear: it passes through nothing on any of the planes.
+        feasible, penetration: over the whole width, path included; None when not measured.
+        scores: criterion name to value.
     """
 
     plan: FingerPlan
@@ -71,6 +73,7 @@ class FingerCandidate:
     q: FloatArray
     touches: tuple[Touch, ...]
     overlap: LinkDepth | None
+    clear: bool = False
     feasible: bool | None = None
     penetration: float | None = None
     scores: dict[str, float] = field(default_factory=dict)

@@ -11,14 +11,13 @@ from .criteria import weigh
 def choose(candidates: Sequence[FingerCandidate], weights: Mapping[str, float]) -> int:
     """Return the index of the best candidate.
 
-    A set that is known to be infeasible is never chosen before one that is not; one known to be feasible goes before
-    one that was not checked; one that touches goes before one that does not. The weighted scores decide among the
-    rest; ties go to the full width, then to the first.
+    A set that is known to be infeasible is never chosen before one that is not; one that passes through nothing on
+    any plane goes before one that does; one that touches goes before one that does not. The weighted scores decide
+    among the rest; ties go to the full width, then to the first.
     """
 
-    def rank(i: int) -> tuple[int, int, float, bool, int]:
+    def rank(i: int) -> tuple[bool, bool, bool, float, bool, int]:
         c = candidates[i]
-        known = {True: 2, None: 1, False: 0}[c.feasible]
-        return known, int(bool(c.holding)), weigh(c.scores, weights), c.plane is None, -i
+        return c.feasible is not False, c.clear, bool(c.holding), weigh(c.scores, weights), c.plane is None, -i
 
     return max(range(len(candidates)), key=rank)

@@ -100,7 +100,7 @@ def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, 
         own = make_sections(most, capacity, more)
         wanted = cut_first_families(plan.arrays, packed.tree, shapes, T, shared)
         if not wanted:
-            answer = empty_answer(plan, rounds)
+            answer = empty_answer(plan)
             find_overlaps(plan.arrays, packed.tree, shapes, packed.closed, T, shared, overlaps)
             close_items(plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer)
             wanted = int(answer.overflow.max(initial=0))
@@ -109,12 +109,12 @@ def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, 
         capacity = 2 * wanted
 
 
-def empty_answer(plan: HandPlan, rounds: int) -> ClosingArrays:
-    """Return the arrays that the kernels write, with room for every contact."""
+def empty_answer(plan: HandPlan) -> ClosingArrays:
+    """Return the arrays that the kernels write, with room for one contact per group."""
     from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
 
     items = len(plan.items.entry)
-    contacts = rounds * max(len(p.lengths) for p in plan.plans)
+    contacts = max(len(p.lengths) for p in plan.plans)
     return ClosingArrays(
         travel=np.zeros((items, len(plan.arrays.chain.group_length))),
         turn=np.zeros((items, len(plan.arrays.chain.rate))),

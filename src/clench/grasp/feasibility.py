@@ -30,28 +30,28 @@ def judge_sets(
     source: CollisionSource,
     measure: bool,
 ) -> list[FingerCandidate]:
-    """Return the candidates with `feasible` and `penetration` filled as far as they are known.
+    """Return the candidates with `clear`, and on request `feasible` and `penetration`, filled.
 
     The full-width set passes through nothing on any plane; a plane's own set that equals it is the same set. Every
-    other one passes through what another plane would have stopped at: how deep is measured on request.
+    other one passes through what another plane would have stopped at. What lies between the planes is measured.
 
     Args:
         hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
-        source: geometry of the hand. measure: measure the sets whose answer the planes do not give.
+        source: geometry of the hand. measure: measure every set, along its path.
     """
     whole = {id(c.plan): c for c in candidates if c.plane is None}
     judged = []
     for c in candidates:
-        full = whole.get(id(c.plan))
         if c.overlap is not None:
-            judged.append(replace(c, feasible=False))
-        elif full is not None and np.abs(c.travel - full.travel).max(initial=0.0) <= _SAME:
-            judged.append(replace(c, feasible=True))
-        elif measure:
+            judged.append(replace(c, feasible=False, penetration=c.overlap.depth))
+            continue
+        full = whole.get(id(c.plan))
+        clear = full is not None and bool(np.abs(c.travel - full.travel).max(initial=0.0) <= _SAME)
+        if measure:
             depth, allowed = _deepest(hand, c, packed, T_palm_object, source)
-            judged.append(replace(c, feasible=depth <= allowed, penetration=depth))
+            judged.append(replace(c, clear=clear, feasible=depth <= allowed, penetration=depth))
         else:
-            judged.append(c)
+            judged.append(replace(c, clear=clear))
     return judged
 
 

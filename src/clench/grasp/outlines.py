@@ -75,8 +75,7 @@ def cut_shape(shape: Shape, T_family_link: FloatArray, offset: float) -> Rounded
     """
     T = T_family_link @ shape.pose.matrix
     if shape.kind is ShapeKind.MESH or shape.kind is ShapeKind.BOX:
-        mesh = shape.mesh if shape.mesh is not None else tessellate(shape, OUTLINE_DEVIATION)
-        return _cut_mesh(mesh, T, offset)
+        return _cut_mesh(shape.mesh if shape.mesh is not None else _box(shape.size), T, offset)
     return _cut_round(shape, T, offset)
 
 
@@ -112,6 +111,11 @@ def _cut_mesh(mesh: TriangleMesh, T: FloatArray, offset: float) -> RoundedOutlin
         return None
     ends = segments[:, :4].reshape(-1, 2)
     return RoundedOutline(np.unique(ends, axis=0), _side_rows(segments), 0.0, not closed, 0.0)
+
+
+@lru_cache(maxsize=512)
+def _box(size: tuple[float, float, float]) -> TriangleMesh:
+    return tessellate(Shape(ShapeKind.BOX, size), OUTLINE_DEVIATION)
 
 
 @lru_cache(maxsize=512)

@@ -111,7 +111,7 @@ def plan_finger(hand: Hand, finger: Finger, posture: FloatArray, planes: int, so
         HandError: a coupling that the method does not cover.
     """
     poses = hand.link_poses(posture)
-    closing = [j for j in finger.joints if hand.joints[j].role is JointRole.CLOSING and _is_free(hand, finger, j)]
+    closing = closing_joints(hand, finger)
     leaders = _leaders(hand, closing)
     mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
     axes = {j: poses[mover[j]][:3, :3] @ hand.joints[j].axis * hand.joints[j].direction for j in closing}
@@ -132,6 +132,23 @@ def plan_finger(hand: Hand, finger: Finger, posture: FloatArray, planes: int, so
     lengths = tuple(_travel(hand, posture, leader) for leader in order)
     families = _cut_families(hand, planned, frames, split, poses, moved_by, planes, source)
     return FingerPlan(finger, posture, planned, tuple(order), lengths, families, max(f.reach for f in families))
+
+
+def closing_joints(hand: Hand, finger: Finger) -> list[int]:
+    """Return the joints that closing moves, palm side first: free ones and those that follow them.
+
+    Raises:
+        HandError: a posture joint that follows a closing one, or coupling between fingers.
+    """
+    closing = [j for j in finger.joints if hand.joints[j].role is JointRole.CLOSING and _is_free(hand, finger, j)]
+    for c in hand.couplings:
+        follower = hand.joints[c.follower]
+        if c.leader in closing and c.follower in finger.joints and c.follower not in closing:
+            raise HandError(
+                f"{hand.name}: posture joint '{follower.name}' follows closing joint '{hand.joints[c.leader].name}'; "
+                "a joint that moves while the finger closes has to be a closing joint."
+            )
+    return closing
 
 
 def _is_free(hand: Hand, finger: Finger, joint: int) -> bool:
@@ -179,7 +196,23 @@ def _families(hand: Hand, closing: list[int], axes: dict[int, FloatArray], leade
                 families[-1].append(j)
                 continue
         families.append([j])
+    _check_groups(hand, families, leaders)
     return families
+
+
+def _check_groups(hand: Hand, families: list[list[int]], leaders: dict[int, int]) -> None:
+    """Refuse coupled joints with a joint between them that closes about another axis.
+
+    Raises:
+        HandError: with the names of the coupled joints.
+    """
+    home = {j: f for f, members in enumerate(families) for j in members}
+    for j, leader in leaders.items():
+        if leader not in home or home[leader] != home[j]:
+            raise HandError(
+                f"{hand.name}: joints '{hand.joints[leader].name}' and '{hand.joints[j].name}' are coupled, but a "
+                "closing joint between them turns about another axis; curl planes need them side by side."
+            )
 
 
 def _last_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[int, int]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .compiling import kernel
+from .compiling import inner_kernel
 from .conics import sweep_region
 from .corners import sharp_blocks
 from .coupled_pairs import sweep_disk, sweep_segment
@@ -29,7 +29,7 @@ from .turning_pairs import turn_disk, turn_segment
 STRIDE = 0.06
 
 
-@kernel
+@inner_kernel
 def make_work(joints: int, outlines: OutlineArrays) -> Work:
     """Allocate the scratch space for a hand."""
     rows = joints + 1
@@ -47,7 +47,7 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
     )
 
 
-@kernel
+@inner_kernel
 def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) -> None:
     """Write where the joints of a family are when each has turned by `turns` [rad]."""
     x, z, angle = 0.0, 0.0, 0.0
@@ -60,7 +60,7 @@ def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) 
             place[j, 0], place[j, 1], place[j, 2] = x, z, angle
 
 
-@kernel
+@inner_kernel
 def put_outline(
     outlines: OutlineArrays, o: int, j: int, place: Floats, cx: float, cz: float, mirror: float, work: Work
 ) -> Outline:
@@ -91,7 +91,7 @@ def put_outline(
     return Outline(o, v0, v1, s0, s1, radius, outlines.both[o] != 0, KIND_TIP if radius > 0.0 else KIND_EDGE)
 
 
-@kernel
+@inner_kernel
 def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work) -> tuple[int, int, float, float]:
     """Write the chain of active joints up to `joint`.
 
@@ -112,7 +112,7 @@ def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work)
     return count, last, rate, speed
 
 
-@kernel
+@inner_kernel
 def misses(
     cx: float, cz: float, d: float, ex: float, ez: float, wide: bool, mx: float, mz: float, reach: float
 ) -> bool:
@@ -129,7 +129,7 @@ def misses(
     return (mx - cx) ** 2 + (mz - cz) ** 2 > square and (mx - ex) ** 2 + (mz - ez) ** 2 > square
 
 
-@kernel
+@inner_kernel
 def deferred_blocks(
     outline: Outline,
     sections: SectionArrays,
@@ -165,7 +165,7 @@ def deferred_blocks(
     return True
 
 
-@kernel
+@inner_kernel
 def turn_outline(
     outline: Outline,
     sections: SectionArrays,
@@ -206,7 +206,7 @@ def turn_outline(
     return best
 
 
-@kernel
+@inner_kernel
 def sweep_outline(
     outline: Outline,
     sections: SectionArrays,
@@ -250,7 +250,7 @@ def sweep_outline(
     return best
 
 
-@kernel
+@inner_kernel
 def advance_outline(
     chain: ChainArrays,
     outlines: OutlineArrays,
@@ -300,7 +300,7 @@ def advance_outline(
     return best
 
 
-@kernel
+@inner_kernel
 def sweep_ellipses(
     outline: Outline,
     sections: SectionArrays,
@@ -326,7 +326,7 @@ def sweep_ellipses(
     return best
 
 
-@kernel
+@inner_kernel
 def advance(
     hand: HandArrays,
     family: int,

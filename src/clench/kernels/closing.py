@@ -9,7 +9,7 @@ import numpy as np
 from clench.base.tolerances import PASSED_GAP, TOUCH_FRACTION
 
 from .advance import advance, make_work, place_joints, put_outline
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 from .conics import region_gap, support
 from .family_pose import compose_inverse, pose_family
 from .family_section import cut_planes
@@ -43,7 +43,7 @@ from .outline_gap import core_distance, outline_distance, point_segment
 from .tree import MeshTree
 
 
-@kernel
+@inner_kernel
 def outline_point(outlines: OutlineArrays, work: Work, o: int, v: int) -> tuple[float, float]:
     """Return where a vertex of an outline is at the placed joints."""
     j = outlines.joint[o]
@@ -52,7 +52,7 @@ def outline_point(outlines: OutlineArrays, work: Work, o: int, v: int) -> tuple[
     return c * x - s * z + work.place[j, 0], s * x + c * z + work.place[j, 1]
 
 
-@kernel
+@inner_kernel
 def side_normal(outlines: OutlineArrays, work: Work, o: int, side: int, which: int) -> tuple[float, float]:
     """Return the outward normal of a touching link side at the placed joints; `which` >= 2 is its other face."""
     angle = work.place[outlines.joint[o], 2]
@@ -64,7 +64,7 @@ def side_normal(outlines: OutlineArrays, work: Work, o: int, side: int, which: i
     ]
 
 
-@kernel
+@inner_kernel
 def touch_segment(
     outlines: OutlineArrays, segment: Floats, work: Work
 ) -> tuple[float, float, float, float, float, float]:
@@ -91,7 +91,7 @@ def touch_segment(
     return ox, oz, nx, nz, cx, cz
 
 
-@kernel
+@inner_kernel
 def touch_round(
     outlines: OutlineArrays, sections: SectionArrays, row: int, work: Work
 ) -> tuple[float, float, float, float]:
@@ -120,7 +120,7 @@ def touch_round(
     return x, z, nx, nz
 
 
-@kernel
+@inner_kernel
 def describe_hit(
     hand: HandArrays,
     sections: SectionArrays,
@@ -151,7 +151,7 @@ def describe_hit(
     point[HIT_CURVE_X], point[HIT_CURVE_Z], point[HIT_TRAVEL] = cx, cz, travel
 
 
-@kernel
+@inner_kernel
 def close_group(
     hand: HandArrays,
     group: int,
@@ -183,7 +183,10 @@ def close_group(
                     end = min(end, chain.stop[j])
                 elif travel < chain.start[j]:
                     end = min(end, chain.start[j])
-        moved, plane = advance(hand, family, sections, base, low, high, closed, turns, rates, end - travel, work)
+        # A little further, so that a touch just at the end is one; no point moves by more than the touch tolerance.
+        reach = end - travel + TOUCH_FRACTION
+        moved, plane = advance(hand, family, sections, base, low, high, closed, turns, rates, reach, work)
+        moved = min(moved, end - travel)
         for j in range(joints):
             turns[j] += rates[j] * moved
         if plane >= 0:
@@ -192,7 +195,7 @@ def close_group(
     return travel, -1
 
 
-@kernel
+@inner_kernel
 def group_family(hand: HandArrays, group: int) -> int:
     """Return the family of a group's joints."""
     for j in range(hand.chain.joint_group.shape[0]):
@@ -201,7 +204,7 @@ def group_family(hand: HandArrays, group: int) -> int:
     return -1
 
 
-@kernel
+@inner_kernel
 def enter_family(
     hand: HandArrays,
     family: int,
@@ -225,7 +228,7 @@ def enter_family(
         answer.overflow[i] = max(answer.overflow[i], wanted)
 
 
-@kernel
+@inner_kernel
 def settle_hits(
     hand: HandArrays, start: int, shared: SectionArrays, own: SectionArrays, i: int, work: Work, answer: ClosingArrays
 ) -> None:
@@ -247,7 +250,7 @@ def settle_hits(
                 point[HIT_X], point[HIT_Z] = x, z
 
 
-@kernel
+@inner_kernel
 def close_item(
     hand: HandArrays,
     tree: MeshTree,
@@ -292,7 +295,10 @@ def close_item(
                 work,
             )
             answer.travel[i, group] = travel
-            n = answer.contacts[i]
+            # In a further round a group's contact takes the place of its earlier one.
+            n = 0
+            while n < answer.contacts[i] and answer.hit[i, n, HIT_GROUP] != group:
+                n += 1
             if plane >= 0 and n < answer.hit.shape[1]:
                 describe_hit(
                     hand,
@@ -307,7 +313,7 @@ def close_item(
                     answer.hit[i, n],
                     answer.point[i, n],
                 )
-                answer.contacts[i] = n + 1
+                answer.contacts[i] = max(answer.contacts[i], n + 1)
     settle_hits(hand, start, shared, own, i, work, answer)
 
 

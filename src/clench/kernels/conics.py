@@ -10,14 +10,14 @@ import math
 
 from clench.base.tolerances import FOOT_FRACTION
 
-from .compiling import kernel
+from .compiling import inner_kernel
 from .coupled import STEPS, bounds, evaluate, line_on_point, place, safe_step
 from .coupled_pairs import side_foot
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning_pairs import note
 
 
-@kernel
+@inner_kernel
 def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
     """Return the point of an ellipse with semi-axes a >= b nearest to (t, y), by bisection on the multiplier.
 
@@ -44,7 +44,7 @@ def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
     return math.copysign(a * a * u / (k + a * a), t), math.copysign(b * b * v / (k + b * b), y)
 
 
-@kernel
+@inner_kernel
 def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, float, float]:
     """Return the distance of a point to an ellipse between its caps, the outward normal and the foot (x, z).
 
@@ -70,7 +70,7 @@ def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, fl
     return distance, (px - fx) / distance, (pz - fz) / distance, fx, fz
 
 
-@kernel
+@inner_kernel
 def sweep_vertex_region(
     chain: Floats, count: int, vx: float, vz: float, w: float, e: Floats, touch: float, best: float
 ) -> float:
@@ -105,7 +105,7 @@ def sweep_vertex_region(
     return s
 
 
-@kernel
+@inner_kernel
 def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
     """Return the support of a whole ellipse about its centre, its derivative by the normal's angle, and -t there."""
     p, q = nx * e[2] + nz * e[3], -nx * e[3] + nz * e[2]
@@ -114,7 +114,7 @@ def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
     return value, (b2 - a2) * p * q / value, a2 * p / value
 
 
-@kernel
+@inner_kernel
 def sweep_side_region(
     chain: Floats,
     terms: Floats,
@@ -162,7 +162,7 @@ def sweep_side_region(
     return s
 
 
-@kernel
+@inner_kernel
 def sweep_region(
     outline: Outline,
     i: int,

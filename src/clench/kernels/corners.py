@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from .compiling import kernel
+from .compiling import inner_kernel
 from .coupled import bounds, evaluate, line_on_point, point_on_line
 from .layout import Floats, Outline
 from .turning import is_blocking
@@ -20,7 +20,7 @@ LEAN = 1e-9
 NEAR = 4.0
 
 
-@kernel
+@inner_kernel
 def line_permits(
     chain: Floats, terms: Floats, joints: int, vx: float, vz: float, nx: float, nz: float, touch: float
 ) -> bool:
@@ -32,7 +32,7 @@ def line_permits(
     return not is_blocking(slope, curvature, lever, touch)
 
 
-@kernel
+@inner_kernel
 def side_permits(
     chain: Floats, terms: Floats, joints: int, mx: float, mz: float, qx: float, qz: float, touch: float
 ) -> bool:
@@ -43,7 +43,7 @@ def side_permits(
     return not is_blocking(slope, curvature, lever, touch)
 
 
-@kernel
+@inner_kernel
 def body_above(outline: Outline, side: Floats, x: float, z: float, nx: float, nz: float, near: float) -> bool:
     """Say whether the link's sides that end at (x, z) lie on the outer side of a line with normal `n`."""
     for k in range(outline.s0, outline.s1):
@@ -57,7 +57,7 @@ def body_above(outline: Outline, side: Floats, x: float, z: float, nx: float, nz
     return True
 
 
-@kernel
+@inner_kernel
 def object_below(
     segments: Floats,
     count: int,
@@ -84,7 +84,7 @@ def object_below(
     return True
 
 
-@kernel
+@inner_kernel
 def corner_blocks(
     outline: Outline,
     segments: Floats,
@@ -142,7 +142,7 @@ def corner_blocks(
     return True
 
 
-@kernel
+@inner_kernel
 def vertex_blocks(
     outline: Outline,
     segments: Floats,
@@ -183,7 +183,7 @@ def vertex_blocks(
     )
 
 
-@kernel
+@inner_kernel
 def sharp_blocks(
     outline: Outline,
     segments: Floats,

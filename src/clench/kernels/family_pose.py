@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from .advance import place_joints
-from .compiling import kernel
+from .compiling import inner_kernel
 from .layout import Floats, HandArrays
 
 
-@kernel
+@inner_kernel
 def compose(a: Floats, b: Floats, out: Floats) -> None:
     """Write the product of two rigid poses, shape (3, 4) each."""
     for r in range(3):
@@ -22,7 +22,7 @@ def compose(a: Floats, b: Floats, out: Floats) -> None:
             out[r, c] = total
 
 
-@kernel
+@inner_kernel
 def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
     """Write `a⁻¹ b` for rigid poses, shape (3, 4) each."""
     for r in range(3):
@@ -34,7 +34,7 @@ def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
             out[r, c] = total
 
 
-@kernel
+@inner_kernel
 def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, place: Floats, poses: Floats) -> None:
     """Write `T_palm_family` of a family from that of the family before and the turns of its joints.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 from .family_pose import compose_inverse
 from .layout import Floats, HandArrays, RoundArrays, SectionArrays
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
@@ -48,7 +48,7 @@ def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections
             cut_sphere(pose[0, 3], pose[1, 3], pose[2, 3], size[0], offset, i, row, sections)
 
 
-@kernel
+@inner_kernel
 def cut_planes(
     hand: HandArrays,
     family: int,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from .compiling import kernel
+from .compiling import inner_kernel
 from .conics import region_gap
 from .layout import Floats, Outline, SectionArrays, Work
 
 
-@kernel
+@inner_kernel
 def point_segment(px: float, pz: float, ax: float, az: float, bx: float, bz: float) -> tuple[float, float, float]:
     """Return the distance of a point to a segment, and the foot."""
     dx, dz = bx - ax, bz - az
@@ -21,7 +21,7 @@ def point_segment(px: float, pz: float, ax: float, az: float, bx: float, bz: flo
     return math.hypot(px - fx, pz - fz), fx, fz
 
 
-@kernel
+@inner_kernel
 def side_ends(side: Floats, i: int) -> tuple[float, float, float, float]:
     """Return the end points of a side."""
     nx, nz, g = side[i, 0], side[i, 1], side[i, 2]
@@ -29,7 +29,7 @@ def side_ends(side: Floats, i: int) -> tuple[float, float, float, float]:
     return g * nx - ta * nz, g * nz + ta * nx, g * nx - tb * nz, g * nz + tb * nx
 
 
-@kernel
+@inner_kernel
 def outline_distance(outline: Outline, sections: SectionArrays, row: int, work: Work) -> tuple[float, float, float]:
     """Return the least distance of an outline (put in family coordinates) to a section, and the section's point."""
     best, x, z = math.inf, 0.0, 0.0
@@ -52,7 +52,7 @@ def outline_distance(outline: Outline, sections: SectionArrays, row: int, work: 
     return (best - outline.radius, x, z) if best - outline.radius <= gap else (gap, fx, fz)
 
 
-@kernel
+@inner_kernel
 def round_distance(outline: Outline, sections: SectionArrays, row: int, work: Work) -> tuple[float, float, float]:
     """Return the least distance of an outline to the round parts of a section, and the section's point."""
     best, x, z = math.inf, 0.0, 0.0
@@ -75,7 +75,7 @@ def round_distance(outline: Outline, sections: SectionArrays, row: int, work: Wo
     return best, x, z
 
 
-@kernel
+@inner_kernel
 def core_distance(outline: Outline, qx: float, qz: float, work: Work) -> tuple[float, float, float]:
     """Return the distance of a point to an outline's core, and the unit direction towards it."""
     best, x, z = math.inf, 0.0, 0.0
@@ -93,7 +93,7 @@ def core_distance(outline: Outline, qx: float, qz: float, work: Work) -> tuple[f
     return best, (x - qx) / best, (z - qz) / best
 
 
-@kernel
+@inner_kernel
 def nearest_scaled(e: Floats, side: Floats, s: int) -> tuple[float, float]:
     """Return the point of a side nearest to an ellipse's centre where the ellipse is a unit circle."""
     ax, az, bx, bz = side_ends(side, s)

@@ -9,7 +9,7 @@ import numpy as np
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import make_work, place_joints, put_outline
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 from .distance import is_inside
 from .family_pose import compose_inverse, pose_family
 from .layout import Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
@@ -18,7 +18,7 @@ from .round_section import CAPSULE, CYLINDER, ELLIPSOID
 from .tree import MeshTree
 
 
-@kernel
+@inner_kernel
 def crosses(
     ax: float, az: float, bx: float, bz: float, cx: float, cz: float, dx: float, dz: float, margin: float
 ) -> bool:
@@ -33,7 +33,7 @@ def crosses(
     return ((c > mu and d < -mu) or (c < -mu and d > mu)) and ((a > mv and b < -mv) or (a < -mv and b > mv))
 
 
-@kernel
+@inner_kernel
 def core_holds(outline: Outline, qx: float, qz: float, work: Work) -> bool:
     """Say whether an outline's core goes around a point (by the crossings of a ray along x)."""
     around = 0
@@ -44,7 +44,7 @@ def core_holds(outline: Outline, qx: float, qz: float, work: Work) -> bool:
     return around != 0
 
 
-@kernel
+@inner_kernel
 def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: float, margin: float, work: Work) -> bool:
     """Say whether a segment crosses an outline, comes closer to its core than the radius, or begins inside it."""
     limit = outline.radius - margin
@@ -67,7 +67,7 @@ def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: floa
     return False
 
 
-@kernel
+@inner_kernel
 def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> bool:
     """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
     margin = 4.0 * touch
@@ -94,7 +94,7 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
     return False
 
 
-@kernel
+@inner_kernel
 def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
     """Say whether a point of the object's frame lies inside a round primitive."""
     pose, size = rounds.pose[i], rounds.size[i]
@@ -112,7 +112,7 @@ def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
     return bool(x * x + y * y + beyond * beyond < size[0] ** 2)
 
 
-@kernel
+@inner_kernel
 def starts_inside(
     tree: MeshTree, rounds: RoundArrays, closed: bool, T_family_object: Floats, x: float, y: float, z: float
 ) -> bool:
@@ -171,7 +171,7 @@ def find_overlaps(
                 break
 
 
-@kernel
+@inner_kernel
 def closer_than(outline: Outline, sections: SectionArrays, row: int, margin: float, work: Work) -> bool:
     """Say whether an outline's first vertex is within `margin` of a section's segments, so that inside is not sure."""
     x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .compiling import kernel
+from .compiling import inner_kernel
 from .layout import Floats, SectionArrays
 
 SPHERE, CAPSULE, CYLINDER, ELLIPSOID = 0, 1, 2, 3
@@ -13,7 +13,7 @@ SPHERE, CAPSULE, CYLINDER, ELLIPSOID = 0, 1, 2, 3
 ALIGNED = 1e-9
 
 
-@kernel
+@inner_kernel
 def add_segment(
     ax: float, az: float, bx: float, bz: float, nx: float, nz: float, source: int, row: int, sections: SectionArrays
 ) -> None:
@@ -25,7 +25,7 @@ def add_segment(
     sections.counts[row, 0] = i + 1
 
 
-@kernel
+@inner_kernel
 def add_disk(x: float, z: float, radius: float, source: int, row: int, sections: SectionArrays) -> None:
     """Append a disk."""
     i = sections.counts[row, 1]
@@ -34,7 +34,7 @@ def add_disk(x: float, z: float, radius: float, source: int, row: int, sections:
     sections.counts[row, 1] = i + 1
 
 
-@kernel
+@inner_kernel
 def add_ellipse(
     x: float,
     z: float,
@@ -56,7 +56,7 @@ def add_ellipse(
     sections.counts[row, 2] = i + 1
 
 
-@kernel
+@inner_kernel
 def cut_sphere(
     x: float, y: float, z: float, radius: float, offset: float, source: int, row: int, sections: SectionArrays
 ) -> None:
@@ -66,7 +66,7 @@ def cut_sphere(
         add_disk(x, z, math.sqrt(square), source, row, sections)
 
 
-@kernel
+@inner_kernel
 def cut_capsule(
     pose: Floats, radius: float, half: float, offset: float, source: int, row: int, sections: SectionArrays
 ) -> None:
@@ -85,7 +85,7 @@ def cut_capsule(
     cut_cylinder(pose, radius, half, offset, False, source, row, sections)
 
 
-@kernel
+@inner_kernel
 def cut_cylinder(
     pose: Floats,
     radius: float,
@@ -132,7 +132,7 @@ def cut_cylinder(
             add_chord(cx, cz, ux, uz, radius * math.sqrt(1.0 - (high / a) ** 2), high, 1.0, source, row, sections)
 
 
-@kernel
+@inner_kernel
 def add_chord(
     cx: float,
     cz: float,
@@ -150,7 +150,7 @@ def add_chord(
     add_segment(x - half * uz, z + half * ux, x + half * uz, z - half * ux, sign * ux, sign * uz, source, row, sections)
 
 
-@kernel
+@inner_kernel
 def cut_ellipsoid(pose: Floats, size: Floats, offset: float, source: int, row: int, sections: SectionArrays) -> None:
     """Append the ellipse of an ellipsoid, the image of the unit sphere under `pose · diag(size)`."""
     mx, my, mz = pose[1, 0] * size[0], pose[1, 1] * size[1], pose[1, 2] * size[2]
@@ -184,7 +184,7 @@ def cut_ellipsoid(pose: Floats, size: Floats, offset: float, source: int, row: i
         add_ellipse(x, z, rho * ax / a, rho * az / a, a, b, -a, a, source, row, sections)
 
 
-@kernel
+@inner_kernel
 def project(pose: Floats, size: Floats, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the in-plane image of a direction of the unit sphere."""
     x, y, z = x * size[0], y * size[1], z * size[2]

@@ -45,7 +45,8 @@ def is_blocking(slope: float, curvature: float, lever: float, touch: float) -> b
 def grazing_band(u: float, touch: float) -> float:
     """Return how far `ρ² - u²` may be off zero while a pass at offset `u` stays within the touch tolerance.
 
-    There the foot is known only to the root of it: rounding must not lose a rolling link that begins to press.
+    There the foot is known only to the root of it, and rounding must not lose a rolling link that begins to press:
+    beyond the end of a feature with radius `w` the gap is off by the tolerance at most over `√grazing_band(w)`.
     """
     return touch * (2.0 * abs(u) + touch)
 
@@ -77,7 +78,7 @@ def disk_on_segment(
     if square < -band:
         return best
     if square <= band:
-        slack += math.sqrt(band)
+        slack += math.sqrt(grazing_band(w, touch))
     t = math.sqrt(max(square, 0.0))
     if t < ta - slack or t > tb + slack:
         return best
@@ -110,7 +111,7 @@ def side_on_vertex(
     if square < -band:
         return best
     if square <= band:
-        slack += math.sqrt(band)
+        slack += math.sqrt(grazing_band(w, touch))
     t = -math.sqrt(max(square, 0.0))
     if t < ta - slack or t > tb + slack:
         return best

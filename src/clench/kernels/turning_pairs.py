@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import math
 
-from .compiling import kernel
+from .compiling import inner_kernel
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
 
 
-@kernel
+@inner_kernel
 def note(pair: Ints, kind: int, outline: int, feature: int, source: int, which: int, disk: int) -> None:
     """Write the winning pair."""
     pair[0], pair[1], pair[2], pair[3], pair[4], pair[5] = kind, outline, feature, source, which, disk
 
 
-@kernel
+@inner_kernel
 def defer(pair: Ints, kind: int, outline: int, feature: int, source: int, which: int) -> None:
     """Write a sharp pair that touches at the start; `corners` decides whether it blocks."""
     pair[6] = 1
     pair[7], pair[8], pair[9], pair[10], pair[11], pair[12] = kind, outline, feature, source, which, 0
 
 
-@kernel
+@inner_kernel
 def turn_segment(
     outline: Outline,
     i: int,
@@ -83,7 +83,7 @@ def turn_segment(
     return turn / rate if turn < limit else best
 
 
-@kernel
+@inner_kernel
 def turn_sides(
     outline: Outline,
     i: int,
@@ -118,7 +118,7 @@ def turn_sides(
     return turn
 
 
-@kernel
+@inner_kernel
 def turn_disk(
     outline: Outline,
     i: int,

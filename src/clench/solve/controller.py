@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clench.base.errors import HandError, ObjectError
+from clench.base.errors import CommandError, HandError, ObjectError
 from clench.base.pose import FloatArray, Pose, invert
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import weights_of
@@ -20,11 +20,11 @@ from clench.grasp.criteria import Setting, score_all
 from clench.grasp.depths import hand_depths
 from clench.grasp.feasibility import judge_sets
 from clench.grasp.motion import alternatives, asked_fingers, open_posture, palm_pose
-from clench.grasp.plan import plan_finger
+from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
 from clench.grasp.scene import PackedObject, pack_object
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command
-from clench.models.hand.hand import Hand, JointRole
+from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
 
@@ -119,8 +119,9 @@ def plan_hand(problem: Problem) -> HandPlan:
     key = (
         id(hand),
         problem.start.tobytes(),
-        command.fingers,
+        None if command.fingers is None else tuple(command.fingers),
         command.planes,
+        command.rounds > 1,
         command.full_width,
         tuple(command.yaw_grid),
         tuple(command.open_variants),
@@ -131,18 +132,34 @@ def plan_hand(problem: Problem) -> HandPlan:
         return kept[1]
     plans, finger, posture = [], [], []
     for f, asked in enumerate(asked_fingers(hand, command)):
-        if any(hand.joints[j].role is JointRole.CLOSING for j in asked.joints):
+        if closing_joints(hand, asked):
             for p, q in enumerate(alternatives(hand, asked, problem.start, command)):
                 plans.append(plan_finger(hand, asked, q, command.planes, problem.source))
                 finger.append(f)
                 posture.append(p)
     if not plans:
         raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
+    if command.rounds > 1:
+        _check_rounds(plans)
     plan = make_hand_plan(plans, finger, posture, command.full_width)
     _plans[key] = (hand, plan)
     while len(_plans) > _KEPT_PLANS:
         _plans.popitem(last=False)
     return plan
+
+
+def _check_rounds(plans: list[FingerPlan]) -> None:
+    """Refuse further rounds where outlines, cut once at the open posture, would no longer hold.
+
+    Raises:
+        CommandError: a finger whose closing axes are not parallel.
+    """
+    for plan in plans:
+        if len(plan.families) > 1:
+            raise CommandError(
+                f"rounds: finger '{plan.finger.name}' closes about axes that are not parallel; "
+                "more than one round needs parallel axes."
+            )
 
 
 def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> list[list[FingerCandidate]]:
