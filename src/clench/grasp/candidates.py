@@ -125,7 +125,7 @@ def _touch(
     hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int, travel: FloatArray
 ) -> Touch:
     answer, arrays = closed.answer, plan.arrays
-    plane, outline, kind, source, group, family = answer.hit[i, n].tolist()
+    plane, outline, kind, source, group, family, _, _ = answer.hit[i, n].tolist()
     x, z, nx, nz, cx, cz, _, gap = answer.point[i, n].tolist()
     entry = int(plan.items.entry[i])
     pose = answer.pose[i, family]

@@ -17,6 +17,7 @@ from .layout import (
     HIT_CURVE_X,
     HIT_CURVE_Z,
     HIT_FAMILY,
+    HIT_FEATURE,
     HIT_GAP,
     HIT_GROUP,
     HIT_KIND,
@@ -26,6 +27,7 @@ from .layout import (
     HIT_PLANE,
     HIT_SOURCE,
     HIT_TRAVEL,
+    HIT_WHICH,
     HIT_X,
     HIT_Z,
     KIND_SIDE,
@@ -140,6 +142,7 @@ def describe_hit(
     source, shape = work.best[3], work.best[5]
     hit[HIT_PLANE], hit[HIT_OUTLINE], hit[HIT_KIND] = plane, work.best[1], work.best[0]
     hit[HIT_GROUP], hit[HIT_FAMILY] = group, family
+    hit[HIT_FEATURE], hit[HIT_WHICH] = work.best[2], work.best[4]
     if shape == 0:
         hit[HIT_SOURCE] = sections.sources[row, source]
         x, z, nx, nz, cx, cz = touch_segment(hand.outlines, sections.segments[row, source], work)
@@ -241,6 +244,10 @@ def settle_hits(
         place_joints(hand.chain, family, answer.turn[i], work.place)
         outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
         point = answer.point[i, n]
+        if answer.hit[i, n, HIT_KIND] == KIND_SIDE:
+            feature, which = answer.hit[i, n, HIT_FEATURE], answer.hit[i, n, HIT_WHICH]
+            nx, nz = side_normal(hand.outlines, work, o, feature, which)
+            point[HIT_NX], point[HIT_NZ] = -nx, -nz
         gap, _, _ = core_distance(outline, point[HIT_X], point[HIT_Z], work)
         point[HIT_GAP] = gap - outline.radius
         if abs(point[HIT_GAP]) > TOUCH_FRACTION * hand.family_length[family]:
