@@ -15,6 +15,7 @@ import pytest
 
 import clench
 from clench.apps.cli import commands
+from clench.apps.cli.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.base.errors import CommandError
 from clench.execution.report import ExecutionReport, JointReached
@@ -345,16 +346,27 @@ def test_demo_takes_the_best_pose_and_leaves_files(
         make_solution(status=SolutionStatus.GRASP),
         make_solution(status=SolutionStatus.PARTIAL),
     ]
-    remaining = iter(answers)
-    monkeypatch.setitem(vars(clench), "solve", lambda *_: next(remaining))
-    assert main(["demo", "--out", str(tmp_path / "out"), "--json"]) == 0
+    poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
+    by_pose = dict(zip(map(str, poses), answers, strict=True))
+    monkeypatch.setitem(vars(clench), "solve", lambda hand, obj, command: by_pose[str(command.hand_pose)])
+    assert main(["demo", "--out", str(tmp_path / "out"), "--seed", "0", "--json"]) == 0
     captured = capsys.readouterr()
     solution = GraspSolution.from_dict(json.loads(captured.out))
     assert solution.status is SolutionStatus.GRASP
     assert (solution.hand_model, solution.object_model) == ("robonaut2", "mug")
     assert calls[0][0] == solution
-    names = {"solution.json", "trajectory.json", "figure.png", "execution.json", "record.db"}
+    names = {"solution.json", "trajectory.json", "figure.png", "execution.json", "record.sqlite"}
     assert names <= {p.name for p in (tmp_path / "out").iterdir()}
+
+
+def test_demo_keeps_a_pose_for_the_built_in_hand_and_mug(
+    executed: Callable[[bool], list[object]], solver: FakeSolver, figures: None, tmp_path: Path
+) -> None:
+    executed(True)
+    assert main(["demo", "--out", str(tmp_path / "out")]) == 0
+    assert {command.hand_pose for command in solver.commands} == {MUG_POSE}
+    assert main(["demo", "--out", str(tmp_path / "out"), "--object", "ball"]) == 0
+    assert MUG_POSE not in {command.hand_pose for command in solver.commands[2:]}
 
 
 def test_demo_fails_when_the_simulated_hand_does(

@@ -21,7 +21,12 @@ Status = Literal["grasp", "partial", "no_contact", "blocked"]
 
 
 def demo(
-    *, out: Path = Path("clench_out"), hand: str = "robonaut2", object: str = "mug", seed: int = 0, json: bool = False
+    *,
+    out: Path = Path("clench_out"),
+    hand: str = "robonaut2",
+    object: str = "mug",
+    seed: int | None = None,
+    json: bool = False,
 ) -> int:
     """Do the main job on a built-in hand and object: solve, figures, simulated hold, record.
 
@@ -29,7 +34,7 @@ def demo(
         out: folder for the files.
         hand: built-in name, or path to a .urdf or .xml file.
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        seed: of the approach poses that are tried.
+        seed: try the approach poses of this seed instead of the kept pose of the built-in hand on the mug.
         json: print the solution as one JSON document, and nothing else, on standard output.
     """
     from .demo import run_demo

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clench.base.pose import Pose
 from clench.models.command import GraspCommand
 from clench.solve.solution import FingerStatus, GraspSolution, SolutionStatus
 
@@ -20,12 +21,14 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
-#: How many approach poses are tried.
+#: Where the palm of the built-in hand holds the built-in mug: around its wall, away from the handle.
+MUG_POSE = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
+#: How many approach poses are tried for any other hand or object.
 TRIES = 24
-STEPS = 5
+STEPS = 6
 
 
-def run_demo(hand_model: str, object_model: str, out: Path, seed: int, json: bool) -> int:
+def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, json: bool) -> int:
     """Load, solve, draw, carry out and record; print what happened and where the files are.
 
     Returns:
@@ -33,41 +36,50 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int, json: boo
     """
     import clench
 
-    from .printing import print_report, print_solution
+    from .printing import print_files, print_report, print_solution
 
     make_folder(out)
     with _progress() as step:
         step(f"Loading hand '{hand_model}' and object '{object_model}'")
         hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)
-        step(f"Solving {TRIES} approach poses")
-        command, solution = best_of(hand, obj, seed)
+        step("Solving (the first run compiles the kernels: a minute or two; later runs load them in seconds)")
+        command = choose_command(hand, obj, (hand_model, object_model), seed)
+        # The first call of a process loads the compiled kernels; this one shows what a solve takes.
+        solution = clench.solve(hand, obj, command)
         solution = replace(solution, hand_model=loadable(hand_model), object_model=loadable(object_model))
-        step("Drawing")
+        step("Drawing every finger in its curl planes, and the hand")
         files = write_results(hand, obj, command, solution, out)
         step("Closing the simulated hand")
         report = clench.execute(solution, clench.SimulatedHand(hand, obj), force=True)
         report.save(out / "execution.json")
         step("Recording")
-        with clench.Record(out / "record.db") as record:
+        with clench.Record(out / "record.sqlite") as record:
             record.append(solution)
-    files += [out / "execution.json", out / "record.db"]
+    files += [out / "execution.json", out / "record.sqlite"]
     if json:
         print_json(solution.to_dict())
     else:
+        print_solution(solution, [*hand.warnings, *obj.warnings], [])
         print_report(report)
-        print_solution(solution, [*hand.warnings, *obj.warnings], files)
+        print_files(files)
     return 0 if report.success and exit_code(solution, strict=False) == 0 else 1
 
 
-def best_of(hand: Hand, obj: GraspObject, seed: int) -> tuple[GraspCommand, GraspSolution]:
-    """Solve a few approach poses and return the best: grasps first, then those with most touching fingers."""
+def choose_command(hand: Hand, obj: GraspObject, models: tuple[str, str], seed: int | None) -> GraspCommand:
+    """Return the command kept for the built-in hand and mug, else the best of a few approach poses.
+
+    Args:
+        hand, obj: what is solved. models: what they were loaded from.
+        seed: of the approach poses; None keeps to the built-in pose where there is one.
+    """
     import clench
 
-    solved = []
-    for pose in clench.approach_poses(hand, obj, TRIES, seed):
-        command = GraspCommand(hand_pose=pose, seed=seed)
-        solved.append((command, clench.solve(hand, obj, command)))
-    return max(solved, key=lambda pair: _merit(pair[1]))
+    if seed is None and models == ("robonaut2", "mug"):
+        command = GraspCommand(hand_pose=MUG_POSE)
+        clench.solve(hand, obj, command)
+        return command
+    commands = [GraspCommand(hand_pose=pose, seed=seed) for pose in clench.approach_poses(hand, obj, TRIES, seed or 0)]
+    return max(commands, key=lambda command: _merit(clench.solve(hand, obj, command)))
 
 
 def _merit(solution: GraspSolution) -> tuple[bool, bool, int, float]:

@@ -29,12 +29,13 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
         table.add_row(*map(_plain, _finger_row(name, finger, solution)))
     console.print(table)
     if solution.max_penetration is not None:
-        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm")
+        between = "" if solution.certified else " (between the curl planes; not certified over the full width)"
+        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm{between}")
     if "total" in solution.timing:
         console.print(f"computed in {solution.timing['total'] * 1e3:.2f} ms")
     _sentences(console, "violation", solution.violations())
     _sentences(console, "warning", warnings)
-    _files(console, files)
+    print_files(files)
 
 
 def print_hand(report: HandReport) -> None:
@@ -95,6 +96,15 @@ def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
     console.print(table)
 
 
+def print_files(files: Sequence[Path]) -> None:
+    """Print where the files are."""
+    console = _console()
+    if files:
+        console.print("files:")
+    for file in files:
+        console.print(f"  {_plain(file)}", soft_wrap=True)
+
+
 def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tuple[str, ...]:
     links = dict.fromkeys(c.link for c in solution.contacts if c.finger == name and not c.passed)
     if not 0 <= finger.chosen < len(finger.candidates):
@@ -123,13 +133,6 @@ def _table(title: str, *columns: str) -> Table:
 def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:
     for sentence in sentences:
         console.print(f"[yellow]{label}:[/yellow] {_plain(sentence)}")
-
-
-def _files(console: Console, files: Sequence[Path]) -> None:
-    if files:
-        console.print("files:")
-    for file in files:
-        console.print(f"  {_plain(file)}", soft_wrap=True)
 
 
 def _plain(text: Any) -> str:
