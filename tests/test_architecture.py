@@ -174,6 +174,28 @@ def test_the_other_checks_see_what_they_look_for() -> None:
     assert long_bodies(long + "    x = 1\n", path)
 
 
+def inner_kernels() -> set[str]:
+    names = set()
+    for path in (PACKAGE / "kernels").glob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and any(
+                isinstance(d, ast.Name) and d.id == "inner_kernel" for d in node.decorator_list
+            ):
+                names.add(node.name)
+    return names
+
+
+def test_python_never_imports_a_kernel_without_an_entry() -> None:
+    # Calling one from Python ends the process without a word.
+    inner = inner_kernels()
+    assert "close_item" in inner
+    callers = [p for p in PACKAGE.rglob("*.py") if p.parent.name != "kernels"]
+    for path in [*callers, *Path(__file__).parent.rglob("*.py")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clench.kernels"):
+                assert not inner & {alias.name for alias in node.names}, path
+
+
 def test_import_is_light_and_quick() -> None:
     program = (
         "import sys, time; t = time.perf_counter(); import clench; t = time.perf_counter() - t; "

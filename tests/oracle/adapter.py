@@ -110,7 +110,7 @@ def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
         np.zeros((items, joints)),
         np.zeros(items, np.int64),
         np.zeros((items, contacts, 8), np.int64),
-        np.zeros((items, contacts, 8)),
+        np.zeros((items, contacts, 7)),
         np.zeros((items, families, 3, 4)),
         np.zeros(items, np.int64),
     )

@@ -126,7 +126,7 @@ def _touch(
 ) -> Touch:
     answer, arrays = closed.answer, plan.arrays
     plane, outline, kind, source, group, family, _, _ = answer.hit[i, n].tolist()
-    x, z, nx, nz, cx, cz, _, gap = answer.point[i, n].tolist()
+    x, z, nx, nz, cx, cz, gap = answer.point[i, n].tolist()
     entry = int(plan.items.entry[i])
     pose = answer.pose[i, family]
     offset = float(arrays.plane_offset[plane])

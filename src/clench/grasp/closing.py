@@ -23,7 +23,7 @@ _CAPACITY = 512
 
 @dataclass(eq=False)
 class HandPlan:
-    """Hold the packed plans of a hand at its postures, and the arena that its solves share.
+    """Hold the packed plans of a hand at its postures.
 
     Args:
         plans: one per finger and posture, in entry order. finger: index into the command's fingers of each entry.

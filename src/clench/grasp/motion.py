@@ -75,7 +75,10 @@ def _yaw_joint(hand: Hand, finger: Finger) -> int | None:
             break
         if hand.joints[j].role is JointRole.POSTURE:
             before = j
-    return before
+    # A joint that another finger follows would move that finger too.
+    shared = any(c.leader == before and c.follower not in finger.joints for c in hand.couplings)
+    follows = any(c.follower == before for c in hand.couplings)
+    return None if shared or follows else before
 
 
 def _shift(hand: Hand, q: FloatArray, joint: int, offset: float) -> None:

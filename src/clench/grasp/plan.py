@@ -330,11 +330,7 @@ def _cut_families(
 
 
 def _extents(hand: Hand, links: list[tuple[int, FloatArray]], source: CollisionSource) -> list[tuple[float, float]]:
-    extents = []
-    for i, T in links:
-        spans = [extent(shape, T) for shape in hand.links[i].shapes[source]]
-        if spans:
-            extents.append((min(s[0] for s in spans), max(s[1] for s in spans)))
+    extents = [extent(shape, T) for i, T in links for shape in hand.links[i].shapes[source]]
     return extents or [(0.0, 0.0)]
 
 

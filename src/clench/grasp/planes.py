@@ -8,7 +8,7 @@ from clench.base.pose import FloatArray
 from clench.base.tolerances import EDGE_INSET
 
 #: Planes closer than this fraction of the width are one [-].
-_SAME = 1e-6
+_SAME = 0.02
 
 
 def family_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> FloatArray:
@@ -36,10 +36,10 @@ def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
     """Place curl planes across a finger, shape (P,), ascending [m].
 
     One plane lies in the middle; two lie at both edges, inset by 1e-4 of the width; from three on there are the
-    edges, even spacing between them, and the edges of every narrower link.
+    edges, even spacing between them, and the edges of every narrower shape; planes closer than 2 % of the width merge.
 
     Args:
-        extents: least and greatest y of every link [m]. count: at least 1.
+        extents: least and greatest y of every shape of every link [m]. count: at least 1.
     """
     low, high = min(e[0] for e in extents), max(e[1] for e in extents)
     width = high - low
@@ -56,8 +56,10 @@ def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
         if offset - groups[-1][0] > _SAME * width:
             groups.append([])
         groups[-1].append(offset)
-    # The middle of each group, so that a mirrored hand gets mirrored planes.
-    return np.array([0.5 * (g[0] + g[-1]) for g in groups])
+    # The middle of each group, so that a mirrored hand gets mirrored planes; the edges of the finger stay.
+    planes = [0.5 * (g[0] + g[-1]) for g in groups]
+    planes[0], planes[-1] = offsets[0], offsets[-1]
+    return np.array(planes)
 
 
 def refined(offsets: FloatArray, count: int) -> FloatArray:

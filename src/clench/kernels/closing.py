@@ -26,7 +26,6 @@ from .layout import (
     HIT_OUTLINE,
     HIT_PLANE,
     HIT_SOURCE,
-    HIT_TRAVEL,
     HIT_WHICH,
     HIT_X,
     HIT_Z,
@@ -130,7 +129,6 @@ def describe_hit(
     family: int,
     plane: int,
     group: int,
-    travel: float,
     turns: Floats,
     work: Work,
     hit: Ints,
@@ -151,7 +149,7 @@ def describe_hit(
         x, z, nx, nz = touch_round(hand.outlines, sections, row, work)
         cx, cz = nx, nz
     point[HIT_X], point[HIT_Z], point[HIT_NX], point[HIT_NZ] = x, z, nx, nz
-    point[HIT_CURVE_X], point[HIT_CURVE_Z], point[HIT_TRAVEL] = cx, cz, travel
+    point[HIT_CURVE_X], point[HIT_CURVE_Z] = cx, cz
 
 
 @inner_kernel
@@ -314,7 +312,6 @@ def close_item(
                     family,
                     plane,
                     group,
-                    travel,
                     answer.turn[i],
                     work,
                     answer.hit[i, n],

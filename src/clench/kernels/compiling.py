@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
@@ -11,8 +11,8 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 
 def inner_kernel(function: Kernel) -> Kernel:
-    """Compile a function that only other kernels call: without the entry from Python it compiles much faster."""
-    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    """Compile a function that only other kernels call: without an entry from Python, which would crash, it compiles faster."""
+    options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return cast(Kernel, njit(cache=True, nogil=True, error_model="numpy", **options)(function))
 
 

@@ -180,7 +180,7 @@ class ClosingArrays(NamedTuple):
     Args:
         travel: of every group [rad], (I, G). turn: of every joint [rad], (I, J); only the entry's own are set.
         contacts: how many there are, (I,). hit: integers of each contact, (I, S, 8), see below.
-        point: numbers of each contact in its family's plane, (I, S, 8), see below.
+        point: numbers of each contact in its family's plane, (I, S, 7), see below.
         pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
         overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
     """
@@ -197,10 +197,10 @@ class ClosingArrays(NamedTuple):
 #: Columns of `ClosingArrays.hit`.
 HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE, HIT_WHICH = 0, 1, 2, 3, 4, 5, 6, 7
 HIT_INTEGERS = 8
-#: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, travel,
+#: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve,
 #: and the gap at the item's final posture.
-HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_TRAVEL, HIT_GAP = 0, 1, 2, 3, 4, 5, 6, 7
-HIT_FLOATS = 8
+HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_GAP = 0, 1, 2, 3, 4, 5, 6
+HIT_FLOATS = 7
 
 #: Kinds of touching features.
 KIND_SIDE, KIND_TIP, KIND_EDGE = 0, 1, 2

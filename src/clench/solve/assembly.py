@@ -82,7 +82,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         object_pose=problem.T_world_object,
         decomposition=decompose(hand, answer.final),
         joint_angles=dict(zip(names, answer.final.tolist(), strict=True)),
-        open_angles=dict(zip(names, problem.start.tolist(), strict=True)),
+        open_angles=dict(zip(names, _opened(answer, problem).tolist(), strict=True)),
         certified=False,
         collision_source=str(problem.source),
         object_collision_source=str(problem.obj.collision_source),
@@ -92,6 +92,15 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         timing=dict(timing),
         joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
     )
+
+
+def _opened(answer: Answer, problem: Problem) -> FloatArray:
+    """Return the posture from which the chosen sets close, shape (J,) [rad]."""
+    q = problem.start.copy()
+    for c in answer.best:
+        own = list(c.plan.finger.joints)
+        q[own] = c.plan.posture[own]
+    return q
 
 
 def _finger(answer: Answer, k: int, problem: Problem) -> FingerResult:
