@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,17 +69,19 @@ class Pose:
         """Unit quaternion, scalar first, shape (4,)."""
         return self.wxyz_xyz[:4]
 
-    @property
+    @cached_property
     def rotation(self) -> FloatArray:
-        """Rotation matrix, shape (3, 3)."""
-        w, x, y, z = self.wxyz
-        return np.array(
+        """Rotation matrix, shape (3, 3), read-only."""
+        w, x, y, z = self.wxyz.tolist()
+        matrix = np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                 [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
             ]
         )
+        matrix.flags.writeable = False
+        return matrix
 
     @property
     def matrix(self) -> FloatArray:

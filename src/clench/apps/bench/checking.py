@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: |gap| of a contact that stands [m] (METHOD.md section 8).
 GAP = 1e-9
 #: Distance of a contact point from the object's surface [m]: what an independent measure is held to.
-SURFACE = 1e-6
+SURFACE = 1e-9
 LIMIT = 1e-9
 
 
@@ -84,12 +84,32 @@ class Surface:
         """Return the distance of a point of the world from the surface [m]; None when the object is round."""
         if self.triangles is None:
             return None
-        from trimesh import triangles
-
-        closest_point: Any = triangles.closest_point
         point = self._T_object_world[:3, :3] @ position + self._T_object_world[:3, 3]
-        near = closest_point(self.triangles, np.broadcast_to(point, (len(self.triangles), 3)))
-        return float(np.sqrt(((near - point) ** 2).sum(axis=1).min()))
+        return float(triangle_distances(self.triangles, point).min())
+
+
+def triangle_distances(triangles: FloatArray, point: FloatArray) -> FloatArray:
+    """Return the distance of a point from every triangle [m], shape (T,).
+
+    Args:
+        triangles: corners [m], shape (T, 3, 3). point: shape (3,).
+    """
+    a, b, c = triangles.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0.0)
+    height = ((point - a) * normal).sum(axis=1)
+    foot = point - height[:, None] * normal
+    over = length[:, 0] > 0.0
+    nearest = np.full(len(triangles), np.inf)
+    for start, end in ((a, b), (b, c), (c, a)):
+        edge = end - start
+        over &= (np.cross(edge, foot - start) * normal).sum(axis=1) >= 0.0
+        square = (edge * edge).sum(axis=1)
+        along = np.divide(((point - start) * edge).sum(axis=1), square, out=np.zeros_like(square), where=square > 0.0)
+        on_edge = start + np.clip(along, 0.0, 1.0)[:, None] * edge
+        nearest = np.minimum(nearest, np.linalg.norm(on_edge - point, axis=1))
+    return np.where(over, np.abs(height), nearest)
 
 
 def _without_times(solution: GraspSolution) -> dict[str, Any]:
