@@ -11,7 +11,7 @@ import pytest
 
 import clench
 from clench.apps.bench import solving
-from clench.apps.bench.checking import Checked, Surface, check_answer
+from clench.apps.bench.checking import Checked, Surface, check_answer, triangle_distances
 from clench.apps.bench.main import BENCHMARKS, main
 from clench.apps.bench.report import BenchReport, describe_place
 from clench.base.errors import CommandError, UnknownNameError
@@ -103,6 +103,22 @@ def test_the_surface_is_the_posed_one() -> None:
     box = clench.GraspObject.load("box:x=0.1,y=0.1,z=0.1", pose=clench.Pose([1.0, 0.0, 0.0]))
     assert Surface(box).distance(np.array([1.07, 0.0, 0.0])) == pytest.approx(0.02)
     assert Surface(clench.GraspObject.load("sphere:r=0.03")).distance(np.zeros(3)) is None
+
+
+def test_distances_from_triangles() -> None:
+    flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    line = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
+    dot = [[0.0, 0.0, 0.0]] * 3
+    triangles = np.array([flat, line, dot])
+    for point, expected in [
+        ((0.2, 0.2, 0.3), (0.3, np.hypot(0.2, 0.3), np.sqrt(0.17))),  # over the face
+        ((0.2, 0.2, -0.3), (0.3, np.hypot(0.2, 0.3), np.sqrt(0.17))),  # under it
+        ((0.5, -2.0, 0.0), (2.0, 2.0, np.sqrt(4.25))),  # before an edge
+        ((1.0, 1.0, 0.0), (np.sqrt(0.5), 1.0, np.sqrt(2.0))),  # before the long edge
+        ((-3.0, 0.0, 4.0), (5.0, 5.0, 5.0)),  # before a corner
+        ((0.25, 0.25, 0.0), (0.0, 0.25, np.sqrt(0.125))),  # on the face
+    ]:
+        assert triangle_distances(triangles, np.array(point)) == pytest.approx(np.array(expected), abs=1e-15)
 
 
 def test_the_stop_watches_are_taken_off() -> None:
