@@ -7,7 +7,7 @@ import numpy as np
 from clench.base.pose import FloatArray
 from clench.base.tolerances import EDGE_INSET
 
-#: Planes closer than this fraction of the width are one [-].
+#: An edge closer than this fraction of the width to another plane gets none of its own [-].
 _SAME = 0.02
 
 
@@ -36,7 +36,8 @@ def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
     """Place curl planes across a finger, shape (P,), ascending [m].
 
     One plane lies in the middle; two lie at both edges, inset by 1e-4 of the width; from three on there are the
-    edges, even spacing between them, and the edges of every narrower shape; planes closer than 2 % of the width merge.
+    edges, even spacing between them, and the edges of every narrower shape that are farther than 2 % of the
+    width, and than half the spacing, from those.
 
     Args:
         extents: least and greatest y of every shape of every link [m]. count: at least 1.
@@ -45,21 +46,19 @@ def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
     width = high - low
     if count == 1 or width <= 0.0:
         return np.array([0.5 * (low + high)])
-    offsets = list(np.linspace(low + EDGE_INSET * width, high - EDGE_INSET * width, count))
-    if count >= 3:
-        for a, b in extents:
-            inset = EDGE_INSET * (b - a)
-            offsets += [a + inset, b - inset]
-    offsets.sort()
-    groups: list[list[float]] = [[offsets[0]]]
-    for offset in offsets[1:]:
-        if offset - groups[-1][0] > _SAME * width:
-            groups.append([])
-        groups[-1].append(offset)
-    # The middle of each group, so that a mirrored hand gets mirrored planes; the edges of the finger stay.
-    planes = [0.5 * (g[0] + g[-1]) for g in groups]
-    planes[0], planes[-1] = offsets[0], offsets[-1]
-    return np.array(planes)
+    offsets = np.linspace(low + EDGE_INSET * width, high - EDGE_INSET * width, count)
+    if count < 3:
+        return offsets
+    near = min(_SAME * width, 0.5 * (offsets[1] - offsets[0]))
+    edges = sorted(y for a, b in extents for y in (a + EDGE_INSET * (b - a), b - EDGE_INSET * (b - a)))
+    groups: list[list[float]] = []
+    for y in edges:
+        if np.abs(offsets - y).min() > near:
+            if not groups or y - groups[-1][-1] > near:
+                groups.append([])
+            groups[-1].append(y)
+    # The middle of each group, so that a mirrored hand gets mirrored planes.
+    return np.sort([*offsets, *(0.5 * (g[0] + g[-1]) for g in groups)])
 
 
 def refined(offsets: FloatArray, count: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The outward normal of an object's surface where it is touched."""
+"""The object's surface where it is touched: its outward normal, and whose it is."""
 
 from __future__ import annotations
 
@@ -27,6 +27,14 @@ def surface_normal(packed: PackedObject, source: int, T_palm_object: FloatArray,
         int(packed.rounds.kind[i]), packed.rounds.size[i], pose[:, :3].T @ (in_object - pose[:, 3])
     )
     return normal
+
+
+def nearest_body(packed: PackedObject, place: FloatArray) -> int:
+    """Return the body whose surface is nearest to a point of the object's frame, shape (3,) [m]."""
+    from clench.kernels.distance import closest_point
+
+    _, triangle, _, _, _ = closest_point(packed.full_tree, np.asarray(place, dtype=np.float64), np.inf)
+    return int(packed.full_tree.body[triangle])
 
 
 def _round_normal(kind: int, size: FloatArray, p: FloatArray) -> FloatArray:

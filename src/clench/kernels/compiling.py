@@ -11,7 +11,10 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 
 def inner_kernel(function: Kernel) -> Kernel:
-    """Compile a function that only other kernels call: without an entry from Python, which would crash, it compiles faster."""
+    """Compile a function that only other kernels call: without an entry from Python, it compiles faster.
+
+    A call from Python would end the process without a word; a test holds that there is none.
+    """
     options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return cast(Kernel, njit(cache=True, nogil=True, error_model="numpy", **options)(function))
 

@@ -14,6 +14,7 @@ from clench.grasp.candidates import FingerCandidate, Touch
 from clench.grasp.depths import LinkDepth, retreat_distance
 from clench.grasp.motion import asked_fingers, decompose
 from clench.grasp.scene import hash_hand
+from clench.grasp.surface import nearest_body
 
 from .solution import (
     Candidate,
@@ -206,7 +207,8 @@ def _overlap_text(found: LinkDepth, problem: Problem) -> str:
     if found.place is None:
         return f"{link} overlaps {problem.obj.name}"
     x, y, z = problem.T_world_object.apply(found.place)
-    return f"{link} overlaps {problem.obj.name} by {found.depth * 1e3:.2f} mm at [{x:.4f}, {y:.4f}, {z:.4f}] m"
+    body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
+    return f"{link} overlaps {body} by {found.depth * 1e3:.2f} mm at [{x:.4f}, {y:.4f}, {z:.4f}] m"
 
 
 def _retreat(problem: Problem) -> float:

@@ -62,7 +62,8 @@ def _finger(name: str, finger: FingerResult, solution: GraspSolution) -> Iterato
         yield f"Finger '{name}' has {len(finger.candidates)} candidates, but number {finger.chosen} is the chosen one."
         return
     chosen = finger.candidates[finger.chosen]
-    if chosen.feasible is False:
+    sampled = not solution.certified and chosen.penetration is not None and chosen.penetration <= SAMPLED_PENETRATION
+    if chosen.feasible is False and not sampled:
         depth = f" by {chosen.penetration:.3g} m" if chosen.penetration else ""
         yield f"The chosen candidate of finger '{name}' is not feasible: it or its path penetrates{depth}."
     for joint, angle in chosen.joint_angles.items():
