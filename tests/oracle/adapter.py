@@ -1,6 +1,7 @@
 """Connect the kernel to the oracle: pack a planar finger and curve, close them, return the stages."""
 
 import numpy as np
+import numpy.typing as npt
 
 from clench.kernels.closing import close_items
 from clench.kernels.family_section import make_sections
@@ -15,6 +16,7 @@ from clench.kernels.layout import (
 )
 from clench.kernels.tree import build_tree
 
+from .compiled import Floats, Ints
 from .planar import StageAnswer
 from .scene import PlanarCurve, PlanarFinger, PlanarOutline
 
@@ -22,11 +24,11 @@ EMPTY_TREE = build_tree(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
 NO_ROUNDS = RoundArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)))
 
 
-def _ints(values) -> np.ndarray:
+def _ints(values: npt.ArrayLike) -> Ints:
     return np.asarray(values, dtype=np.int64)
 
 
-def side_rows(outline: PlanarOutline) -> np.ndarray:
+def side_rows(outline: PlanarOutline) -> Floats:
     """Return the sides of an outline as the kernel's rows (n_x, n_z, g, t_a, t_b)."""
     rows = []
     for i, j in outline.sides:

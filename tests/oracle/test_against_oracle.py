@@ -5,6 +5,7 @@ from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 
 import pytest
+
 from oracle.adapter import solve_planar
 from oracle.cases import cases, make_case
 from oracle.checking import check_answer

@@ -1,0 +1,1 @@
+"""An independent engine (python-fcl) judges contacts in three dimensions."""

@@ -1,0 +1,94 @@
+"""Contacts of real hands judged by python-fcl; `statistics.py` beside this file prints the full statistics."""
+
+import numpy as np
+import pytest
+
+import clench
+from clench.base.pose import Pose
+from clench.models.shapes import Shape, ShapeKind
+from engine.statistics import HANDS, OBJECTS, Judge
+from engine.surfaces import ShapeSurface, brute_distance, distance_to_tree, volume_tree
+
+ONE_MICROMETRE = 1e-6
+
+
+def test_the_engine_measures_points_exactly():
+    """Points on, near and far from a mesh: the engine and a look at every triangle agree to rounding."""
+    import trimesh
+
+    mesh = trimesh.creation.torus(0.03, 0.01, major_sections=24, minor_sections=12)
+    tree = volume_tree(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    rng = np.random.default_rng(0)
+    on, _ = trimesh.sample.sample_surface(mesh, 15, seed=0)
+    points = [*on, *(on + 1e-6), *rng.normal(scale=0.03, size=(15, 3)), *mesh.vertices[:5]]
+    for point in points:
+        expected = brute_distance(np.asarray(mesh.vertices), np.asarray(mesh.faces), point)
+        assert distance_to_tree(tree, point) == pytest.approx(expected, abs=1e-12)
+    assert max(distance_to_tree(tree, p) for p in on) < 1e-12
+
+
+@pytest.mark.parametrize("kind", [ShapeKind.SPHERE, ShapeKind.CAPSULE, ShapeKind.CYLINDER, ShapeKind.BOX])
+def test_distances_to_primitives(kind):
+    """Against a fine mesh of the shape, up to its deviation."""
+    shape = Shape(kind, (0.01, 0.02, 0.015), Pose([0.01, 0.0, 0.02], wxyz=[0.6, 0.0, 0.8, 0.0]))
+    mesh = shape.to_mesh(1e-5)
+    surface = ShapeSurface(shape)
+    for point in np.random.default_rng(1).normal(scale=0.03, size=(30, 3)):
+        expected = brute_distance(mesh.vertices, mesh.triangles, point)
+        assert surface.distance(point) == pytest.approx(expected, abs=1.1e-5)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("model", HANDS.values(), ids=HANDS)
+def test_contact_points_lie_on_object_and_link(shared_data, model):
+    hand = clench.Hand.load(shared_data / model)
+    seen = 0
+    for name in ("mug", "scissors", "torus"):
+        obj = clench.GraspObject.load(shared_data / OBJECTS[name])
+        judge = Judge(hand, obj)
+        for pose in clench.approach_poses(hand, obj, 2, seed=5):
+            for check in judge.contacts(clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))):
+                assert check.to_object <= ONE_MICROMETRE, check
+                assert check.to_link <= ONE_MICROMETRE, check
+                seen += 1
+    assert seen > 15
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("model", ["Barrett", "D'Claw"])
+def test_what_planes_miss_between_them_vanishes_with_more_planes(shared_data, model):
+    """The depth that is left is between the planes, and nowhere else."""
+    hand = clench.Hand.load(shared_data / HANDS[model])
+    obj = clench.GraspObject.load(shared_data / OBJECTS["wineglass"])
+    coarse, fine = [], []
+    for pose in clench.approach_poses(hand, obj, 4, seed=0):
+        for planes, depths in ((5, coarse), (161, fine)):
+            solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=planes))
+            depths.append(solution.max_penetration)
+    assert max(coarse) > 2e-5
+    assert max(fine) < 2e-5
+
+
+@pytest.mark.shared
+def test_depth_is_there_where_the_engine_sees_a_collision(shared_data):
+    """A depth of more than rounding is a collision of triangles, unless one lies wholly inside the other."""
+    import fcl
+
+    hand = clench.Hand.load(shared_data / HANDS["Barrett"])
+    obj = clench.GraspObject.load(shared_data / OBJECTS["torus"])
+    judge = Judge(hand, obj)
+    seen = set()
+    for pose in clench.approach_poses(hand, obj, 6, seed=2):
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+        q = np.array([solution.joint_angles[name] for name in hand.joint_names])
+        T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
+        collides = False
+        for link, T in zip(hand.links, T_object_palm @ hand.link_poses(q), strict=True):
+            for shape in link.shapes.get(hand.default_source, ()):
+                mesh = shape.to_mesh(1e-5)
+                placed = volume_tree(mesh.vertices @ T[:3, :3].T + T[:3, 3], mesh.triangles)
+                collides |= fcl.collide(fcl.CollisionObject(placed), fcl.CollisionObject(judge.trees[0])) > 0
+        if solution.max_penetration > 1e-6:
+            assert collides
+        seen.add(bool(collides))
+    assert True in seen

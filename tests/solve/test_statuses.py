@@ -1,0 +1,222 @@
+"""Whatever the object is and wherever it stands, the answer is a status with a reason whose numbers are true."""
+
+import numpy as np
+import pytest
+
+import clench
+from chain_hands import HandBuilder, along_x, mount, one_link, three_links, turned
+from clench.base.pose import Pose
+from clench.models.shapes import Shape, ShapeKind
+
+Y, Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+HALF = np.sqrt(0.5)
+
+
+def command(**changes):
+    return clench.GraspCommand(**{"hand_pose": Pose.identity(), "planes": 5, **changes})
+
+
+def palm_and_finger():
+    palm = Shape(ShapeKind.BOX, (0.04, 0.03, 0.01), Pose([0, 0, -0.01]))
+    builder = HandBuilder(palm)
+    return builder.finger(
+        "index", [along_x(0.007, 0.05), along_x(0.007, 0.04)], [0.05, 0.04], base=mount((0.05, 0, 0))
+    ).hand()
+
+
+def test_out_of_reach_of_every_finger():
+    solution = clench.solve(three_links(), clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0])), command())
+    assert solution.status == "no_contact"
+    assert solution.fingers["index"].status == "limit"
+    assert "index" in solution.reason["text"]
+    assert solution.contacts == ()
+    assert set(solution.joint_angles.values()) == {3.0}
+    assert solution.max_penetration == 0.0
+    assert not solution.is_valid()
+
+
+def test_a_finger_without_travel_cannot_move():
+    hand = HandBuilder().finger("index", [along_x(0.007, 0.05)], [0.05], upper=0.0).hand()
+    solution = clench.solve(hand, clench.GraspObject.load("sphere:r=0.01", pose=Pose([0.03, 0, 0.05])), command())
+    assert solution.fingers["index"].status == "no_motion"
+    assert solution.status == "no_contact"
+
+
+@pytest.mark.parametrize(
+    ("text", "position", "link"),
+    [
+        ("sphere:r=0.01", [0.03, 0.0, 0.005], "index_link_0"),
+        ("box:x=0.03,y=0.03,z=0.03", [0.12, 0.0, 0.0], "index_link_2"),
+        ("box:x=0.002,y=0.1,z=0.0005", [0.02, 0.0, 0.0], "index_link_0"),
+        ("ellipsoid:a=0.001,b=0.002,c=0.001", [0.07, 0.0, 0.0], "index_link_1"),
+    ],
+    ids=["ball", "tip in a box", "blade in a thick finger", "bead inside the finger"],
+)
+def test_finger_that_starts_inside_is_blocked_with_link_and_depth(text, position, link):
+    solution = clench.solve(three_links(), clench.GraspObject.load(text, pose=Pose(position)), command())
+    finger = solution.fingers["index"]
+    assert (solution.status, finger.status) == ("blocked", "blocked")
+    assert solution.reason["link"] == link
+    assert solution.reason["depth"] > 1e-4
+    assert link in finger.reason
+    assert "mm" in finger.reason
+    assert solution.contacts == ()
+    assert set(solution.joint_angles.values()) == {0.0}
+    assert not solution.is_valid()
+
+
+@pytest.mark.parametrize(
+    "rotation", [[1, 0, 0, 0], [HALF, HALF, 0, 0], [HALF, 0, HALF, 0], [0.96, 0.16, 0.2, 0.107703]]
+)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "cylinder:r=0.3,h=0.8",
+        "capsule:r=0.3,h=0.8",
+        "box:x=0.8,y=0.8,z=0.8",
+        "sphere:r=0.4",
+        "ellipsoid:a=0.4,b=0.3,c=0.5",
+    ],
+)
+def test_finger_wholly_inside_is_blocked(text, rotation):
+    """No curve crosses there: only a test of inside tells."""
+    obj = clench.GraspObject.load(
+        text, pose=Pose([0.02, 0.01, 0.03], wxyz=np.array(rotation) / np.linalg.norm(rotation))
+    )
+    solution = clench.solve(one_link(), obj, command(planes=1))
+    assert solution.status == "blocked"
+    assert solution.reason["depth"] > 0.2
+
+
+def test_one_blocked_finger_does_not_block_the_others():
+    builder = HandBuilder().finger("index", [along_x(0.007, 0.05)], [0.05], base=mount((0, 0.03, 0)))
+    hand = builder.finger("ring", [along_x(0.007, 0.05)], [0.05], base=mount((0, -0.03, 0))).hand()
+    obj = clench.GraspObject.load("cylinder:r=0.008,h=0.03", pose=Pose([0.03, -0.03, 0.02], wxyz=[HALF, HALF, 0, 0]))
+    thorn = clench.GraspObject.load("sphere:r=0.004").bodies[0].moved(obj.pose.inverse() @ Pose([0.03, 0.03, 0.005]))
+    solution = clench.solve(hand, obj.with_body(thorn), command())
+    assert solution.status == "partial"
+    assert {n: f.status for n, f in solution.fingers.items()} == {"index": "blocked", "ring": "touch"}
+    assert solution.joint_angles["index_0"] == 0.0
+
+
+def test_a_link_that_only_a_posture_joint_moves_blocks_its_finger():
+    shapes = [Shape(ShapeKind.SPHERE, (0.02, 0, 0)), along_x(0.007, 0.05), along_x(0.007, 0.04)]
+    roles = [clench.JointRole.POSTURE, clench.JointRole.CLOSING, clench.JointRole.CLOSING]
+    hand = HandBuilder().finger("index", shapes, [0.03, 0.05, 0.04], axes=[Z, -Y, -Y], roles=roles).hand()
+    solution = clench.solve(hand, clench.GraspObject.load("sphere:r=0.01", pose=Pose([0, 0, 0.015])), command())
+    assert solution.fingers["index"].status == "blocked"
+    assert solution.reason["link"] == "index_link_0"
+
+
+@pytest.mark.parametrize(
+    ("text", "position"),
+    [
+        ("sphere:r=0.02", [0, 0, 0.01]),
+        ("box:x=0.03,y=0.02,z=0.02", [0, 0.01, 0.005]),
+        ("cylinder:r=0.01,h=0.05", [0.01, 0, 0.004]),
+    ],
+)
+def test_the_retreat_of_an_overlapping_palm_frees_it(text, position):
+    obj, hand = clench.GraspObject.load(text, pose=Pose(position)), palm_and_finger()
+    solution = clench.solve(hand, obj, command())
+    assert solution.status == "blocked"
+    assert solution.reason["link"] == "palm"
+    assert solution.reason["depth"] > 0.001
+    retreat = solution.reason["retreat"]
+    back = clench.solve(hand, obj, command(hand_pose=Pose([0, 0, -retreat - 1e-7])))
+    assert back.status != "blocked"
+    assert clench.solve(hand, obj, command(hand_pose=Pose([0, 0, -retreat + 1e-5]))).status == "blocked"
+
+
+@pytest.mark.parametrize("tilt", [0.3, 1.3])
+def test_blades_stop_a_finger_however_thin(tilt):
+    """A blade of thickness 0 is the limit: the answers come closer to each other in proportion to the thickness."""
+    place = Pose.from_matrix(mount((0.03, 0, 0.03), turned(Y, tilt)))
+    angles = []
+    for thickness in (1e-5, 1e-7, 1e-9, 1e-12):
+        obj = clench.GraspObject.load(f"box:x=0.04,y=0.1,z={thickness}", pose=place)
+        solution = clench.solve(three_links(), obj, command())
+        assert solution.status == "grasp"
+        assert solution.max_penetration <= 1e-9
+        angles.append(np.array(list(solution.joint_angles.values())))
+    assert np.abs(angles[0] - angles[-1]).max() < 2e-3
+    assert np.abs(angles[1] - angles[-1]).max() < 2e-5
+    assert np.abs(angles[2] - angles[-1]).max() < 2e-7
+
+
+SHEET = np.array([[0.02, -0.05, 0.02], [0.06, -0.05, 0.02], [0.06, 0.05, 0.02], [0.02, 0.05, 0.02]])
+
+
+@pytest.mark.parametrize(
+    "faces", [[[0, 1, 2], [0, 2, 3]], [[0, 2, 1], [0, 3, 2]], [[0, 1, 2], [0, 3, 2]]], ids=["up", "down", "mixed"]
+)
+def test_open_sheets_stop_a_finger_from_either_side(faces):
+    """Winding means nothing on an open mesh; a sheet at z = 20 mm meets the link at its far corner or its near edge."""
+    solution = clench.solve(one_link(0.005, 0.2), clench.GraspObject.from_meshes([(SHEET, faces)]), command())
+    corner = np.array([0.06, 0.02])
+    expected = np.arctan2(corner[1], corner[0]) - np.arcsin(0.005 / np.hypot(*corner))
+    assert solution.joint_angles["index_0"] == pytest.approx(expected, abs=1e-9)
+    assert solution.status == "grasp"
+
+
+def test_triangles_without_area_change_nothing():
+    box = clench.GraspObject.load("box:x=0.02,y=0.1,z=0.02").bodies[0].shapes[0].to_mesh()
+    vertices = np.vstack([box.vertices, box.vertices[:1], 0.5 * (box.vertices[0] + box.vertices[1])])
+    slivers = [[0, 1, 9], [0, 8, 3], [8, 0, 0]]
+    place = Pose([0.05, 0.0, 0.04])
+    plain = clench.GraspObject.from_meshes([(box.vertices, box.triangles)], pose=place)
+    worse = clench.GraspObject.from_meshes([(vertices, np.vstack([box.triangles, slivers]))], pose=place)
+    a, b = (clench.solve(three_links(), obj, command()) for obj in (plain, worse))
+    assert a.joint_angles == pytest.approx(b.joint_angles, abs=1e-9)
+    assert b.status == "grasp"
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-15, -1e-13, 1e-12])
+def test_vertices_on_the_curl_planes(shift):
+    """A grid whose rows of vertices lie in the planes, to rounding; a flat plate has one answer."""
+    hand = one_link(0.007, 0.2)
+    plain = clench.GraspObject.load("box:x=0.04,y=0.2,z=0.02", pose=Pose([0.05, 0, 0.03]))
+    offsets = [
+        c.offset for c in clench.solve(hand, plain, command()).fingers["index"].candidates if c.offset is not None
+    ]
+    rows = np.array([-0.02, *offsets, 0.02]) + shift
+    vertices = np.array([[x, y, 0.02] for x in (0.03, 0.05, 0.07) for y in rows])
+    n = len(rows)
+    squares = [(i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1, i * n + j + 1) for i in range(2) for j in range(n - 1)]
+    faces = [t for a, b, c, d in squares for t in ((a, c, b), (a, d, c))]
+    solution = clench.solve(hand, clench.GraspObject.from_meshes([(vertices, faces)]), command())
+    corner = np.array([0.07, 0.02])
+    for candidate in solution.fingers["index"].candidates:
+        offset = 0.0 if candidate.offset is None else candidate.offset
+        thick = np.sqrt(0.007**2 - offset**2)
+        expected = np.arctan2(corner[1], corner[0]) - np.arcsin(thick / np.hypot(*corner))
+        assert candidate.joint_angles["index_0"] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-4, 1e3])
+def test_objects_much_smaller_or_larger_than_the_finger(size):
+    """A speck in front of the finger stops it; a wall larger than everything does too."""
+    lower = 0.02
+    obj = clench.GraspObject.load(f"box:x={size},y={max(size, 0.02)},z={size}", pose=Pose([0.05, 0, lower + size / 2]))
+    solution = clench.solve(one_link(0.007, 0.1), obj, command(planes=1))
+    assert solution.status == "grasp"
+    if size < 1.0:
+        corner = np.array([0.05 + size / 2, lower])
+        expected = np.arctan2(corner[1], corner[0]) - np.arcsin(0.007 / np.hypot(*corner))
+    else:
+        expected = np.arcsin((lower - 0.007) / 0.1)
+    assert solution.joint_angles["index_0"] == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_obstacle_stops_a_finger_but_is_no_grasp():
+    obj = clench.GraspObject.load("sphere:r=0.01", pose=Pose([0.5, 0, 0.5]))
+    wall = (
+        clench.GraspObject.load("box:x=0.05,y=0.1,z=0.01").bodies[0].moved(obj.pose.inverse() @ Pose([0.05, 0, 0.04]))
+    )
+    from dataclasses import replace
+
+    wall = replace(wall, role=clench.BodyRole.OBSTACLE, name="table")
+    solution = clench.solve(three_links(), obj.with_body(wall), command())
+    assert solution.status == "no_contact"
+    assert solution.fingers["index"].status == "limit"
+    assert "table" in solution.fingers["index"].reason
