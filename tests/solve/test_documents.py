@@ -49,7 +49,12 @@ def test_round_trip_through_a_file(solution: GraspSolution, tmp_path: Path) -> N
 
 
 @settings(deadline=None)
-@given(finite, st.lists(st.floats(-1e100, 1e100), min_size=3, max_size=3), st.text(), st.lists(st.floats(-1, 1), min_size=4, max_size=4))
+@given(
+    finite,
+    st.lists(st.floats(-1e100, 1e100), min_size=3, max_size=3),
+    st.text(),
+    st.lists(st.floats(-1, 1), min_size=4, max_size=4),
+)
 def test_round_trip_keeps_every_bit(number: float, vector: list[float], text: str, quaternion: list[float]) -> None:
     norm = float(np.linalg.norm(quaternion))
     pose = Pose(vector, wxyz=np.array(quaternion) / norm if norm > 1e-3 else (1, 0, 0, 0))
