@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections import OrderedDict
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -104,21 +103,6 @@ def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
 
 def hash_hand(hand: Hand, source: CollisionSource) -> str:
     """Return a SHA-256 over the hand's kinematics and its shapes of one collision source, hexadecimal."""
-    key = (id(hand), CollisionSource(source))
-    kept = _hashes.get(key)
-    if kept is None or kept[0] is not hand:
-        kept = _hashes[key] = (hand, _hash_hand(hand, key[1]))
-        while len(_hashes) > _KEPT_HASHES:
-            _hashes.popitem(last=False)
-    return kept[1]
-
-
-#: Hashes by identity of the hand; each entry holds its hand, so that the identity stays its own.
-_hashes: OrderedDict[tuple[int, CollisionSource], tuple[Hand, str]] = OrderedDict()
-_KEPT_HASHES: Final = 16
-
-
-def _hash_hand(hand: Hand, source: CollisionSource) -> str:
     digest = hashlib.sha256()
     digest.update(f"{hand.palm} {sorted(hand.fixed_links)}".encode())
     for link in hand.links:
