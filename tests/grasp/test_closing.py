@@ -1,0 +1,81 @@
+"""All candidates of all fingers in one call: items, arenas that grow, and independence of each other."""
+
+import numpy as np
+import pytest
+from small_chain import CLOSING, POSTURE, chain
+
+from clench.base.pose import Pose
+from clench.grasp import closing
+from clench.grasp.closing import close_hand, make_hand_plan
+from clench.grasp.plan import plan_finger
+from clench.grasp.scene import pack_object
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
+
+
+def plans(hand, count=3, q=None):
+    posture = np.zeros(len(hand.joints)) if q is None else np.array(q)
+    return [plan_finger(hand, f, posture, count, CollisionSource.ENGINE) for f in hand.fingers]
+
+
+def close(found, obj, full_width=True, rounds=1):
+    plan = make_hand_plan(found, range(len(found)), [0] * len(found), full_width)
+    return plan, close_hand(plan, pack_object(obj), obj.pose.matrix, rounds)
+
+
+BALL = GraspObject.load("sphere:r=0.02", pose=Pose([0.04, 0.001, 0.04]))
+
+
+def test_one_item_per_plane_and_one_for_the_full_width():
+    found = plans(chain([CLOSING, CLOSING], names=("a", "b")))
+    plan, _ = close(found, BALL)
+    assert plan.items.entry.tolist() == [0] * 4 + [1] * 4
+    assert plan.whole == (False, False, False, True) * 2
+    assert plan.items.high.tolist() == [1, 2, 3, 3] * 2
+    plan, _ = close(found, BALL, full_width=False)
+    assert not any(plan.whole)
+
+
+def test_fingers_close_as_they_would_alone():
+    hand = chain([CLOSING, CLOSING], names=("a", "b"), upper=2.5)
+    found = plans(hand)
+    _, together = close(found, BALL)
+    _, alone = close(found[1:], BALL)
+    np.testing.assert_array_equal(together.answer.travel[4:, 2:], alone.answer.travel)
+    assert (together.answer.travel > 0.0).any()
+
+
+def test_each_plane_closes_as_it_would_alone():
+    hand = chain([CLOSING, CLOSING], upper=2.5)
+    (three,) = plans(hand)
+    _, closed = close([three], BALL)
+    for k, offset in enumerate(three.families[0].offsets):
+        _, single = close([three], BALL, full_width=False)
+        np.testing.assert_array_equal(single.answer.travel[k], closed.answer.travel[k], err_msg=f"{offset}")
+
+
+@pytest.mark.parametrize("roles", [[CLOSING, CLOSING], [CLOSING, POSTURE, CLOSING]])
+def test_a_section_that_outgrows_its_arena_is_cut_anew(monkeypatch, roles):
+    """With room for one segment per plane, the answer is the same as with plenty."""
+    import trimesh
+
+    hand = chain(roles, upper=2.5)
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=0.02)
+    obj = GraspObject.from_meshes([(mesh.vertices, mesh.faces)], pose=Pose([0.04, 0.001, 0.04]))
+    found = plans(hand, q=[0.0, 0.3, 0.0][: len(roles)] if len(roles) == 3 else None)
+    _, plenty = close(found, obj)
+    monkeypatch.setattr(closing, "_CAPACITY", 1)
+    _, tight = close(found, obj)
+    np.testing.assert_array_equal(tight.answer.travel, plenty.answer.travel)
+    np.testing.assert_array_equal(tight.answer.point[..., :8], plenty.answer.point[..., :8])
+    assert plenty.answer.contacts.sum() > 4
+
+
+def test_overlap_at_the_start_is_noted_for_the_finger_it_concerns():
+    hand = chain([CLOSING], names=("a", "b"))
+    _, closed = close(plans(hand), BALL)
+    assert closed.overlaps.tolist() == [-1, -1]
+    inside = BALL.posed(Pose([0.02, 0.0, 0.02]))
+    plan, closed = close(plans(hand), inside)
+    assert (closed.overlaps >= 0).all()
+    assert plan.arrays.outlines.link[closed.overlaps].tolist() == [1, 2]

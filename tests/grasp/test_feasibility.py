@@ -1,0 +1,66 @@
+"""Which alternative sets a rigid hand could take: what is known without measuring, and what measuring finds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_chain import CLOSING, chain
+
+import clench
+from clench.base.pose import Pose
+from clench.grasp.candidates import FingerCandidate
+from clench.grasp.feasibility import judge_sets
+from clench.grasp.plan import plan_finger
+from clench.grasp.scene import pack_object
+from clench.models.shapes import CollisionSource
+
+HAND = chain([CLOSING], upper=2.0)
+PLAN = plan_finger(HAND, HAND.fingers[0], np.zeros(1), 3, CollisionSource.ENGINE)
+WALL = clench.GraspObject.load("box:x=0.02,y=0.1,z=0.02", pose=Pose([0.02, 0.0, 0.03]))
+
+
+def at(travel, plane=None):
+    travel = np.array([travel])
+    return FingerCandidate(PLAN, 0, plane, travel, PLAN.angles(HAND, travel), (), None)
+
+
+def judge(candidates, *, measure, hand=HAND, obj=WALL):
+    return judge_sets(hand, candidates, pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, measure)
+
+
+def first_touch():
+    corner = np.array([0.03, 0.02])
+    return float(np.arctan2(corner[1], corner[0]) - np.arcsin(0.006 / np.hypot(*corner)))
+
+
+def test_without_measuring_only_equality_with_the_full_width_is_known():
+    judged = judge([at(0.3, 0), at(0.4, 1), at(0.3)], measure=False)
+    assert [c.clear for c in judged] == [True, False, True]
+    assert all(c.penetration is None for c in judged)
+
+
+def test_measuring_finds_how_deep_the_path_goes():
+    touch = first_touch()
+    judged = judge([at(touch, 0), at(touch + 0.05, 1), at(touch - 1e-4)], measure=True)
+    assert [c.feasible for c in judged] == [True, False, True]
+    corner = np.array([0.03, 0.02])
+    turned = touch + 0.05
+    above = -np.sin(turned) * corner[0] + np.cos(turned) * corner[1]
+    assert judged[1].penetration == pytest.approx(0.006 - above, abs=3e-5)
+
+
+def test_a_path_that_passes_through_is_infeasible_though_its_end_is_free():
+    bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose([0.03, 0.0, 0.02]))
+    (judged,) = judge([at(1.9)], measure=True, obj=bead)
+    assert judged.feasible is False
+    assert judged.penetration > 1e-3
+
+
+def test_pads_may_be_indented():
+    touch = first_touch()
+    padded = replace(HAND, links=(HAND.links[0], replace(HAND.links[1], pad_indentation=0.001)))
+    for depth_angle, feasible in ((0.015, True), (0.05, False)):
+        (judged,) = judge([at(touch + depth_angle)], measure=True, hand=padded)
+        assert judged.feasible is feasible
+    (rigid,) = judge([at(touch + 0.015)], measure=True)
+    assert rigid.feasible is False
