@@ -99,6 +99,7 @@ def _check(report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence
         "answers_right": not wrong,
         "checked_contacts": checked.contacts,
         "worst_gap_m": checked.worst_gap,
+        "worst_overlap_m": checked.worst_overlap,
         "checked_surface_contacts": checked.surface_contacts,
         "worst_surface_distance_m": checked.worst_surface,
     }
