@@ -103,7 +103,7 @@ def test_mirror_image(obj):
     assert_same(right, left, flipped=True)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 0.1, 7.0, 1e3])
+@pytest.mark.parametrize("factor", [1e-3, 0.1, 30.0])
 @pytest.mark.parametrize("obj", OBJECTS, ids=lambda o: o.name)
 def test_scale(obj, factor):
     hand = two_fingers()
