@@ -21,27 +21,24 @@ from .turning_pairs import note
 def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
     """Return the point of an ellipse with semi-axes a >= b nearest to (t, y), by bisection on the multiplier.
 
-    The foot is `(a² t / (k + a²), b² y / (k + b²))` for the largest root k > -b² of
-    `(a t / (k + a²))² + (b y / (k + b²))² = 1`.
+    The foot is `(a² t / (m + a² - b²), b² y / m)` for the root m > 0 of `(a t / (m + a² - b²))² + (b y / m)² = 1`.
     """
     u, v = abs(t), abs(y)
-    if v == 0.0 and u * a <= a * a - b * b:
-        x = a * a * u / (a * a - b * b)
-        y0 = b * math.sqrt(max(1.0 - (x / a) ** 2, 0.0))
-        return math.copysign(x, t), y0
-    low = -b * b + b * v
-    high = -b * b + math.hypot(a * u, b * v)
-    for _ in range(200):
-        k = 0.5 * (low + high)
-        if k <= low or k >= high:
+    c = a * a - b * b
+    if v == 0.0 and u * a <= c:
+        x = a * a * u / c if c > 0.0 else a
+        return math.copysign(x, t), b * math.sqrt(max(1.0 - (x / a) ** 2, 0.0))
+    low, high = b * v, math.hypot(a * u, b * v)
+    for _ in range(1100):
+        m = 0.5 * (low + high)
+        if m <= low or m >= high:
             break
-        p, q = a * u / (k + a * a), b * v / (k + b * b)
+        p, q = a * u / (m + c), b * v / m
         if p * p + q * q > 1.0:
-            low = k
+            low = m
         else:
-            high = k
-    k = high
-    return math.copysign(a * a * u / (k + a * a), t), math.copysign(b * b * v / (k + b * b), y)
+            high = m
+    return math.copysign(a * (a * u / (high + c)), t), math.copysign(b * (b * v / high), y)
 
 
 @inner_kernel
