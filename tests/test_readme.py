@@ -1,0 +1,92 @@
+"""README and docs say what is true: the code runs, links lead somewhere, commands and keys exist and are all there."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import clench
+from clench.apps.cli.commands import COMMANDS
+from clench.models.command_file import KEYS, command_from_dict
+from clench.models.hand.hand_file import read_hand_file
+from handmade import make_solution
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def page(name: str) -> str:
+    return (ROOT / "docs" / name).read_text(encoding="utf-8")
+
+
+def test_the_ten_lines_run_and_their_number_is_right() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    names: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert names["report"].success
+    said = re.search(r'"index_proximal": ([\d.]+)', code)
+    assert said is not None
+    assert names["solution"].joint_angles["index_proximal"] == pytest.approx(float(said[1]), abs=0.005)
+
+
+@pytest.mark.parametrize("path", PAGES, ids=[p.name for p in PAGES])
+def test_links_lead_to_files(path: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", path.read_text(encoding="utf-8")):
+        assert target.startswith("https://") or (path.parent / target).exists(), target
+
+
+def test_the_table_lists_every_command() -> None:
+    assert set(re.findall(r"^\| `clench (\w+)", README, re.MULTILINE)) == set(COMMANDS)
+
+
+def test_the_two_commands_are_there() -> None:
+    assert "pip install uv && uv run clench demo " in README
+    assert "pip install uv && uv run pytest " in README
+
+
+def test_the_source_of_the_method_is_named() -> None:
+    assert "9,067,319" in README
+    assert "legal status" in README
+    assert "Apache-2.0" in README
+
+
+def test_every_key_of_a_command_file_is_documented() -> None:
+    documented = set(re.findall(r"`(\w+)`", page("command-file.md")))
+    assert set(KEYS) <= documented
+
+
+def test_the_command_file_shown_is_read() -> None:
+    import json
+
+    (shown,) = re.findall(r"\n\n(    \{.*?\})\n\n", page("command-file.md"), re.DOTALL)
+    command = command_from_dict(json.loads(shown))
+    solution = clench.solve(clench.Hand.load("robonaut2"), clench.GraspObject.load("ball"), command)
+    assert set(solution.fingers) == {"index", "middle", "thumb"}
+
+
+def test_every_key_of_a_solution_is_documented() -> None:
+    document = make_solution().to_dict()
+    finger = next(f for f in document["fingers"].values() if f["candidates"])
+    contact = document["contacts"][0]
+    documented = set(re.findall(r"`(\w+)", page("solution-format.md")))
+    for keys in (document, finger, finger["candidates"][0], contact):
+        assert set(keys) <= documented
+
+
+def test_the_hand_file_shown_is_read(tmp_path: Path) -> None:
+    blocks = re.findall(r"(?:^    .*\n|^\n(?=    ))+", page("hand-file.md"), re.MULTILINE)
+    text = "".join(blocks).replace("\n    ", "\n").removeprefix("    ").strip()
+    (tmp_path / "x.hand.toml").write_text(text, encoding="utf-8")
+    read = read_hand_file(tmp_path / "x.hand.toml")
+    assert read.palm == "link"
+    assert set(tomllib.loads(text)) == {
+        *("palm", "collision_source", "allowed_pairs", "fingers", "joints", "links", "tendons"),
+    }
+    assert read.joints["Y"].follows == "X"
+    assert read.tendons is not None
