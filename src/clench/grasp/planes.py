@@ -26,7 +26,9 @@ def family_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> F
         x = np.eye(3)[np.argmin(np.abs(y))]
         x = x - y * (x @ y)
         size = np.linalg.norm(x)
-    x = x / size
+    # Once more, now that it is long: the little that is left of a target almost on the axis is mostly rounding.
+    x = x / size - y * ((x / size) @ y)
+    x = x / np.linalg.norm(x)
     frame = np.eye(4)
     frame[:3, 0], frame[:3, 1], frame[:3, 2], frame[:3, 3] = x, y, np.cross(x, y), origin
     return frame
