@@ -1,11 +1,11 @@
-"""The one decorator of all kernels: strict floating point, cached on disk, without the interpreter's lock."""
+"""The decorators of all kernels: strict floating point, cached on disk, without the interpreter's lock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, types
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -15,10 +15,27 @@ def inner_kernel(function: Kernel) -> Kernel:
 
     A call from Python would end the process without a word; a test holds that there is none.
     """
-    options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return cast(Kernel, njit(cache=True, nogil=True, error_model="numpy", **options)(function))
+    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def kernel(function: Kernel) -> Kernel:
     """Compile a function on its first call; it keeps its signature."""
-    return cast(Kernel, njit(cache=True, nogil=True, error_model="numpy")(function))
+    return _compiled(function)
+
+
+def _compiled(function: Kernel, **options: bool) -> Kernel:
+    """Compile a function on its first call, once for all values of a number.
+
+    Numba would compile it anew for every integer that another kernel writes out in a call.
+    """
+    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
+        return cast(Kernel, dispatcher)
+    choose = dispatcher.get_call_template
+
+    def choose_plain(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        plain = tuple(types.unliteral(a) for a in args)
+        return choose(plain, {name: types.unliteral(a) for name, a in kws.items()})
+
+    dispatcher.get_call_template = choose_plain
+    return cast(Kernel, dispatcher)
