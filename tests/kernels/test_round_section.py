@@ -11,7 +11,7 @@ from clench.kernels.section import cut_mesh
 from clench.models.shapes import Shape, ShapeKind
 
 region_gap, cut_rounds = entry(conics.region_gap), entry(family_section.cut_rounds)
-make_sections = entry(family_section.make_sections)
+make_sections = family_section.make_sections
 
 NUMBER = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
 SIZE = (0.02, 0.035, 0.028)

@@ -15,7 +15,7 @@ def inner_kernel(function: Kernel) -> Kernel:
 
     A call from Python would end the process without a word; a test holds that there is none.
     """
-    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return _compiled(function, no_cpython_wrapper=True)
 
 
 def kernel(function: Kernel) -> Kernel:
@@ -28,7 +28,8 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
 
     Numba would compile it anew for every integer that another kernel writes out in a call.
     """
-    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    compiled = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
+    dispatcher: Any = compiled(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
     choose = dispatcher.get_call_template

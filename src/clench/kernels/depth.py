@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 from .distance import Point, closest_within, corners, is_inside
 from .tree import Floats, Ints, MeshTree
 
@@ -58,7 +58,7 @@ def penetration(
     return depth, p[0], p[1], p[2]
 
 
-@kernel
+@inner_kernel
 def moved(T: Floats, p: Point) -> Point:
     """Map a point by a transform, shape (3, 4)."""
     return (
@@ -68,7 +68,7 @@ def moved(T: Floats, p: Point) -> Point:
     )
 
 
-@kernel
+@inner_kernel
 def _deepest(
     a: MeshTree,
     owners: Masks,
@@ -106,7 +106,7 @@ def _deepest(
     return best, place
 
 
-@kernel
+@inner_kernel
 def _is_shallow(b: MeshTree, center: Point, radius: float, closed: bool, best: float, stack: Ints) -> bool:
     """Say whether no point of a ball can be deeper inside b than `best`: depth changes no faster than place."""
     if b.low.shape[0] == 0:
@@ -125,7 +125,7 @@ def _is_shallow(b: MeshTree, center: Point, radius: float, closed: bool, best: f
     return True
 
 
-@kernel
+@inner_kernel
 def _deeper(b: MeshTree, p: Point, closed: bool, best: float, place: Point, stack: Ints) -> Deepest:
     """Return the deeper of `best` and the depth of p inside b, with its place."""
     if best > 0.0 and closest_within(b, p, best, stack)[1] >= 0:
@@ -138,7 +138,7 @@ def _deeper(b: MeshTree, p: Point, closed: bool, best: float, place: Point, stac
     return best, place
 
 
-@kernel
+@inner_kernel
 def _deeper_on_edge(
     b: MeshTree, p: Point, q: Point, closed: bool, best: float, place: Point, crossings: Floats, stack: Ints
 ) -> Deepest:
@@ -146,7 +146,6 @@ def _deeper_on_edge(
     number = _cross_edge(b, p, q, crossings)
     if number == 0:
         return best, place
-    crossings[:number].sort()
     start = 0.0
     for i in range(number + 1):
         end = crossings[i] if i < number else 1.0
@@ -158,9 +157,9 @@ def _deeper_on_edge(
     return best, place
 
 
-@kernel
+@inner_kernel
 def _cross_edge(b: MeshTree, p: Point, q: Point, crossings: Floats) -> int:
-    """Write where the edge pq crosses b, as fractions of its length; return how often."""
+    """Write where the edge pq crosses b, as fractions of its length in ascending order; return how often."""
     vertices, triangles, low, high = b.vertices, b.triangles, b.low, b.high
     first, count, skip = b.first, b.count, b.skip
     number, node = 0, 0
@@ -172,13 +171,17 @@ def _cross_edge(b: MeshTree, p: Point, q: Point, crossings: Floats) -> int:
             u, v, w = corners(vertices, triangles, t)
             s = _cross_triangle(p, q, u, v, w)
             if s >= 0.0 and number < CROSSINGS:
-                crossings[number] = s
+                at = number
+                while at > 0 and crossings[at - 1] > s:
+                    crossings[at] = crossings[at - 1]
+                    at -= 1
+                crossings[at] = s
                 number += 1
         node += 1
     return number
 
 
-@kernel
+@inner_kernel
 def _edge_misses(low: Floats, high: Floats, node: int, p: Point, q: Point) -> bool:
     enter, leave = 0.0, 1.0
     for k in range(3):
@@ -193,7 +196,7 @@ def _edge_misses(low: Floats, high: Floats, node: int, p: Point, q: Point) -> bo
     return enter > leave
 
 
-@kernel
+@inner_kernel
 def _cross_triangle(p: Point, q: Point, a: Point, b: Point, c: Point) -> float:
     """Return where the edge pq crosses a triangle, as a fraction of its length; -1 when it does not."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

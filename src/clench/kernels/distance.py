@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 from .tree import STACK_SIZE, Floats, Ints, MeshTree
 
 Point = tuple[float, float, float]
@@ -51,7 +51,7 @@ def closest_point(tree: MeshTree, p: Any, bound: float) -> tuple[float, int, flo
     return found
 
 
-@kernel
+@inner_kernel
 def closest_within(tree: MeshTree, p: Point, bound: float, stack: Ints) -> tuple[float, int, float, float, float]:
     """Do as `closest_point` with a stack of `STACK_SIZE` entries that the caller gives."""
     vertices, triangles, low, high = tree.vertices, tree.triangles, tree.low, tree.high
@@ -134,7 +134,7 @@ def winding_number(tree: MeshTree, p: Any) -> float:
     return total / (2.0 * np.pi)
 
 
-@kernel
+@inner_kernel
 def _crossings(tree: MeshTree, p: Point, ray: int) -> tuple[bool, int]:
     """Count the signed crossings of a ray from p with the mesh; say whether it met no edge and no vertex."""
     vertices, triangles, low, high = tree.vertices, tree.triangles, tree.low, tree.high
@@ -170,7 +170,7 @@ def _crossings(tree: MeshTree, p: Point, ray: int) -> tuple[bool, int]:
     return clear, winding
 
 
-@kernel
+@inner_kernel
 def _ray_misses(low: Floats, high: Floats, node: int, p: Point, dx: float, dy: float, dz: float) -> bool:
     enter, leave = 0.0, np.inf
     slack = 1e-12 * (high[0, 0] - low[0, 0] + high[0, 1] - low[0, 1] + high[0, 2] - low[0, 2])
@@ -183,7 +183,7 @@ def _ray_misses(low: Floats, high: Floats, node: int, p: Point, dx: float, dy: f
     return bool(enter > leave)
 
 
-@kernel
+@inner_kernel
 def _box_distance(low: Floats, high: Floats, node: int, p: Point) -> float:
     """Return the squared distance from a point to a node's box [m²]."""
     x = max(low[node, 0] - p[0], p[0] - high[node, 0], 0.0)
@@ -192,7 +192,7 @@ def _box_distance(low: Floats, high: Floats, node: int, p: Point) -> float:
     return float(x * x + y * y + z * z)
 
 
-@kernel
+@inner_kernel
 def corners(vertices: Floats, triangles: Ints, t: int) -> tuple[Point, Point, Point]:
     """Return the three corners of a triangle."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]

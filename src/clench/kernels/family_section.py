@@ -12,7 +12,6 @@ from .section import cut
 from .tree import MeshTree
 
 
-@kernel
 def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
     """Allocate an arena; a round primitive gives at most four segments, two disks and one ellipse."""
     return SectionArrays(

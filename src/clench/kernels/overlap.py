@@ -132,7 +132,7 @@ def starts_inside(
     for k in range(3):
         if p[k] < tree.low[0, k] or p[k] > tree.high[0, k]:
             return False
-    return bool(is_inside(tree, p, closed))
+    return bool(is_inside(tree, (p[0], p[1], p[2]), closed))
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 from .tree import Floats, Ints, MeshTree, build_tree
 
 Row = tuple[float, float, float, float]
@@ -127,7 +127,7 @@ def cut(tree: MeshTree, T: Floats, offset: float, reach: float, segments: Floats
     return found if found <= segments.shape[0] else -found
 
 
-@kernel
+@inner_kernel
 def _misses(
     cx: float,
     cy: float,
@@ -154,7 +154,7 @@ def _misses(
     return x * x + z * z > reach * reach
 
 
-@kernel
+@inner_kernel
 def _segment(
     a: Point, b: Point, c: Point, x_row: Row, y_row: Row, z_row: Row, on: float
 ) -> tuple[int, float, float, float, float]:
@@ -195,31 +195,31 @@ def _segment(
     return ends, u[0], u[1], v[0], v[1]
 
 
-@kernel
+@inner_kernel
 def _dot(row: Row, m: Row) -> float:
     return row[0] * m[0] + row[1] * m[1] + row[2] * m[2]
 
 
-@kernel
+@inner_kernel
 def _map(row: Row, p: Point) -> float:
     return row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]
 
 
-@kernel
+@inner_kernel
 def _add(ends: int, u: Flat, v: Flat, point: Flat) -> tuple[int, Flat, Flat]:
     if ends == 0:
         return 1, point, v
     return ends + 1, u, point
 
 
-@kernel
+@inner_kernel
 def _crossing(p: Flat, q: Flat, dp: float, dq: float) -> Flat:
     """Return the point between p and q at distances dp and dq from the plane: the same bits with both exchanged."""
     share = 1.0 / (dp + dq)
     return (p[0] * dq + q[0] * dp) * share, (p[1] * dq + q[1] * dp) * share
 
 
-@kernel
+@inner_kernel
 def _within(ax: float, az: float, bx: float, bz: float, reach: float) -> bool:
     """Say whether a segment comes as near to the origin as `reach`."""
     if ax * ax + az * az <= reach * reach:
@@ -233,7 +233,7 @@ def _within(ax: float, az: float, bx: float, bz: float, reach: float) -> bool:
     return x * x + z * z <= reach * reach
 
 
-@kernel
+@inner_kernel
 def _normal(ax: float, az: float, bx: float, bz: float, fx: float, fz: float, short: float) -> Flat:
     """Return the unit normal of a segment on the side of the face's projected normal; zero without one."""
     if fx == 0.0 and fz == 0.0:

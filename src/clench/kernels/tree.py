@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .compiling import kernel
+from .compiling import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -73,7 +73,7 @@ def build_tree(vertices: ArrayLike, triangles: ArrayLike, body: ArrayLike | None
         raise ValueError(f"triangles: expected vertex indices from 0 to {len(v) - 1}, got {t.min()} to {t.max()}.")
     if b.shape != (len(t),):
         raise ValueError(f"body: expected {len(t)} numbers, one per triangle, got shape {b.shape}.")
-    order, low, high, first, count, right, skip = _build(v, t)
+    order, low, high, first, count, right, skip = _grow(v, t)
     t = np.ascontiguousarray(t[order])
     normals = np.empty((len(t), 3))
     face_normals(v, t, normals)
@@ -123,25 +123,62 @@ def face_normals(vertices: Floats, triangles: Ints, out: Floats) -> None:
         out[i, 2] = nz / area
 
 
-@kernel
-def _build(vertices: Floats, triangles: Ints) -> Any:
+def _grow(vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats, Ints, Ints, Ints, Ints]:
+    """Return the order of the triangles and the nodes.
+
+    The arrays are made here: every kind of allocation in a kernel is one more function to compile.
+    """
     size = triangles.shape[0]
     capacity = max(2 * size - 1, 0)
-    boxes, centers = _triangle_boxes(vertices, triangles)
-    order = np.arange(size).astype(np.int32)
-    low = np.empty((capacity, 3))
-    high = np.empty((capacity, 3))
-    first = np.zeros(capacity, dtype=np.int32)
-    count = np.zeros(capacity, dtype=np.int32)
-    right = np.full(capacity, -1, dtype=np.int32)
-    skip = np.empty(capacity, dtype=np.int32)
-    scratch = np.empty(size, dtype=np.int32)
-    bin_boxes = np.empty((_BINS, 6))
-    areas = np.empty(_BINS)
-    numbers = np.empty(_BINS, dtype=np.int64)
-    todo = np.empty((2 * STACK_SIZE, 4), dtype=np.int64)
-    todo[0] = np.array([0, size, -1, 0])
-    waiting = 1 if size else 0
+    order = np.arange(size, dtype=np.int32)
+    low, high = np.empty((capacity, 3)), np.empty((capacity, 3))
+    first, count = np.zeros(capacity, dtype=np.int32), np.zeros(capacity, dtype=np.int32)
+    right, skip = np.full(capacity, -1, dtype=np.int32), np.empty(capacity, dtype=np.int32)
+    boxes, centers = np.empty((size, 6)), np.empty((size, 3))
+    scratch, numbers = np.empty(size, dtype=np.int32), np.empty(_BINS, dtype=np.int64)
+    bin_boxes, areas = np.empty((_BINS, 6)), np.empty(_BINS)
+    todo = np.zeros((2 * STACK_SIZE, 4), dtype=np.int64)
+    todo[0] = 0, size, -1, 0
+    triangle_boxes(vertices, triangles, boxes, centers)
+    nodes = part_nodes(
+        boxes, centers, order, low, high, first, count, right, skip, scratch, bin_boxes, numbers, areas, todo
+    )
+    return (
+        order,
+        low[:nodes].copy(),
+        high[:nodes].copy(),
+        first[:nodes].copy(),
+        count[:nodes].copy(),
+        right[:nodes].copy(),
+        skip[:nodes].copy(),
+    )
+
+
+@kernel
+def part_nodes(
+    boxes: Floats,
+    centers: Floats,
+    order: Ints,
+    low: Floats,
+    high: Floats,
+    first: Ints,
+    count: Ints,
+    right: Ints,
+    skip: Ints,
+    scratch: Ints,
+    bin_boxes: Floats,
+    numbers: Any,
+    areas: Floats,
+    todo: Any,
+) -> int:
+    """Part the triangles into nodes until leaves are left; write `order` and the nodes, return how many there are.
+
+    Args:
+        boxes, centers: see `triangle_boxes`. order: triangles, 0 ... T - 1 at the start, (T,).
+        low, high, first, count, right, skip: the nodes, with room for 2 T - 1; `first` and `count` 0, `right` -1.
+        scratch: (T,). bin_boxes, numbers, areas: one row per bin. todo: stack, whose first row is (0, T, -1, 0).
+    """
+    waiting = 1 if order.shape[0] else 0
     nodes = 0
     while waiting:
         waiting -= 1
@@ -164,23 +201,13 @@ def _build(vertices: Floats, triangles: Ints) -> Any:
         waiting += 2
     for node in range(nodes - 1, -1, -1):
         skip[node] = node + 1 if count[node] else skip[right[node]]
-    return (
-        order,
-        low[:nodes].copy(),
-        high[:nodes].copy(),
-        first[:nodes].copy(),
-        count[:nodes].copy(),
-        right[:nodes].copy(),
-        skip[:nodes].copy(),
-    )
+    return nodes
 
 
 @kernel
-def _triangle_boxes(vertices: Floats, triangles: Ints) -> tuple[Floats, Floats]:
-    size = triangles.shape[0]
-    boxes = np.empty((size, 6))
-    centers = np.empty((size, 3))
-    for i in range(size):
+def triangle_boxes(vertices: Floats, triangles: Ints, boxes: Floats, centers: Floats) -> None:
+    """Write the box of each triangle as (low, high), shape (T, 6), and the middle of each box, shape (T, 3)."""
+    for i in range(triangles.shape[0]):
         for k in range(3):
             a = vertices[triangles[i, 0], k]
             b = vertices[triangles[i, 1], k]
@@ -188,10 +215,9 @@ def _triangle_boxes(vertices: Floats, triangles: Ints) -> tuple[Floats, Floats]:
             boxes[i, k] = min(a, b, c)
             boxes[i, k + 3] = max(a, b, c)
             centers[i, k] = 0.5 * (boxes[i, k] + boxes[i, k + 3])
-    return boxes, centers
 
 
-@kernel
+@inner_kernel
 def _bounds(boxes: Floats, order: Ints, start: int, end: int, low: Floats, high: Floats, node: int) -> None:
     for k in range(3):
         low[node, k] = np.inf
@@ -203,7 +229,7 @@ def _bounds(boxes: Floats, order: Ints, start: int, end: int, low: Floats, high:
             high[node, k] = max(high[node, k], boxes[t, k + 3])
 
 
-@kernel
+@inner_kernel
 def _split(
     boxes: Floats,
     centers: Floats,
@@ -245,7 +271,7 @@ def _split(
     return middle
 
 
-@kernel
+@inner_kernel
 def _fill_bins(
     boxes: Floats,
     centers: Floats,
@@ -272,7 +298,7 @@ def _fill_bins(
             bin_boxes[j, k + 3] = max(bin_boxes[j, k + 3], boxes[t, k + 3])
 
 
-@kernel
+@inner_kernel
 def _best_cut(bin_boxes: Floats, numbers: Any, areas: Floats) -> int:
     """Return the bin before which to cut: the least sum of area times number of triangles."""
     for side in range(2):
