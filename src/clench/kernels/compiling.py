@@ -28,15 +28,14 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
 
     Numba would compile it anew for every integer that another kernel writes out in a call.
     """
-    compiled = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
-    dispatcher: Any = compiled(function)
+    settings: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+    dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
-    choose = dispatcher.get_call_template
+    choose, plain = dispatcher.get_call_template, types.unliteral
 
     def choose_plain(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-        plain = tuple(types.unliteral(a) for a in args)
-        return choose(plain, {name: types.unliteral(a) for name, a in kws.items()})
+        return choose(tuple(map(plain, args)), {name: plain(a) for name, a in kws.items()})
 
     dispatcher.get_call_template = choose_plain
     return cast(Kernel, dispatcher)

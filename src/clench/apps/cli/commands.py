@@ -80,6 +80,7 @@ def solve(
     from dataclasses import replace
 
     import clench
+    from clench.kernels.warming import warm_up
 
     from .printing import print_solution
     from .results import print_json, write_results
@@ -94,6 +95,7 @@ def solve(
         the_command = replace(the_command, planes=planes)
     if order is not None:
         the_command = replace(the_command, order=clench.ClosingOrder(order))
+    warm_up()
     solution = clench.solve(the_hand, the_object, the_command)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
     files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)

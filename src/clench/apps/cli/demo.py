@@ -35,6 +35,7 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         0 when the hand grasps and the simulated hand reaches the computed angles, else 1.
     """
     import clench
+    from clench.kernels.warming import warm_up
 
     from .printing import print_files, print_report, print_solution
 
@@ -42,7 +43,8 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
     with _progress() as step:
         step(f"Loading hand '{hand_model}' and object '{object_model}'")
         hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)
-        step("Solving (the first run compiles the kernels: a minute or two; later runs load them in seconds)")
+        step("Solving (the first run compiles the kernels, which takes most of a minute; later runs load them)")
+        warm_up()
         command = choose_command(hand, obj, (hand_model, object_model), seed)
         # The first call of a process loads the compiled kernels; this one shows what a solve takes.
         solution = clench.solve(hand, obj, command)
