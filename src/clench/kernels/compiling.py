@@ -32,7 +32,8 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
     dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
-    choose, plain = dispatcher.get_call_template, types.unliteral
+    choose = dispatcher.get_call_template
+    plain: Any = types.unliteral
 
     def choose_plain(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
         return choose(tuple(map(plain, args)), {name: plain(a) for name, a in kws.items()})
