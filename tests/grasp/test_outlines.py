@@ -5,7 +5,7 @@ import pytest
 
 from clench.base.pose import Pose
 from clench.base.tolerances import OUTLINE_DEVIATION
-from clench.grasp.outlines import RoundedOutline, cut_shape, extent
+from clench.grasp.outlines import RoundedOutline, cut_shape, extent, without_seams
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import Shape, ShapeKind
 
@@ -108,6 +108,45 @@ def test_sides_of_a_mesh_look_out_and_meet_their_vertices():
     assert (outline.sides[:, 2] > 0.0).all()
     assert np.abs(outline.side_ends()).reshape(-1, 2).max(axis=0) == pytest.approx([0.01, 0.03])
     assert set(map(tuple, np.round(outline.vertices, 12))) >= {(x, z) for x in (-0.01, 0.01) for z in (-0.03, 0.03)}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_outline_of_a_box_does_not_depend_on_how_its_faces_are_split(seed):
+    """The diagonals of faces are no corners, so the outline of a mirrored box is the image of the box's."""
+    T, _ = placed(seed)
+    shape = Shape(ShapeKind.BOX, SIZE)
+    low, high = extent(shape, T.matrix)
+    box = shape.to_mesh()
+    # Split the other way, in each pair of triangles: the box's mirror image, at the same place.
+    other = Shape(ShapeKind.MESH, mesh=TriangleMesh(box.vertices * [1, -1, 1], box.triangles[:, ::-1]))
+    for offset in np.linspace(low, high, 9)[1:-1]:
+        outline, image = cut_shape(shape, T.matrix, offset), cut_shape(other, T.matrix, offset)
+        assert len(outline.vertices) == len(outline.sides) <= 6
+        np.testing.assert_allclose(image.vertices, outline.vertices, atol=1e-15)
+        order, image_order = (np.argsort(np.arctan2(o.sides[:, 1], o.sides[:, 0])) for o in (outline, image))
+        np.testing.assert_allclose(image.sides[image_order], outline.sides[order], atol=1e-12)
+
+
+def test_only_straight_seams_within_one_side_are_joined():
+    """A corner stays; so do two sides that meet in a point with a third, and ends of an open curve."""
+    corner = [[0, 0, 1, 0, 0, -1], [2, 1, 1, 0, np.sqrt(0.5), -np.sqrt(0.5)]]
+    np.testing.assert_array_equal(np.unique(without_seams(np.array(corner, dtype=float))[:, :4]), [0, 1, 2])
+    assert len(without_seams(np.array(corner, dtype=float))) == 2
+    seam = np.array([[3, 0, 1, 0, 0, -1], [0, 0, 1, 0, 0, -1], [3, 0, 4, 0, 0, -1]], dtype=float)
+    np.testing.assert_allclose(without_seams(seam), [[0, 0, 4, 0, 0, -1]])
+    branch = np.vstack([seam, [[1, 0, 1, 2, 1, 0], [1, 0, 1, 2, -1, 0]]])
+    assert len(without_seams(branch)) == 4
+    back_to_back = np.array([[0, 0, 1, 0, 0, -1], [1, 0, 2, 0, 0, 1]], dtype=float)
+    assert len(without_seams(back_to_back)) == 2
+
+
+def test_curves_of_fine_meshes_keep_their_points():
+    turn = np.linspace(0, 2 * np.pi, 20000, endpoint=False)
+    points = 0.01 * np.column_stack([np.cos(turn), np.sin(turn)])
+    middle = turn + np.pi / 20000
+    rows = np.column_stack([points, np.roll(points, -1, axis=0), np.cos(middle), np.sin(middle)])
+    joined = without_seams(rows)
+    assert np.hypot(*(joined[:, :2] + joined[:, 2:4]).T / 2).min() > 0.01 - 1e-9
 
 
 @pytest.mark.parametrize("spoil", ["open", "flipped"])

@@ -153,15 +153,8 @@ def test_real_hands_moved_and_scaled(shared_data, model):
         assert_same(here, clench.solve(small, smaller, clench.GraspCommand(hand_pose=scaled_pose(pose, 0.01))))
 
 
-MIRRORED = [
-    # Open: on one pose a joint of LEAP's second family stops 1.5 mrad apart from its mirror image.
-    pytest.param(model, id=name, marks=[pytest.mark.xfail(reason="second family, 1.5 mrad")] if name == "LEAP" else [])
-    for name, model in HANDS.items()
-]
-
-
 @pytest.mark.shared
-@pytest.mark.parametrize("model", MIRRORED)
+@pytest.mark.parametrize("model", HANDS.values(), ids=HANDS)
 def test_real_hands_mirrored(shared_data, model):
     hand = clench.Hand.load(shared_data / model)
     obj = clench.GraspObject.load(shared_data / TORUS)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Axes closer than this to the plane count as lying in it [rad].
 ALIGNED = 1e-9
+#: Corners nearer than this to the line between their neighbours are none [fraction of the largest coordinate].
+_STRAIGHT = 1e-12
 _ROUND = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
 
 
@@ -109,8 +111,68 @@ def _cut_mesh(mesh: TriangleMesh, T: FloatArray, offset: float) -> RoundedOutlin
     segments, _ = cut_mesh(tree, T, offset)
     if not len(segments):
         return None
+    segments = without_seams(segments)
     ends = segments[:, :4].reshape(-1, 2)
     return RoundedOutline(np.unique(ends, axis=0), _side_rows(segments), 0.0, not closed, 0.0)
+
+
+def without_seams(segments: FloatArray) -> FloatArray:
+    """Join segments that go straight on: where two triangles of one flat face meet there is no corner.
+
+    With such corners an outline would depend on how the faces are split, and a mirrored box would not have those of
+    the box's image.
+
+    Args:
+        segments: rows (a_x, a_z, b_x, b_z, n_x, n_z) [m], shape (S, 6); joined only where normals agree.
+    """
+    a, b, n = segments[:, 0:2], segments[:, 2:4], segments[:, 4:6]
+    # Ends in the order of (-n_z, n_x), so that sides of one piece follow each other.
+    ahead = ((b - a) * np.column_stack([-n[:, 1], n[:, 0]])).sum(axis=1, keepdims=True) >= 0.0
+    start, end = np.where(ahead, a, b), np.where(ahead, b, a)
+    real = (start != end).any(axis=1)
+    if not real.any():
+        return segments
+    start, end, n = start[real], end[real], n[real]
+    slack = _STRAIGHT * float(np.abs(segments[:, :4]).max())
+    following = _followers(start, end, n, slack)
+    kept = np.ones(len(n), dtype=bool)
+    for head in np.setdiff1d(np.flatnonzero(following >= 0), following):
+        i, seam, k = head, [], following[head]
+        while k >= 0:
+            seam.append(start[k])
+            if _in_line(start[i], np.array(seam), end[k], slack).all():
+                kept[k], end[i] = False, end[k]
+                run = end[i] - start[i]
+                n[i] = np.array([run[1], -run[0]]) / np.linalg.norm(run)
+            else:
+                i, seam = k, []
+            k = following[k]
+    return np.hstack([start, end, n])[kept]
+
+
+def _followers(start: FloatArray, end: FloatArray, n: FloatArray, slack: float) -> np.ndarray:
+    """Return, for every segment, the one that goes on from its end in nearly the same line, or -1."""
+    points, index = np.unique(np.vstack([start, end]), axis=0, return_inverse=True)
+    first, last = np.split(index.ravel(), 2)
+    count = len(points)
+    single = (np.bincount(first, minlength=count) == 1) & (np.bincount(last, minlength=count) == 1)
+    after = np.full(count, -1)
+    after[first] = np.arange(len(first))
+    following = np.where(single[last], after[last], -1)
+    i = np.flatnonzero(following >= 0)
+    k = following[i]
+    straight = _in_line(start[i], end[i], end[k], slack) & ((n[i] * n[k]).sum(axis=1) > 0.0)
+    following[i[~straight]] = -1
+    return following
+
+
+def _in_line(a: FloatArray, points: FloatArray, b: FloatArray, slack: float) -> np.ndarray:
+    """Say which points lie within `slack` of the line through a and b, shape (N,); all may be rows."""
+    run = b - a
+    away = points - a
+    across = np.abs(run[..., 0] * away[:, 1] - run[..., 1] * away[:, 0])
+    near: np.ndarray = across <= slack * np.linalg.norm(run, axis=-1)
+    return near
 
 
 @lru_cache(maxsize=512)
