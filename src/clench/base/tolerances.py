@@ -6,6 +6,8 @@ from typing import Final
 
 #: Feature pairs with |gap| below this fraction of the finger's length touch [-] (section 3).
 TOUCH_FRACTION: Final = 1e-9
+#: The exact sweep stops a link at a positive gap of at most this fraction of the finger's length [-] (section 5).
+SWEEP_FRACTION: Final = 1e-10
 #: Foot points count as inside up to this fraction of the feature's length [-] (section 3).
 FOOT_FRACTION: Final = 1e-12
 #: Axes closer than this share one family of curl planes [rad] (section 1).

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from clench.base.pose import FloatArray
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
-from .closing import HandPlan
+from .closing import ClosedHand, HandPlan
 from .depths import LinkDepth, hand_depths
 from .plan import FingerPlan
 from .scene import PackedObject
@@ -18,7 +16,7 @@ from .scene import PackedObject
 def start_overlaps(
     hand: Hand,
     plan: HandPlan,
-    found: np.ndarray,
+    closed: ClosedHand,
     packed: PackedObject,
     T_palm_object: FloatArray,
     source: CollisionSource,
@@ -26,12 +24,12 @@ def start_overlaps(
     """Return, for every entry, the link that overlaps the object deepest at the start, or None.
 
     Args:
-        hand: the hand. plan: of its fingers. found: per entry, an outline that overlaps on a plane, or -1.
+        hand: the hand. plan: of its fingers. closed: which entries overlap, on a plane or anywhere over their width.
         packed, T_palm_object: the object, shape (4, 4). source: geometry of the hand.
     """
     result: list[LinkDepth | None] = []
     for entry, finger in enumerate(plan.plans):
-        crossed = int(found[entry])
+        crossed = _crossed_link(plan, closed, entry)
         # Links that closing moves are judged on the planes; those that only the posture moves lie on none.
         links = finger.finger.links if crossed >= 0 else _resting_links(hand, finger)
         depths = hand_depths(hand, finger.posture, packed, T_palm_object, source, links=links) if links else ()
@@ -39,10 +37,17 @@ def start_overlaps(
         if deepest is not None and deepest.depth > ALLOWED_PENETRATION:
             result.append(deepest)
         elif crossed >= 0:
-            result.append(LinkDepth(int(plan.arrays.outlines.link[crossed]), 0.0, None))
+            result.append(LinkDepth(crossed, 0.0, None))
         else:
             result.append(None)
     return result
+
+
+def _crossed_link(plan: HandPlan, closed: ClosedHand, entry: int) -> int:
+    """Return a moving link that overlaps the object at the start, or -1."""
+    if closed.overlaps[entry] >= 0:
+        return int(plan.arrays.outlines.link[closed.overlaps[entry]])
+    return int(closed.answer.overlap[plan.items.entry == entry].max(initial=-1))
 
 
 def _resting_links(hand: Hand, plan: FingerPlan) -> tuple[int, ...]:

@@ -26,8 +26,10 @@ class Touch:
 
     Args:
         link, joint: indices in the hand: the touching link, and the leader of the group it stopped.
-        body: index of the touched body. graspable: whether that body is to be grasped.
-        plane: of the family. offset: its place along y [m]. kind: 0 side, 1 tip, 2 edge.
+        body: index of the touched body, or -1 - index of a touched link of the hand itself. graspable: whether that
+            body is to be grasped.
+        plane: of the family, None where the touch lies on none. offset: its place along y [m].
+        kind: 0 side, 1 tip, 2 edge on a plane or of a round link; 3 corner, 4 edge, 5 face of a link's mesh.
         position: [m], normal: of the object's surface there, outward unit, shape (3,). gap: at the final posture [m].
         curve_angle: tangent angle of the object's curve [rad]. link_angle: of the touching side [rad], else None.
     """
@@ -36,7 +38,7 @@ class Touch:
     joint: int
     body: int
     graspable: bool
-    plane: int
+    plane: int | None
     offset: float
     kind: int
     position: FloatArray
@@ -125,6 +127,8 @@ def _touch(
     hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int, travel: FloatArray
 ) -> Touch:
     answer, arrays = closed.answer, plan.arrays
+    if answer.hit[i, n, 0] < 0:
+        return _exact_touch(hand, plan, packed, closed, i, n)
     plane, outline, kind, source, group, family, _, _ = answer.hit[i, n].tolist()
     x, z, nx, nz, cx, cz, gap = answer.point[i, n].tolist()
     entry = int(plan.items.entry[i])
@@ -147,6 +151,31 @@ def _touch(
         gap=max(gap, _carried(hand, plan.plans[entry], link, own_family, travel, position)),
         curve_angle=math.atan2(cx, -cz),
         link_angle=math.atan2(nx, -nz) if kind == 0 else None,
+    )
+
+
+def _exact_touch(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int) -> Touch:
+    """Read a touch that an exact sweep found, anywhere over the width."""
+    _, link, kind, element, group, family, _, met = closed.answer.hit[i, n].tolist()
+    entry = int(plan.items.entry[i])
+    numbers = closed.answer.point[i, n]
+    position, normal = numbers[:3].copy(), numbers[3:6].copy()
+    pose = closed.answer.pose[i, family]
+    body = int(packed.element_body[element]) if met == len(hand.links) else -1 - met
+    across = pose[:, :3].T @ normal
+    return Touch(
+        link=link,
+        joint=plan.plans[entry].leaders[group - int(plan.arrays.entry_group[entry])],
+        body=body,
+        graspable=body >= 0 and packed.body_roles[body] is BodyRole.GRASPABLE,
+        plane=None,
+        offset=float(pose[:, 1] @ (position - pose[:, 3])),
+        kind=kind,
+        position=position,
+        normal=normal,
+        gap=float(numbers[6]),
+        curve_angle=math.atan2(across[0], -across[2]),
+        link_angle=None,
     )
 
 

@@ -15,6 +15,7 @@ from .plan import FingerPlan
 from .scene import PackedObject
 
 if TYPE_CHECKING:
+    from clench.kernels.exact import ExactArrays
     from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
 
 #: Segments per plane that the arena holds before it has to grow.
@@ -79,11 +80,13 @@ def make_hand_plan(
     )
 
 
-def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, rounds: int) -> ClosedHand:
+def close_hand(
+    plan: HandPlan, exact: ExactArrays, packed: PackedObject, T_palm_object: FloatArray, rounds: int
+) -> ClosedHand:
     """Cut the object, look for overlaps at the start, and close every item.
 
     Args:
-        plan: of the hand. packed: the object. T_palm_object: where it is, shape (4, 4).
+        plan: of the hand. exact: for the items that are swept exactly. packed: the object. T_palm_object: where it is, shape (4, 4).
         rounds: how often all degrees of freedom are gone through.
     """
     from clench.kernels.closing import close_items
@@ -102,7 +105,9 @@ def close_hand(plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, 
         if not wanted:
             answer = empty_answer(plan)
             find_overlaps(plan.arrays, packed.tree, shapes, packed.closed, T, shared, overlaps)
-            close_items(plan.arrays, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer)
+            close_items(
+                plan.arrays, exact, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer
+            )
             wanted = int(answer.overflow.max(initial=0))
             if not wanted:
                 return ClosedHand(answer, overlaps, shared, T_palm_object)
@@ -123,6 +128,7 @@ def empty_answer(plan: HandPlan) -> ClosingArrays:
         point=np.zeros((items, contacts, HIT_FLOATS)),
         pose=np.zeros((items, len(plan.arrays.family_pose), 3, 4)),
         overflow=np.zeros(items, dtype=np.int64),
+        overlap=np.full(items, -1, dtype=np.int64),
     )
 
 

@@ -117,7 +117,7 @@ def plan_finger(hand: Hand, finger: Finger, posture: FloatArray, planes: int, so
     axes = {j: poses[mover[j]][:3, :3] @ hand.joints[j].axis * hand.joints[j].direction for j in closing}
     anchors = {j: (poses[mover[j]] @ np.append(hand.joints[j].anchor, 1.0))[:3] for j in closing}
     split = _families(hand, closing, axes, leaders)
-    moved_by = _last_joint(hand, finger, closing)
+    moved_by = last_closing_joint(hand, finger, closing)
     frames = [_frame(hand, closing, f, axes, anchors, poses, moved_by, source) for f in split]
     joints = []
     for f, members in enumerate(split):
@@ -215,7 +215,7 @@ def _check_groups(hand: Hand, families: list[list[int]], leaders: dict[int, int]
             )
 
 
-def _last_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[int, int]:
+def last_closing_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[int, int]:
     """Return, for every link of the finger that closing moves, the last closing joint before it."""
     result: dict[int, int] = {}
     for i in finger.links:

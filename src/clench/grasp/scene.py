@@ -17,12 +17,15 @@ from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 if TYPE_CHECKING:
+    from clench.kernels.bodies import BodyArrays, Elements
     from clench.kernels.tree import MeshTree
 
 #: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
 TESSELLATION_FRACTION: Final = 2e-3
 #: ... and in metres.
 TESSELLATION_DEVIATION: Final = 2e-5
+#: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by at most this [m].
+SWEEP_DEVIATION: Final = 1e-6
 #: Number of each kind of round shape in `RoundShapes.kind`.
 ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
 
@@ -52,6 +55,8 @@ class PackedObject:
         rounds: spheres, capsules, cylinders and ellipsoids.
         full_tree: all shapes as triangles, round ones inscribed, off by `tessellation_deviation` at most.
         full_owners: `feature_owners` of `full_tree`.
+        bodies: everything as the elements of one body, for exact sweeps. element_body: index of the body of each
+            element.
         closed: every body is watertight with outward normals, so one-sided tests are exact.
         body_closed: the same for each body.
         body_names, body_roles: of the bodies that `tree.body` and `rounds.body` number.
@@ -64,6 +69,8 @@ class PackedObject:
     rounds: RoundShapes
     full_tree: MeshTree
     full_owners: NDArray[np.uint8]
+    bodies: BodyArrays
+    element_body: NDArray[np.int32]
     closed: bool
     body_closed: tuple[bool, ...]
     body_names: tuple[str, ...]
@@ -101,6 +108,23 @@ def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
     return shape.to_mesh(tessellation_deviation(shape) or TESSELLATION_DEVIATION)
 
 
+def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
+    """Return a shape as convex elements in its body's or link's frame: a sphere is a point, a capsule a segment."""
+    from clench.kernels.bodies import Elements
+
+    a, b, _ = shape.size
+    if shape.kind in (ShapeKind.SPHERE, ShapeKind.CAPSULE):
+        half = b if shape.kind is ShapeKind.CAPSULE else 0.0
+        ends = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]) @ shape.pose.rotation.T + shape.pose.position
+        core = [0, 1, 1] if half > 0.0 else [0, 0, 0]
+        return Elements(ends, np.array([core], dtype=np.int32), np.array([a]))
+    if shape.kind in (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID):
+        mesh = shape.to_mesh(SWEEP_DEVIATION)
+    else:
+        mesh = shape_mesh(shape, source)
+    return Elements(mesh.vertices, np.asarray(mesh.triangles, dtype=np.int32), np.zeros(len(mesh.triangles)))
+
+
 def hash_hand(hand: Hand, source: CollisionSource) -> str:
     """Return a SHA-256 over the hand's kinematics and its shapes of one collision source, hexadecimal."""
     digest = hashlib.sha256()
@@ -125,11 +149,14 @@ _latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", N
 
 @lru_cache(maxsize=64)
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
+    from clench.kernels.bodies import join_elements, pack_bodies
     from clench.kernels.tree import feature_owners
 
     placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
     flat = [(n, shape_mesh(s, source)) for n, s in placed if s.kind not in ROUND_KINDS]
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
+    elements = [(n, shape_elements(s, source)) for n, s in placed]
+    numbers = np.repeat(np.array([n for n, _ in elements], dtype=np.int32), [len(e.elements) for _, e in elements])
     tree = _tree(flat)
     full_tree = _tree(flat + curved) if curved else tree
     graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
@@ -142,6 +169,8 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
         full_tree=full_tree,
         full_owners=feature_owners(full_tree),
+        bodies=(joined := pack_bodies([join_elements([e for _, e in elements])])),
+        element_body=numbers[joined.source],
         closed=all(closed),
         body_closed=closed,
         body_names=tuple(body.name for body in bodies),

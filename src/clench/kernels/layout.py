@@ -183,6 +183,7 @@ class ClosingArrays(NamedTuple):
         point: numbers of each contact in its family's plane, (I, S, 7), see below.
         pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
         overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
+        overlap: link that overlaps the object at the start over its width, or -1, (I,); then nothing moves.
     """
 
     travel: Floats
@@ -192,15 +193,18 @@ class ClosingArrays(NamedTuple):
     point: Floats
     pose: Floats
     overflow: Ints
+    overlap: Ints
 
 
 #: Columns of `ClosingArrays.hit`.
 HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE, HIT_WHICH = 0, 1, 2, 3, 4, 5, 6, 7
 HIT_INTEGERS = 8
-#: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve,
+#: Columns of `ClosingArrays.hit` mean for an exact contact, whose plane is -1: link, kind, element of what it meets,
+#: element of the link, and what it meets (a link, or the number of links for the object).
+#: Columns of `ClosingArrays.point`, but for an exact contact point, normal (both in the palm frame) and gap: contact, outward normal of the object there, normal of its curve,
 #: and the gap at the item's final posture.
 HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_GAP = 0, 1, 2, 3, 4, 5, 6
 HIT_FLOATS = 7
 
-#: Kinds of touching features.
-KIND_SIDE, KIND_TIP, KIND_EDGE = 0, 1, 2
+#: Kinds of touching features: of an outline; of a link's mesh (corner, edge, face, as `closest` numbers them).
+KIND_SIDE, KIND_TIP, KIND_EDGE, KIND_VERTEX, KIND_LINE, KIND_FACE = 0, 1, 2, 3, 4, 5

@@ -29,7 +29,14 @@ from .solution import (
 if TYPE_CHECKING:
     from .controller import Problem
 
-_KINDS = (ContactKind.SIDE, ContactKind.TIP, ContactKind.EDGE)
+_KINDS = (
+    ContactKind.SIDE,
+    ContactKind.TIP,
+    ContactKind.EDGE,
+    ContactKind.VERTEX,
+    ContactKind.EDGE,
+    ContactKind.FACE,
+)
 #: Contacts of thumb and finger oppose each other when their normals do: the cosine is below this [-].
 _OPPOSED = 0.0
 
@@ -134,7 +141,7 @@ def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
     return Contact(
         finger=c.plan.finger.name,
         link=problem.hand.links[t.link].name,
-        body=problem.packed.body_names[t.body],
+        body=_body_name(t, problem),
         stops_joint=problem.hand.joints[t.joint].name,
         plane=t.plane,
         offset=t.offset,
@@ -148,19 +155,25 @@ def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
     )
 
 
+def _body_name(t: Touch, problem: Problem) -> str:
+    """Return the name of a touched body, or of a touched link of the hand itself."""
+    return problem.packed.body_names[t.body] if t.body >= 0 else problem.hand.links[-1 - t.body].name
+
+
 def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, str]:
     hand, name = problem.hand, c.plan.finger.name
     if c.overlap is not None:
         return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} before {name} moves."
     if c.holding:
         links = list(dict.fromkeys(hand.links[t.link].name for t in c.holding))
-        return FingerStatus.TOUCH, f"{', '.join(links)} touches {problem.packed.body_names[c.holding[0].body]}."
+        return FingerStatus.TOUCH, f"{', '.join(links)} touches {_body_name(c.holding[0], problem)}."
     if max(c.plan.lengths, default=0.0) <= 0.0:
         return FingerStatus.NO_MOTION, f"Every closing joint of {name} is at its limit before it moves."
     stopped = [t for t in c.touches if not t.passed]
     if stopped:
-        body = problem.packed.body_names[stopped[0].body]
-        return FingerStatus.LIMIT, f"{name} is stopped by the obstacle {body} and does not reach the object."
+        what = "the hand's own" if stopped[0].body < 0 else "the obstacle"
+        body = _body_name(stopped[0], problem)
+        return FingerStatus.LIMIT, f"{name} is stopped by {what} {body} and does not reach the object."
     if c.touches:
         return FingerStatus.LIMIT, f"{name} touched on its way and was carried off again by a later joint."
     angles = ", ".join(f"{hand.joints[j].name} {c.q[j]:.3f}" for j in c.plan.leaders)

@@ -18,6 +18,7 @@ from clench.grasp.choice import choose
 from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
 from clench.grasp.criteria import Setting, score_all
 from clench.grasp.depths import hand_depths
+from clench.grasp.exact import checked_pairs, pack_exact
 from clench.grasp.feasibility import judge_sets
 from clench.grasp.motion import alternatives, asked_fingers, open_posture, palm_pose
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
@@ -79,9 +80,12 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     clock.lap("read")
     plan = plan_hand(problem)
     clock.lap("plan")
-    closed = close_hand(plan, problem.packed, problem.T_palm_object, command.rounds)
+    exact = pack_exact(
+        hand, plan.plans, plan.whole, checked_pairs(hand, across=False), problem.source, problem.packed.bodies
+    )
+    closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, command.rounds)
     clock.lap("close")
-    overlaps = start_overlaps(hand, plan, closed.overlaps, problem.packed, problem.T_palm_object, problem.source)
+    overlaps = start_overlaps(hand, plan, closed, problem.packed, problem.T_palm_object, problem.source)
     candidates = read_candidates(hand, plan, problem.packed, closed, overlaps)
     judged = judge_sets(hand, candidates, problem.packed, problem.T_palm_object, problem.source, command.check_sets)
     setting = Setting(hand, problem.start)

@@ -46,9 +46,11 @@ class ContactKind(StrEnum):
     TIP = "tip"
     """rounded end of the link's outline on the object"""
     EDGE = "edge"
-    """corner of the link's outline on the object"""
+    """corner of the link's outline on the object, or an edge of its mesh on one of the object's"""
     FACE = "face"
+    """face of the link's mesh on a corner of the object"""
     VERTEX = "vertex"
+    """corner of the link's mesh on the object"""
 
 
 @dataclass(frozen=True, eq=False)

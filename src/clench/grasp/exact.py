@@ -1,0 +1,123 @@
+"""Pack what the exact width needs: the hand's links and the object as bodies, and how the links move (section 5)."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+from .plan import FingerPlan, closing_joints, last_closing_joint
+from .scene import shape_elements
+
+if TYPE_CHECKING:
+    from clench.kernels.bodies import BodyArrays
+    from clench.kernels.exact import ExactArrays
+
+_KEPT_HANDS: Final = 16
+_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, BodyArrays]] = OrderedDict()
+
+
+def link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
+    """Return every link of a hand that can touch as a body, in its own frame; made once per hand and source."""
+    from clench.kernels.bodies import join_elements, pack_bodies
+
+    kept = _kept.get((id(hand), source))
+    if kept is not None and kept[0] is hand:
+        return kept[1]
+    solid = {*hand.fixed_links, *(link for finger in hand.fingers for link in finger.links)}
+    parts = [
+        join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
+        for i, link in enumerate(hand.links)
+    ]
+    bodies = pack_bodies(parts)
+    _kept[id(hand), source] = (hand, bodies)
+    while len(_kept) > _KEPT_HANDS:
+        _kept.popitem(last=False)
+    return bodies
+
+
+def checked_pairs(hand: Hand, *, across: bool) -> np.ndarray:
+    """Return which links may not overlap, shape (L, L): moving by resting.
+
+    Args:
+        hand: the hand. across: links of different fingers, too.
+    """
+    checked = np.ones((len(hand.links),) * 2, dtype=np.int64)
+    np.fill_diagonal(checked, 0)
+    for a, b in hand.allowed_pairs:
+        checked[a, b] = checked[b, a] = 0
+    if not across:
+        for one in hand.fingers:
+            for other in hand.fingers:
+                if one is not other:
+                    checked[np.ix_(one.links, other.links)] = 0
+    return checked
+
+
+def pack_exact(
+    hand: Hand,
+    plans: Sequence[FingerPlan],
+    wanted: Sequence[bool],
+    checked: np.ndarray,
+    source: CollisionSource,
+    obj: BodyArrays,
+    resting: FloatArray | None = None,
+) -> ExactArrays:
+    """Pack the links of the plans' fingers and how their joints move them.
+
+    Args:
+        hand: the hand. plans: one per entry. wanted: per item. checked: see `checked_pairs`.
+        source: geometry of the links. obj: the object.
+        resting: posture of all joints that the other fingers rest in [rad]; None is each plan's own.
+    """
+    from clench.kernels.exact import ExactArrays
+
+    first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
+    movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
+    axes = [_axis(plan, k) for plan in plans for k in range(len(plan.joints))]
+    poses = [hand.link_poses(_posture(plan, resting))[:, :3] for plan in plans]
+    rows = [(link, joint, pose[link]) for found, pose in zip(movers, poses, strict=True) for link, joint in found]
+    return ExactArrays(
+        joint_first=first.astype(np.int64),
+        wanted=np.array(wanted, dtype=np.int64),
+        links=link_bodies(hand, source),
+        object=obj,
+        mover_first=np.cumsum([0, *(len(found) for found in movers)]).astype(np.int64),
+        mover_link=np.array([row[0] for row in rows], dtype=np.int64),
+        mover_joint=np.array([row[1] for row in rows], dtype=np.int64),
+        mover_pose=np.array([row[2] for row in rows], dtype=np.float64).reshape(-1, 3, 4),
+        axis=np.array([axis for axis, _ in axes]).reshape(-1, 3),
+        anchor=np.array([anchor for _, anchor in axes]).reshape(-1, 3),
+        link_pose=np.ascontiguousarray(poses),
+        checked=checked,
+    )
+
+
+def _posture(plan: FingerPlan, resting: FloatArray | None) -> FloatArray:
+    if resting is None:
+        return plan.posture
+    q = resting.copy()
+    own = list(plan.finger.joints)
+    q[own] = plan.posture[own]
+    return q
+
+
+def _movers(hand: Hand, plan: FingerPlan, first: int) -> list[tuple[int, int]]:
+    """Return the moving links and the last joint before each, numbered from `first`; palm side first."""
+    position = {p.joint: first + k for k, p in enumerate(plan.joints)}
+    moved = last_closing_joint(hand, plan.finger, closing_joints(hand, plan.finger))
+    return sorted(((link, position[joint]) for link, joint in moved.items()), key=lambda row: (row[1], row[0]))
+
+
+def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
+    """Return axis and anchor of a joint in the palm frame at the open posture; a positive turn takes x towards z."""
+    joint = plan.joints[k]
+    T = plan.families[joint.family].T_palm_family
+    anchor: FloatArray = T[:3, 3] + T[:3, 0] * joint.pivot[0] + T[:3, 2] * joint.pivot[1]
+    return -T[:3, 1], anchor

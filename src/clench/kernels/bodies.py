@@ -1,0 +1,130 @@
+"""Rigid bodies for exact sweeps: convex elements (triangles, segments, points, each with a radius) in trees of balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .tree import build_tree
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+class BodyArrays(NamedTuple):
+    """Hold several bodies, each in its own frame, one tree each; V vertices, T elements, N nodes, B bodies.
+
+    Nodes are in preorder, the left child of `i` is `i + 1`. An element is the convex hull of its vertices, grown by its
+    radius: a triangle of a mesh, the core of a capsule or of a sphere (METHOD.md section 5).
+
+    Args:
+        vertices: [m], (V, 3). elements: vertex indices, (T, 3), repeated for segments and points.
+        corners: number of different vertices, 1 to 3, (T,). radius: [m], (T,).
+        ball: centre and radius of the ball around each element, its own radius included [m], (T, 4).
+        source: number of each element in the caller's list, (T,).
+        node: centre and radius of the ball around each node [m], (N, 4).
+        first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
+        right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
+    """
+
+    vertices: Floats
+    elements: Ints
+    corners: Ints
+    radius: Floats
+    ball: Floats
+    source: Ints
+    node: Floats
+    first: Ints
+    count: Ints  # type: ignore[assignment]
+    right: Ints
+    root: Ints
+
+
+class Elements(NamedTuple):
+    """List the elements of one body: `vertices` (V, 3) [m], `elements` (T, 3), `radius` (T,) [m]."""
+
+    vertices: Floats
+    elements: Ints
+    radius: Floats
+
+
+def join_elements(parts: Sequence[Elements]) -> Elements:
+    """Return the elements of several parts as those of one body, in order."""
+    shift = np.cumsum([0, *(len(p.vertices) for p in parts)])
+    return Elements(
+        np.concatenate([np.empty((0, 3)), *(p.vertices for p in parts)]),
+        np.concatenate([np.empty((0, 3), np.int32), *(p.elements + k for p, k in zip(parts, shift, strict=False))]),
+        np.concatenate([np.empty(0), *(p.radius for p in parts)]),
+    )
+
+
+def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
+    """Build the trees of bodies and put them into one set of arrays; the order of the bodies is kept."""
+    rows: list[tuple[np.ndarray, ...]] = []
+    root, vertices, elements, nodes = [], 0, 0, 0
+    for body in bodies:
+        if not len(body.elements):
+            root.append(-1)
+            continue
+        tree = build_tree(body.vertices, body.elements)
+        radius = body.radius[tree.original]
+        ball = _balls(tree.vertices[tree.triangles], radius)
+        node = _node_balls(tree.low, tree.high, tree.first, tree.count, tree.right, radius)
+        inner = tree.count == 0
+        rows.append(
+            (
+                tree.vertices,
+                tree.triangles + vertices,
+                _corners(tree.vertices[tree.triangles]),
+                radius,
+                ball,
+                tree.original,
+                node,
+                tree.first + elements,
+                tree.count,
+                np.where(inner, tree.right + nodes, -1),
+            )
+        )
+        root.append(nodes)
+        vertices += len(tree.vertices)
+        elements += len(tree.triangles)
+        nodes += len(tree.low)
+    shapes = ((0, 3), (0, 3), (0,), (0,), (0, 4), (0,), (0, 4), (0,), (0,), (0,))
+    kinds = (float, np.int32, np.int32, float, float, np.int32, float, np.int32, np.int32, np.int32)
+    joined = [
+        np.concatenate([np.empty(shape, kind), *(row[k] for row in rows)]).astype(kind)
+        for k, (shape, kind) in enumerate(zip(shapes, kinds, strict=True))
+    ]
+    return BodyArrays(*joined, np.array(root, dtype=np.int32))
+
+
+def _corners(points: Floats) -> Ints:
+    """Return how many of the first vertices of each element differ; repeated ones stand last."""
+    same_last = (points[:, 1] == points[:, 2]).all(axis=1)
+    same_all = same_last & (points[:, 0] == points[:, 1]).all(axis=1)
+    return np.where(same_all, 1, np.where(same_last, 2, 3)).astype(np.int32)
+
+
+def _balls(points: Floats, radius: Floats) -> Floats:
+    """Return the ball around each element: its middle is that of the longest side, unless a corner is outside."""
+    sides = np.linalg.norm(points - np.roll(points, -1, axis=1), axis=2)
+    k = np.argmax(sides, axis=1)
+    each = np.arange(len(points))
+    center = 0.5 * (points[each, k] + points[each, (k + 1) % 3])
+    reach = np.linalg.norm(points - center[:, None], axis=2).max(axis=1)
+    return np.column_stack([center, reach * (1.0 + 1e-12) + radius])
+
+
+def _node_balls(low: Floats, high: Floats, first: Ints, count: Ints, right: Ints, radius: Floats) -> Floats:
+    """Return the ball around the box of each node, grown by the largest radius of its elements."""
+    grown = np.zeros(len(low))
+    for i in range(len(low) - 1, -1, -1):
+        if count[i]:
+            grown[i] = radius[first[i] : first[i] + count[i]].max()
+        else:
+            grown[i] = max(grown[i + 1], grown[right[i]])
+    reach = 0.5 * np.linalg.norm(high - low, axis=1) * (1.0 + 1e-12) + grown
+    return np.column_stack([0.5 * (low + high), reach])

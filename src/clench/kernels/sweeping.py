@@ -1,0 +1,242 @@
+"""First contact of a moving body with a resting one, through their trees (METHOD.md section 5, exact width)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .advance import misses
+from .bodies import BodyArrays
+from .closest import separation
+from .compiling import inner_kernel
+from .layout import Floats, Ints
+from .sweep_pairs import sweep_pair
+
+#: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
+PAIRS = 512
+#: How coarsely the sweep of an element against a node's ball is settled, as a fraction of the ball's radius [-].
+COARSE = 0.25
+
+
+class SweepWork(NamedTuple):
+    """Hold the scratch space of a sweep.
+
+    Args:
+        core, fixed, placed: corners of a pair, (3, 3) each. chain: rows (Ω, e_x, e_z), (J + 1, 3).
+        moving, resting: poses of two bodies relative to their pivots, (3, 4). start: pose of the moving one, (3, 4).
+        poses: `T_palm_link` of every link, (L, 3, 4). stack: (PAIRS, 2).
+        pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
+            moving body, resting body, (4,).
+    """
+
+    core: Floats
+    fixed: Floats
+    placed: Floats
+    chain: Floats
+    moving: Floats
+    resting: Floats
+    start: Floats
+    poses: Floats
+    stack: Ints
+    pair: Ints
+    winner: Ints
+
+
+@inner_kernel
+def make_sweep_work(chain: Floats, links: int) -> SweepWork:
+    """Allocate the scratch space for sweeps of a hand; `chain` is that of the closing kernels."""
+    return SweepWork(
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        chain,
+        np.empty((3, 4)),
+        np.empty((3, 4)),
+        np.empty((3, 4)),
+        np.empty((links, 3, 4)),
+        np.empty((PAIRS, 2), dtype=np.int64),
+        np.zeros(4, dtype=np.int64),
+        np.zeros(4, dtype=np.int64),
+    )
+
+
+@inner_kernel
+def put_point(T: Floats, p: Floats, out: Floats) -> None:
+    """Write a point in the frame that a pose leads to."""
+    for r in range(3):
+        out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
+
+
+@inner_kernel
+def put_core(bodies: BodyArrays, element: int, T: Floats, out: Floats) -> None:
+    """Write the corners of an element in the frame that a pose leads to."""
+    for k in range(bodies.corners[element]):
+        put_point(T, bodies.vertices[bodies.elements[element, k]], out[k])
+
+
+@inner_kernel
+def balls_miss(
+    a: Floats, b: Floats, work: SweepWork, count: int, speed: float, best: float, touch: float, c: float, d: float
+) -> bool:
+    """Say whether a moving ball meets no resting one before `best`; rows hold centre and radius in the body's frame.
+
+    Args:
+        c, d: cosine and sine of the turn at `best`, for one joint. speed: bound for several.
+    """
+    T, R = work.moving, work.resting
+    ax = T[0, 0] * a[0] + T[0, 1] * a[1] + T[0, 2] * a[2] + T[0, 3]
+    ay = T[1, 0] * a[0] + T[1, 1] * a[1] + T[1, 2] * a[2] + T[1, 3]
+    az = T[2, 0] * a[0] + T[2, 1] * a[1] + T[2, 2] * a[2] + T[2, 3]
+    bx = R[0, 0] * b[0] + R[0, 1] * b[1] + R[0, 2] * b[2] + R[0, 3]
+    by = R[1, 0] * b[0] + R[1, 1] * b[1] + R[1, 2] * b[2] + R[1, 3]
+    bz = R[2, 0] * b[0] + R[2, 1] * b[1] + R[2, 2] * b[2] + R[2, 3]
+    reach = a[3] + b[3] + touch
+    if count > 1:
+        for i in range(count - 1):
+            ax += work.chain[i, 1]
+            az += work.chain[i, 2]
+        reach += speed * best
+        return (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2 > reach * reach
+    flat = reach * reach - (ay - by) ** 2
+    if flat < 0.0:
+        return True
+    if work.chain[0, 0] < 0.0:
+        # Mirrored, so that the turn is counter-clockwise.
+        az, bz = -az, -bz
+    turn = abs(work.chain[0, 0]) * best
+    far = math.sqrt(ax * ax + az * az)
+    return bool(misses(ax, az, far, c * ax - d * az, d * ax + c * az, turn >= 3.0, bx, bz, math.sqrt(flat)))
+
+
+@inner_kernel
+def ball_of(bodies: BodyArrays, n: int) -> Floats:
+    """Return the ball around a node, or around element `-1 - n`."""
+    return bodies.node[n] if n >= 0 else bodies.ball[-1 - n]
+
+
+@inner_kernel
+def put_item(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> tuple[int, float]:
+    """Write the core of element `-1 - n`, or the centre of node `n`; return its corners and its radius."""
+    if n >= 0:
+        put_point(T, bodies.node[n], out[0])
+        return 1, bodies.node[n, 3]
+    put_core(bodies, -1 - n, T, out)
+    return bodies.corners[-1 - n], bodies.radius[-1 - n]
+
+
+@inner_kernel
+def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints, waiting: int) -> int:
+    """Put the children of a node, or the elements of a leaf, on the stack against `other`; return its new height."""
+    if bodies.count[n] == 0:
+        stack[waiting, column], stack[waiting, 1 - column] = bodies.right[n], other
+        stack[waiting + 1, column], stack[waiting + 1, 1 - column] = n + 1, other
+        return waiting + 2
+    for k in range(bodies.count[n]):
+        stack[waiting + k, column], stack[waiting + k, 1 - column] = -1 - (bodies.first[n] + k), other
+    return waiting + bodies.count[n]
+
+
+@inner_kernel
+def sweep_body(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    count: int,
+    speed: float,
+    touch: float,
+    best: float,
+    work: SweepWork,
+) -> float:
+    """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
+
+    A pair of nodes is left out when their balls do not meet, a node and an element when the element does not meet the
+    ball: the same sweep, with the ball's centre as a core. For one joint the balls' arcs tell without it.
+
+    Args:
+        work: has `chain`, `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
+        count: rows of the chain. speed: no point of body `m` is faster [m per travel]. touch: gaps up to this touch [m].
+    """
+    stack = work.stack
+    stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
+    waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
+    turn = abs(work.chain[0, 0]) * best
+    c, d = math.cos(turn), math.sin(turn)
+    while waiting > 0:
+        waiting -= 1
+        a, b = stack[waiting, 0], stack[waiting, 1]
+        ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
+        if balls_miss(ball_a, ball_b, work, count, speed, best, touch, c, d):
+            continue
+        if a < 0 or b < 0 or count > 1:
+            ka, wa = put_item(moving, a, work.moving, work.core)
+            kb, wb = put_item(resting, b, work.resting, work.fixed)
+            near = touch if a < 0 and b < 0 else COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
+            found = sweep_pair(
+                work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, work.placed
+            )
+            if found >= best:
+                continue
+            if a < 0 and b < 0:
+                best = found
+                work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
+                if best < 0.0:
+                    return best
+                turn = abs(work.chain[0, 0]) * best
+                c, d = math.cos(turn), math.sin(turn)
+                continue
+        if b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
+            waiting = push_parts(moving, a, 0, b, stack, waiting)
+        else:
+            waiting = push_parts(resting, b, 1, a, stack, waiting)
+    return best
+
+
+@inner_kernel
+def body_gap(
+    moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, work: SweepWork
+) -> float:
+    """Return the gap between two bodies if it is below `bound`, else `bound`; writes the closest pair.
+
+    Args:
+        work: has `moving` and `resting`, the bodies' poses in one frame.
+    """
+    stack, best = work.stack, bound
+    a, b = moving.root[m], resting.root[r]
+    stack[0, 0], stack[0, 1] = a, b
+    waiting = 1 if a >= 0 and b >= 0 else 0
+    while waiting > 0:
+        waiting -= 1
+        a, b = stack[waiting, 0], stack[waiting, 1]
+        put_point(work.moving, moving.node[a], work.core[0])
+        put_point(work.resting, resting.node[b], work.fixed[0])
+        if point_distance(work.core, work.fixed) - moving.node[a, 3] - resting.node[b, 3] >= best:
+            continue
+        leaf_a, leaf_b = moving.count[a] > 0, resting.count[b] > 0
+        if leaf_a and leaf_b:
+            for i in range(moving.first[a], moving.first[a] + moving.count[a]):
+                put_core(moving, i, work.moving, work.core)
+                for k in range(resting.first[b], resting.first[b] + resting.count[b]):
+                    put_core(resting, k, work.resting, work.fixed)
+                    d = separation(work.core, moving.corners[i], work.fixed, resting.corners[k])[0]
+                    gap = d - moving.radius[i] - resting.radius[k]
+                    if gap < best:
+                        best = gap
+                        work.pair[0], work.pair[1], work.pair[2], work.pair[3] = i, k, m, r
+        elif leaf_b or (not leaf_a and moving.node[a, 3] >= resting.node[b, 3]):
+            stack[waiting, 0], stack[waiting, 1] = moving.right[a], b
+            stack[waiting + 1, 0], stack[waiting + 1, 1] = a + 1, b
+            waiting += 2
+        else:
+            stack[waiting, 0], stack[waiting, 1] = a, resting.right[b]
+            stack[waiting + 1, 0], stack[waiting + 1, 1] = a, b + 1
+            waiting += 2
+    return best
+
+
+@inner_kernel
+def point_distance(a: Floats, b: Floats) -> float:
+    """Return the distance between the first rows."""
+    return math.sqrt((a[0, 0] - b[0, 0]) ** 2 + (a[0, 1] - b[0, 1]) ** 2 + (a[0, 2] - b[0, 2]) ** 2)
