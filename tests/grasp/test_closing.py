@@ -9,6 +9,7 @@ from clench.grasp import closing
 from clench.grasp.closing import close_hand, make_hand_plan
 from clench.grasp.plan import plan_finger
 from clench.grasp.scene import pack_object
+from clench.kernels.exact import planes_only
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 
@@ -20,7 +21,8 @@ def plans(hand, count=3, q=None):
 
 def close(found, obj, full_width=True, rounds=1):
     plan = make_hand_plan(found, range(len(found)), [0] * len(found), full_width)
-    return plan, close_hand(plan, pack_object(obj), obj.pose.matrix, rounds)
+    exact = planes_only(len(plan.whole), len(found))
+    return plan, close_hand(plan, exact, pack_object(obj), obj.pose.matrix, rounds)
 
 
 BALL = GraspObject.load("sphere:r=0.02", pose=Pose([0.04, 0.001, 0.04]))

@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clench.kernels.closing import close_items
+from clench.kernels.exact import planes_only
 from clench.kernels.family_section import make_sections
 from clench.kernels.layout import (
     ChainArrays,
@@ -115,6 +116,7 @@ def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
         np.zeros((items, contacts, 7)),
         np.zeros((items, families, 3, 4)),
         np.zeros(items, np.int64),
+        np.full(items, -1, np.int64),
     )
 
 
@@ -126,7 +128,7 @@ def solve_planar(finger: PlanarFinger, curve: PlanarCurve) -> tuple[tuple[StageA
     answer = empty_answer(hand, 1, finger.groups)
     closed = not curve.two_sided
     T = np.eye(4)[:3].copy()
-    close_items(hand, EMPTY_TREE, NO_ROUNDS, closed, T, sections, sections, items, 1, answer)
+    close_items(hand, planes_only(1, 1), EMPTY_TREE, NO_ROUNDS, closed, T, sections, sections, items, 1, answer)
     stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
     stages = tuple(
         StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)

@@ -175,7 +175,8 @@ def _exact_touch(hand: Hand, plan: HandPlan, packed: PackedObject, closed: Close
         normal=normal,
         gap=float(numbers[6]),
         curve_angle=math.atan2(across[0], -across[2]),
-        link_angle=None,
+        # Where the side of a round link touches, the two surfaces have one tangent.
+        link_angle=math.atan2(across[0], -across[2]) if kind == 0 else None,
     )
 
 

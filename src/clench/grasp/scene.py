@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 TESSELLATION_FRACTION: Final = 2e-3
 #: ... and in metres.
 TESSELLATION_DEVIATION: Final = 2e-5
-#: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by at most this [m].
-SWEEP_DEVIATION: Final = 1e-6
+#: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
+SWEEP_DEVIATION: Final = 2e-5
 #: Number of each kind of round shape in `RoundShapes.kind`.
 ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
 
@@ -119,7 +119,7 @@ def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
         core = [0, 1, 1] if half > 0.0 else [0, 0, 0]
         return Elements(ends, np.array([core], dtype=np.int32), np.array([a]))
     if shape.kind in (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID):
-        mesh = shape.to_mesh(SWEEP_DEVIATION)
+        mesh = shape.to_mesh(SWEEP_DEVIATION * max(shape.size))
     else:
         mesh = shape_mesh(shape, source)
     return Elements(mesh.vertices, np.asarray(mesh.triangles, dtype=np.int32), np.zeros(len(mesh.triangles)))

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from clench.base.tolerances import SWEEP_FRACTION
 
 from .advance import fill_chain, place_joints
-from .bodies import BodyArrays
+from .bodies import BodyArrays, pack_bodies
 from .closest import AT_CORNER, separation
 from .compiling import inner_kernel
 from .family_pose import compose_inverse
@@ -60,6 +62,25 @@ class ExactArrays(NamedTuple):
     anchor: Floats
     link_pose: Floats
     checked: Ints
+
+
+def planes_only(items: int, entries: int) -> ExactArrays:
+    """Return what closes so many items of so many entries on their planes alone."""
+    nothing = pack_bodies([])
+    return ExactArrays(
+        joint_first=np.zeros(entries + 1, np.int64),
+        wanted=np.zeros(items, np.int64),
+        links=nothing,
+        object=nothing,
+        mover_first=np.zeros(entries + 1, np.int64),
+        mover_link=np.zeros(0, np.int64),
+        mover_joint=np.zeros(0, np.int64),
+        mover_pose=np.zeros((0, 3, 4)),
+        axis=np.zeros((0, 3)),
+        anchor=np.zeros((0, 3)),
+        link_pose=np.zeros((entries, 0, 3, 4)),
+        checked=np.zeros((0, 0), np.int64),
+    )
 
 
 @inner_kernel

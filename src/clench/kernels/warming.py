@@ -19,8 +19,9 @@ import numba
 import numpy as np
 
 from .advance import advance
-from .closing import close_items, describe_hit, settle_hits
+from .closing import close_items
 from .depth import penetration
+from .exact import planes_only, settle_pair, sweep_stage
 from .family_section import cut_first_families
 from .layout import (
     ChainArrays,
@@ -33,11 +34,21 @@ from .layout import (
     Work,
 )
 from .overlap import find_overlaps
+from .sweeping import SweepWork
+from .touching import describe_hit, settle_hit
 from .tree import MeshTree, build_tree
 
 #: What each process compiles, in this order. What both need, like the cutting of sections, is first in one of them
 #: and late in the other.
-HERE: tuple[Any, ...] = (cut_first_families, settle_hits, describe_hit, find_overlaps, penetration)
+HERE: tuple[Any, ...] = (
+    cut_first_families,
+    sweep_stage,
+    settle_pair,
+    settle_hit,
+    describe_hit,
+    find_overlaps,
+    penetration,
+)
 THERE: tuple[Any, ...] = (advance, close_items)
 
 #: The second process is given up after this long [s].
@@ -91,23 +102,26 @@ def sample_values() -> dict[str, Any]:
         "hand": HandArrays(*hand),
         "rounds": RoundArrays(*_arrays("i1 f2 f3")),
         "items": ItemArrays(*_arrays("i1 i1 i1")),
-        "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1")),
+        "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1")),
+        "exact": planes_only(0, 0),
+        "chain": chain,
+        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f3 i2 i1 i1")),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 i1")),
     }
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values |= dict.fromkeys(("tree", "link", "obj"), tree)
     values |= dict.fromkeys(("closed", "link_closed", "obj_closed"), True)
-    values |= dict.fromkeys(("family", "start", "base", "low", "high", "i", "times", "group", "plane"), 0)
+    values |= dict.fromkeys(("family", "start", "base", "low", "high", "i", "times", "group", "plane", "entry"), 0)
     kinds = {
         "f1": ("turns", "rates", "crossings", "point"),
-        "f2": ("T_palm_object", "T_obj_link", "T_link_obj"),
+        "f2": ("T_palm_object", "T_palm_family", "T_obj_link", "T_link_obj"),
         "i1": ("overlaps", "hit"),
         "s1": ("stack",),
         "b1": ("link_owners", "obj_owners"),
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])
-    return {**values, "length": 0.0}
+    return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
 
 
 def _arrays(kinds: str) -> list[Any]:

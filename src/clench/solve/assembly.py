@@ -132,7 +132,7 @@ def _candidate(c: FingerCandidate, problem: Problem) -> Candidate:
         feasible=c.feasible,
         penetration=c.penetration,
         scores=dict(c.scores),
-        contacts=tuple(_contact(c, t, problem) for t in c.touches),
+        contacts=tuple(_contact(c, t, problem) for t in c.touches if t.body >= 0),
     )
 
 
@@ -141,7 +141,7 @@ def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
     return Contact(
         finger=c.plan.finger.name,
         link=problem.hand.links[t.link].name,
-        body=_body_name(t, problem),
+        body=problem.packed.body_names[t.body],
         stops_joint=problem.hand.joints[t.joint].name,
         plane=t.plane,
         offset=t.offset,
