@@ -11,8 +11,10 @@ import pytest
 
 import clench
 from clench.apps.figures import draw_solution
+from clench.apps.figures.curl_plane import plane_title
+from clench.apps.figures.finger_scenes import FingerScenes
 from clench.apps.figures.hand_view import _labels, viewpoints
-from clench.apps.figures.plane_scene import FingerScenes, bounds
+from clench.apps.figures.plane_scene import PlaneScene, bounds
 from clench.apps.figures.set_grid import MOST_SETS, _selected, _short
 from clench.apps.figures.surfaces import hand_surface, object_surface, thinned
 from clench.base.errors import FileError
@@ -161,6 +163,68 @@ def test_drawn_pivots_agree_with_the_hands_own_kinematics(
             anchor = (poses[link] @ np.append(hand.joints[index].anchor, 1.0))[:3]
             local = T[:3, :3].T @ (anchor - T[:3, 3])
             np.testing.assert_allclose(local[[0, 2]], joint.pivot, atol=1e-9)
+
+
+def between_planes(scenes: FingerScenes) -> list[PlaneScene]:
+    """Return what the planes show that go through contacts off the finger's own planes."""
+    own = [len(f.offsets) for f in scenes.plan.families]
+    return [scenes.scene(f, k) for f, k in scenes.touched_planes(99) if k >= own[f]]
+
+
+def test_a_contact_between_the_planes_has_a_plane_of_its_own(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    command, solution = answer
+    result = solution.fingers["index"]
+    candidate = next(c for c in result.candidates if c.plane is None)
+    off = [c.offset for c in candidate.contacts if c.plane is None]
+    assert off, "this grasp touches between the planes"
+    scenes = FingerScenes(hand, ball, command, solution, "index", candidate)
+    scenes_between = between_planes(scenes)
+    assert sorted(c.contact.offset for s in scenes_between for c in s.contacts) == pytest.approx(sorted(off), abs=1e-9)
+    for scene in scenes_between:
+        assert scene.offset == pytest.approx(scene.contacts[0].contact.offset, abs=2e-6)
+        assert plane_title(scene, 1) == f"between the planes, y = {scene.offset * 1e3:+.1f} mm"
+        assert [link.name for link in scene.open_links] == [link.name for link in scene.closed_links]
+    alone = next(c for c in result.candidates if c.plane is not None)
+    assert not between_planes(scenes.showing(alone)), "planes through the contacts of one set are not those of another"
+    assert plane_title(scenes.showing(alone).scene(0, 1), 1).startswith("plane 2 of ")
+
+
+def test_contacts_share_a_plane_where_nobody_sees_the_difference(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    command, solution = answer
+    result = solution.fingers["index"]
+    candidate = next(c for c in result.candidates if c.plane is None)
+    contact = next(c for c in candidate.contacts if c.plane is None)
+    scenes = FingerScenes(hand, ball, command, solution, "index", candidate)
+    y = (solution.hand_pose.matrix @ scenes.frames[0])[:3, 1]
+    for step, count in ((1e-6, 1), (1e-5, 1), (1e-3, 2)):
+        beside = replace(contact, position=contact.position + step * y)
+        shown = scenes.showing(replace(candidate, contacts=(contact, beside)))
+        assert len(between_planes(shown)) == count, step
+
+
+def test_a_contact_on_a_flat_side_in_the_plane_is_drawn_on_the_section(
+    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
+) -> None:
+    command, solution = answer
+    candidate = next(c for c in solution.fingers["index"].candidates if c.plane is None)
+    contact = next(c for c in candidate.contacts if c.plane is None)
+    scenes = FingerScenes(hand, ball, command, solution, "index", candidate)
+    family = solution.hand_pose.matrix @ scenes.frames[0]
+    for side in (1.0, -1.0):
+        # A block of which the contact is on an edge: one of its sides lies in the plane, up to the contact's gap.
+        T = family.copy()
+        T[:3, 3] = contact.position - (0.01 + 1e-9) * side * family[:3, 1] - 0.01 * family[:3, 2]
+        block = clench.GraspObject.load("box:x=0.02,y=0.02,z=0.02")
+        moved = replace(solution, object_pose=clench.Pose.from_matrix(T))
+        (scene,) = between_planes(
+            FingerScenes(hand, block, command, moved, "index", replace(candidate, contacts=(contact,)))
+        )
+        assert abs(scene.offset - contact.offset) < 2e-6
+        assert min(distance(scene.contacts[0].point, curve.loop.points) for curve in scene.section) < 5e-5
 
 
 @pytest.mark.shared

@@ -31,8 +31,8 @@ def draw_solution(
         FileError: a file cannot be written.
     """
     from .curl_plane import draw_finger
+    from .finger_scenes import FingerScenes
     from .hand_view import draw_hand
-    from .plane_scene import FingerScenes
     from .set_grid import draw_sets
 
     folder = Path(directory)

@@ -13,8 +13,9 @@ from clench.base.pose import FloatArray
 from clench.solve.solution import Candidate, FingerResult
 
 from . import style
+from .finger_scenes import FingerScenes
 from .loops import Loop
-from .plane_scene import FingerScenes, JointMotion, LinkSection, PlaneContact, PlaneScene, bounds
+from .plane_scene import JointMotion, LinkSection, PlaneContact, PlaneScene, bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +31,7 @@ _MARGIN: Final = 62
 def draw_finger(scenes: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
     """Write the curl-plane figure of a finger's chosen set."""
     shown = [scenes.scene(family, plane) for family, plane in scenes.touched_planes(MOST_PANELS)]
-    text = 370.0 + 37.0 * (len(scenes.plan.joints) + len(scenes.contacts))
+    text = 370.0 + 37.0 * len(scenes.plan.joints) + 54.0 * len(scenes.contacts)
     figure, panels = _panels(shown, text)
     low, high = bounds(shown)
     for axes, scene in zip(panels, shown, strict=True):
@@ -68,13 +69,11 @@ def _panels(shown: Sequence[PlaneScene], text: float) -> tuple[Figure, list[Axes
 
 def plane_title(scene: PlaneScene, families: int) -> str:
     """Return a title that says which plane is seen."""
-    place = f"plane {scene.plane + 1} of {scene.planes}, y = {scene.offset * _MM:+.1f} mm"
     if families == 1:
-        return place
+        return scene.place
     names = ", ".join(j.name for j in scene.joints)
-    return (
-        f"{place}\nturned by {names if len(names) < 40 else f'{len(scene.joints)} joints from {scene.joints[0].name}'}"
-    )
+    short = names if len(names) < 40 else f"{len(scene.joints)} joints from {scene.joints[0].name}"
+    return f"{scene.place}\nturned by {short}"
 
 
 def frame_plane(axes: Axes, low: FloatArray, high: FloatArray) -> None:
@@ -296,11 +295,12 @@ def _explain(
     line("Contacts", fontsize=11, fontweight="bold")
     seen = {c.number for s in shown for c in s.contacts}
     for c in scenes.contacts:
-        where = f"plane {c.plane + 1}" + ("" if c.number in seen else ", not shown")
-        stops = f"; stops {c.contact.stops_joint}" if c.contact.stops_joint else ""
-        passed = "; opened again later" if c.contact.passed else ""
+        stops = f", stops {c.contact.stops_joint}" if c.contact.stops_joint else ""
+        passed = ", opened again later" if c.contact.passed else ""
+        hidden = "" if c.number in seen else " (not shown)"
         line(f"{c.number + 1}  {c.contact.link}", 17.0, color=style.CONTACT, fontweight="bold")
-        line(f"    {_KIND[c.contact.kind.value]}, {where}{stops}{passed}", 20.0, fontsize=9.5)
+        line(f"    {_KIND[c.contact.kind.value]}{stops}{passed}", 17.0, fontsize=9.5)
+        line(f"    {c.place}{hidden}", 20.0, fontsize=9.5)
     if not scenes.contacts:
         for text in textwrap.wrap(f"none: {result.reason}", 58)[:4]:
             line(text, 16.0, fontsize=9.5)
@@ -318,7 +318,7 @@ def _deg(angle: float) -> str:
 _KIND: Final = {
     "side": "side of the link",
     "tip": "rounded end of the link",
-    "edge": "corner of the link",
+    "edge": "edge of the link",
     "face": "face of the link",
     "vertex": "corner of the link",
 }
@@ -326,7 +326,10 @@ _KIND: Final = {
 
 def _meaning(candidate: Candidate) -> list[str]:
     if candidate.plane is None:
-        lines = ["closed over all planes at once: each joint", "stops at the first touch on any plane"]
+        lines = [
+            "each joint stops at the first touch across the whole width",
+            "of the finger, between the planes, too, or at another link",
+        ]
     else:
         lines = ["closed as if only this plane existed"]
     if candidate.penetration is not None and candidate.feasible is not None:

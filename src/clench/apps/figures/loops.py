@@ -22,6 +22,15 @@ class Loop:
     points: FloatArray
     closed: bool
 
+    def distance(self, point: FloatArray) -> float:
+        """Return the distance from a point to the curve [m]."""
+        ends = np.roll(self.points, -1, axis=0)
+        a, b = (self.points, ends) if self.closed or len(ends) == 1 else (self.points[:-1], ends[:-1])
+        run = b - a
+        share = ((point - a) * run).sum(axis=1) / np.maximum((run**2).sum(axis=1), 1e-30)
+        away = a + np.clip(share, 0.0, 1.0)[:, None] * run - point
+        return float(np.linalg.norm(away, axis=1).min())
+
 
 def join_segments(segments: FloatArray) -> list[Loop]:
     """Join segments end to start, each run with its normal on the right, so that a hole runs against its border.

@@ -12,7 +12,8 @@ from clench.solve.solution import Candidate, FingerResult
 
 from . import style
 from .curl_plane import draw_plane, frame_plane, overlap, set_name
-from .plane_scene import FingerScenes, PlaneScene, bounds
+from .finger_scenes import FingerScenes
+from .plane_scene import PlaneScene, along_y, bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +43,7 @@ def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str
     shown = _selected(alike, chosen)
     made = [scenes_of.showing(c) for c in shown]
     family = _busiest_family(made[0])
-    scenes = [m.scene(family, dict(m.touched_planes(99)[::-1])[family], with_open=False) for m in made]
+    scenes = [m.scene(family, dict(m.touched_planes(len(m.plan.families)))[family], with_open=False) for m in made]
     low, high = bounds(scenes)
     columns = min(_COLUMNS, len(shown))
     rows = math.ceil(len(shown) / columns)
@@ -68,7 +69,7 @@ def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str
         style.write(
             figure, _GAP / width, below, text, fontsize=10, va="top", color=style.INK if i == 0 else style.CHOSEN
         )
-    note = "●  touches on the plane that is drawn     ○  touches on another plane of this finger     "
+    note = "●  touches on the plane that is drawn     ○  touches elsewhere across the finger's width     "
     note += "thin line: joints, also where the plane misses a link"
     style.write(figure, _GAP / width, 16 / height, note, fontsize=9.5, color=style.CONTACT)
     return style.save_figure(figure, path)
@@ -99,7 +100,8 @@ def _busiest_family(scenes: FingerScenes) -> int:
 
 def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) -> None:
     """Title a panel, write its joint angles, and frame the chosen one."""
-    where = "" if candidate.plane is None else f" (y = {scene.offset * 1e3:+.1f} mm)"
+    drawn = "drawn: " if candidate.plane is None else ""
+    where = f" ({drawn}{along_y(scene.offset)})"
     title = f"{set_name(candidate)}{where}"
     color = style.CHOSEN if chosen else style.INK
     axes.set_title(
@@ -121,7 +123,7 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
             label = style.write(axes, x, -down / box.height, text, fontsize=size, color=shade, fontweight="bold")
             label.set(transform=axes.transAxes, va="top")
     for i, text in enumerate(_verdict(candidate)):
-        label = style.write(axes, 0.0, -(37.0 + 15.0 * i) / box.height, text, fontsize=8.5)
+        label = style.write(axes, 0.0, -(37.0 + 15.0 * i) / box.height, text, fontsize=8.0)
         label.set(transform=axes.transAxes, va="top")
 
 
@@ -161,13 +163,15 @@ def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, 
     if len(scenes.plan.families) > 1:
         family = f" Its joints lie in {len(scenes.plan.families)} families of planes; drawn are those of "
         family += f"{', '.join(j.name for j in scene.joints)}."
-    first = "One set per curl plane, closed as if only that plane existed, and one closed over the full width at once."
+    first = "One set per curl plane, closed as if only that plane existed"
+    if any(c.plane is None for c in result.candidates):
+        first += "; and one over the full width, which stops at touches between the planes, too"
     why = {
         True: "it stops at the first touch anywhere across the finger's width",
         False: "it scores best among the sets",
     }[chosen.plane is None]
     second = f"Chosen: {set_name(chosen)}: {why}."
-    return [first + family, second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
+    return [f"{first}.{family}", second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
 
 
 def _scale_bar(axes: Axes) -> None:
