@@ -89,7 +89,7 @@ class HandBuilder:
             fingers=tuple(self.fingers),
             palm=0,
             fixed_links=(0,),
-            allowed_pairs=(),
+            allowed_pairs=tuple((link.parent, i) for i, link in enumerate(self.links) if link.parent >= 0),
             palm_center=np.zeros(3),
             palm_normal=np.asarray(normal, dtype=float),
         )

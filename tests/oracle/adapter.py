@@ -117,6 +117,7 @@ def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
         np.zeros((items, families, 3, 4)),
         np.zeros(items, np.int64),
         np.full(items, -1, np.int64),
+        np.zeros(items, np.int64),
     )
 
 

@@ -58,16 +58,17 @@ class FingerCandidate:
     """Hold one alternative set of a finger.
 
     Args:
-        plan: the finger at its posture. posture: index of the posture alternative.
+        item: number of its item of work. plan: the finger at its posture. posture: index of the posture alternative.
         plane: index, or None for the full width. travel: of the plan's groups [rad].
         q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
         touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
             or None; then nothing moves.
-        clear: it passes through nothing on any of the planes.
+        exact: it was swept over the whole width. clear: it passes through nothing on any of the planes.
         feasible, penetration: over the whole width, path included; None when not measured.
         scores: criterion name to value.
     """
 
+    item: int
     plan: FingerPlan
     posture: int
     plane: int | None
@@ -75,6 +76,7 @@ class FingerCandidate:
     q: FloatArray
     touches: tuple[Touch, ...]
     overlap: LinkDepth | None
+    exact: bool = False
     clear: bool = False
     feasible: bool | None = None
     penetration: float | None = None
@@ -113,6 +115,7 @@ def _candidate(
     travel = np.zeros(last - first) if overlap else closed.answer.travel[i, first:last].copy()
     contacts = 0 if overlap else closed.answer.contacts[i]
     return FingerCandidate(
+        item=i,
         plan=finger,
         posture=plan.posture[entry],
         plane=None if plan.whole[i] else int(plan.items.low[i]),
@@ -120,6 +123,7 @@ def _candidate(
         q=finger.angles(hand, travel),
         touches=tuple(_touch(hand, plan, packed, closed, i, n, travel) for n in range(contacts)),
         overlap=overlap,
+        exact=plan.whole[i] and not closed.answer.skipped[i],
     )
 
 

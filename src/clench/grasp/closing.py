@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,7 +86,8 @@ def close_hand(
     """Cut the object, look for overlaps at the start, and close every item.
 
     Args:
-        plan: of the hand. exact: for the items that are swept exactly. packed: the object. T_palm_object: where it is, shape (4, 4).
+        plan: of the hand. exact: for the items that are swept exactly. packed: the object.
+        T_palm_object: where it is, shape (4, 4).
         rounds: how often all degrees of freedom are gone through.
     """
     from clench.kernels.closing import close_items
@@ -114,6 +115,51 @@ def close_hand(
         capacity = 2 * wanted
 
 
+def only_item(plan: HandPlan, item: int) -> HandPlan:
+    """Return a plan with one of its items alone."""
+    from clench.kernels.layout import ItemArrays
+
+    return replace(
+        plan, items=ItemArrays(*(column[item : item + 1] for column in plan.items)), whole=(plan.whole[item],)
+    )
+
+
+def close_item_again(
+    plan: HandPlan, exact: ExactArrays, packed: PackedObject | None, closed: ClosedHand, item: int, rounds: int
+) -> ClosedHand:
+    """Close one item again, with other links in its way than before.
+
+    Args:
+        plan: of the hand. exact: for the item alone. packed: the object, or None to leave it out.
+        closed: as the whole hand was closed before. item: its number. rounds: as for `close_hand`.
+    """
+    from clench.kernels.bodies import no_body
+    from clench.kernels.closing import close_items
+    from clench.kernels.family_section import make_sections
+    from clench.kernels.layout import no_rounds
+    from clench.kernels.tree import build_tree
+
+    one = only_item(plan, item)
+    T = np.ascontiguousarray(closed.T_palm_object[:3])
+    if packed is None:
+        tree, shapes, winding = build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True
+        shared, more = make_sections(len(plan.arrays.plane_offset), 0, 0), 0
+        exact = exact._replace(object=no_body())
+    else:
+        tree, shapes, winding = packed.tree, _round_arrays(packed), packed.closed
+        shared, more = closed.sections, len(packed.rounds.kind)
+        exact = exact._replace(object=packed.bodies)
+    capacity = _CAPACITY
+    while True:
+        answer = empty_answer(one)
+        own = make_sections(plan.most_planes, capacity, more)
+        close_items(plan.arrays, exact, tree, shapes, winding, T, shared, own, one.items, rounds, answer)
+        wanted = int(answer.overflow.max(initial=0))
+        if not wanted:
+            return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
+        capacity = 2 * wanted
+
+
 def empty_answer(plan: HandPlan) -> ClosingArrays:
     """Return the arrays that the kernels write, with room for one contact per group."""
     from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
@@ -129,6 +175,7 @@ def empty_answer(plan: HandPlan) -> ClosingArrays:
         pose=np.zeros((items, len(plan.arrays.family_pose), 3, 4)),
         overflow=np.zeros(items, dtype=np.int64),
         overlap=np.full(items, -1, dtype=np.int64),
+        skipped=np.zeros(items, dtype=np.int64),
     )
 
 

@@ -13,7 +13,7 @@ from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
 from .plan import FingerPlan, closing_joints, last_closing_joint
-from .scene import shape_elements
+from .scene import ROUND_POLYHEDRA, SWEEP_DEVIATION, PackedObject, shape_elements
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays
@@ -66,28 +66,26 @@ def pack_exact(
     wanted: Sequence[bool],
     checked: np.ndarray,
     source: CollisionSource,
-    obj: BodyArrays,
-    resting: FloatArray | None = None,
 ) -> ExactArrays:
-    """Pack the links of the plans' fingers and how their joints move them.
+    """Pack the links of the plans' fingers and how their joints move them; the object is left out.
 
     Args:
         hand: the hand. plans: one per entry. wanted: per item. checked: see `checked_pairs`.
-        source: geometry of the links. obj: the object.
-        resting: posture of all joints that the other fingers rest in [rad]; None is each plan's own.
+        source: geometry of the links.
     """
+    from clench.kernels.bodies import no_body
     from clench.kernels.exact import ExactArrays
 
     first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
     movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
     axes = [_axis(plan, k) for plan in plans for k in range(len(plan.joints))]
-    poses = [hand.link_poses(_posture(plan, resting))[:, :3] for plan in plans]
+    poses = [hand.link_poses(plan.posture)[:, :3] for plan in plans]
     rows = [(link, joint, pose[link]) for found, pose in zip(movers, poses, strict=True) for link, joint in found]
     return ExactArrays(
         joint_first=first.astype(np.int64),
         wanted=np.array(wanted, dtype=np.int64),
         links=link_bodies(hand, source),
-        object=obj,
+        object=no_body(),
         mover_first=np.cumsum([0, *(len(found) for found in movers)]).astype(np.int64),
         mover_link=np.array([row[0] for row in rows], dtype=np.int64),
         mover_joint=np.array([row[1] for row in rows], dtype=np.int64),
@@ -97,15 +95,6 @@ def pack_exact(
         link_pose=np.ascontiguousarray(poses),
         checked=checked,
     )
-
-
-def _posture(plan: FingerPlan, resting: FloatArray | None) -> FloatArray:
-    if resting is None:
-        return plan.posture
-    q = resting.copy()
-    own = list(plan.finger.joints)
-    q[own] = plan.posture[own]
-    return q
 
 
 def _movers(hand: Hand, plan: FingerPlan, first: int) -> list[tuple[int, int]]:
@@ -121,3 +110,13 @@ def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
     T = plan.families[joint.family].T_palm_family
     anchor: FloatArray = T[:3, 3] + T[:3, 0] * joint.pivot[0] + T[:3, 2] * joint.pivot[1]
     return -T[:3, 1], anchor
+
+
+def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:
+    """Return how far the surfaces that are swept may lie inside the true ones [m]: 0 but for cylinders, ellipsoids."""
+    solid = {*hand.fixed_links, *(link for finger in hand.fingers for link in finger.links)}
+    shapes = [s for i in solid for s in hand.links[i].shapes.get(source, ())]
+    return sum(
+        max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)
+        for sizes in ([(s.kind, s.size) for s in shapes], packed.round_sizes)
+    )

@@ -26,6 +26,7 @@ TESSELLATION_FRACTION: Final = 2e-3
 TESSELLATION_DEVIATION: Final = 2e-5
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
+ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
 #: Number of each kind of round shape in `RoundShapes.kind`.
 ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
 
@@ -79,6 +80,12 @@ class PackedObject:
     radius: float
     geometry_hash: str
 
+    @property
+    def round_sizes(self) -> list[tuple[ShapeKind, tuple[float, ...]]]:
+        """Kind and half sizes of every round shape [m]."""
+        kinds = {number: kind for kind, number in ROUND_KINDS.items()}
+        return [(kinds[int(k)], tuple(size)) for k, size in zip(self.rounds.kind, self.rounds.size, strict=True)]
+
 
 def pack_object(obj: GraspObject) -> PackedObject:
     """Pack an object's bodies for the kernels; the pose plays no part, and the same bodies are packed once."""
@@ -118,7 +125,7 @@ def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
         ends = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]) @ shape.pose.rotation.T + shape.pose.position
         core = [0, 1, 1] if half > 0.0 else [0, 0, 0]
         return Elements(ends, np.array([core], dtype=np.int32), np.array([a]))
-    if shape.kind in (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID):
+    if shape.kind in ROUND_POLYHEDRA:
         mesh = shape.to_mesh(SWEEP_DEVIATION * max(shape.size))
     else:
         mesh = shape_mesh(shape, source)

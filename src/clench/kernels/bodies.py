@@ -1,9 +1,9 @@
-"""Rigid bodies for exact sweeps: convex elements (triangles, segments, points, each with a radius) in trees of balls."""
+"""Rigid bodies for exact sweeps: triangles, segments and points, each with a radius, in trees of balls."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,13 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         np.concatenate([np.empty(shape, kind), *(row[k] for row in rows)]).astype(kind)
         for k, (shape, kind) in enumerate(zip(shapes, kinds, strict=True))
     ]
-    return BodyArrays(*joined, np.array(root, dtype=np.int32))
+    columns: dict[str, NDArray[Any]] = dict(zip(BodyArrays._fields, joined, strict=False))
+    return BodyArrays(**columns, root=np.array(root, dtype=np.int32))
+
+
+def no_body() -> BodyArrays:
+    """Return one body without elements."""
+    return pack_bodies([join_elements([])])
 
 
 def _corners(points: Floats) -> Ints:

@@ -43,9 +43,7 @@ def above_face(t: Floats, nx: float, ny: float, nz: float, px: float, py: float,
 
 
 @inner_kernel
-def edge_pair(
-    a: Floats, i: int, j: int, b: Floats, k: int, m: int
-) -> tuple[float, float, float, float, float, float]:
+def edge_pair(a: Floats, i: int, j: int, b: Floats, k: int, m: int) -> tuple[float, float, float, float, float, float]:
     """Return where two edges are closest: parameters from 0 to 1 on each, difference there, and its square."""
     ux, uy, uz = a[j, 0] - a[i, 0], a[j, 1] - a[i, 1], a[j, 2] - a[i, 2]
     vx, vy, vz = b[m, 0] - b[k, 0], b[m, 1] - b[k, 1], b[m, 2] - b[k, 2]
@@ -79,7 +77,7 @@ def edge_count(corners: int) -> int:
 
 @inner_kernel
 def corner_over_face(a: Floats, ka: int, b: Floats, kb: int, best: float) -> tuple[float, float, float, float, int]:
-    """Return the closest corner of `a` over the face of `b` if it is nearer than `best`: distance, direction, corner."""
+    """Return the closest corner of `a` over the face of `b` nearer than `best`: distance, direction, number."""
     d, mx, my, mz, corner = best, 0.0, 0.0, 0.0, -1
     if kb == 3:
         nx, ny, nz, size = face_normal(b)

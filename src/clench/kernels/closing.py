@@ -18,7 +18,6 @@ from .layout import (
     ClosingArrays,
     Floats,
     HandArrays,
-    Ints,
     ItemArrays,
     RoundArrays,
     SectionArrays,
@@ -217,6 +216,7 @@ def close_item(
     rates = np.zeros(hand.chain.rate.shape[0])
     if exact.wanted[i]:
         sweep.poses[:] = exact.link_pose[entry]
+    sweep.skipped[0] = 0
     for _ in range(times):
         family = start - 1
         for group in range(hand.entry_group[entry], hand.entry_group[entry + 1]):
@@ -270,6 +270,7 @@ def close_item(
                     items,
                     answer,
                 )
+    answer.skipped[i] = sweep.skipped[0]
     settle(hand, exact, T_palm_object, start, shared, own, items, i, work, sweep, answer)
 
 
@@ -290,7 +291,8 @@ def close_items(
     """Close every item of work (METHOD.md section 4, *proximal first*).
 
     Args:
-        hand: the fingers. exact: what the exact sweeps need. tree, rounds, closed: the object in its own frame; `closed` when its winding is known.
+        hand: the fingers. exact: what the exact sweeps need.
+        tree, rounds, closed: the object in its own frame; `closed` when its winding is known.
         T_palm_object: where it is, shape (3, 4).
         shared: sections with every entry's first family, by global plane. own: arena for later families, with a row for
             every plane of the largest entry.
@@ -300,6 +302,4 @@ def close_items(
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
     sweep = make_sweep_work(work.chain, exact.checked.shape[0])
     for i in range(items.entry.shape[0]):
-        close_item(
-            hand, exact, tree, rounds, closed, T_palm_object, shared, own, items, i, times, work, sweep, answer
-        )
+        close_item(hand, exact, tree, rounds, closed, T_palm_object, shared, own, items, i, times, work, sweep, answer)

@@ -1,4 +1,4 @@
-"""The exact width: moving links against the object and the hand's resting links, stage by stage (METHOD.md section 5)."""
+"""The exact width: moving links against object and resting links, stage by stage (METHOD.md section 5)."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def sweep_stage(
     Returns:
         the travel; what is met: -1 nothing, L the object, else a link of the hand. `sweep.pair` and `sweep.poses`,
         which has every link where it is at the start of the segment, describe it. A link that overlaps the object
-        already gives `OVERLAP`; links that overlap each other already are left alone.
+        already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
     """
     first = 0
     while first < rates.shape[0] and rates[first] == 0.0:
@@ -223,7 +223,9 @@ def sweep_stage(
                 work,
                 sweep,
             )
-            if 0.0 <= found < best:
+            if found < 0.0:
+                sweep.skipped[0] += 1
+            elif found < best:
                 best, met = found, r
                 keep_pair(sweep)
     return best, met
@@ -247,7 +249,14 @@ def is_moving(exact: ExactArrays, entry: int, first: int, link: int) -> bool:
 
 @inner_kernel
 def describe_pair(
-    exact: ExactArrays, T_palm_object: Floats, met: int, group: int, family: int, sweep: SweepWork, hit: Ints, point: Floats
+    exact: ExactArrays,
+    T_palm_object: Floats,
+    met: int,
+    group: int,
+    family: int,
+    sweep: SweepWork,
+    hit: Ints,
+    point: Floats,
 ) -> None:
     """Write how the winning pair touches with the links at `sweep.poses`; the point is in the palm frame."""
     i, k, m = sweep.winner[0], sweep.winner[1], sweep.winner[2]
@@ -255,9 +264,7 @@ def describe_pair(
     T = T_palm_object if met == exact.checked.shape[0] else sweep.poses[met]
     put_core(exact.links, i, sweep.poses[m], sweep.core)
     put_core(resting, k, T, sweep.fixed)
-    d, nx, ny, nz, feature, _, x, y, z = separation(
-        sweep.core, exact.links.corners[i], sweep.fixed, resting.corners[k]
-    )
+    d, nx, ny, nz, feature, _, x, y, z = separation(sweep.core, exact.links.corners[i], sweep.fixed, resting.corners[k])
     w = resting.radius[k]
     hit[HIT_PLANE], hit[HIT_OUTLINE], hit[HIT_SOURCE], hit[HIT_GROUP], hit[HIT_FAMILY] = -1, m, k, group, family
     hit[HIT_FEATURE], hit[HIT_WHICH] = i, met

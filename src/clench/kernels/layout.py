@@ -162,6 +162,11 @@ class RoundArrays(NamedTuple):
     pose: Floats
 
 
+def no_rounds() -> RoundArrays:
+    """Return the round primitives of an object that has none."""
+    return RoundArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)))
+
+
 class ItemArrays(NamedTuple):
     """List the items of work: an entry's one plane, or all of its planes (the full width).
 
@@ -184,6 +189,7 @@ class ClosingArrays(NamedTuple):
         pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
         overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
         overlap: link that overlaps the object at the start over its width, or -1, (I,); then nothing moves.
+        skipped: pairs of the hand's own links that were left alone, as they overlapped already, (I,).
     """
 
     travel: Floats
@@ -194,15 +200,16 @@ class ClosingArrays(NamedTuple):
     pose: Floats
     overflow: Ints
     overlap: Ints
+    skipped: Ints
 
 
 #: Columns of `ClosingArrays.hit`.
 HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE, HIT_WHICH = 0, 1, 2, 3, 4, 5, 6, 7
 HIT_INTEGERS = 8
-#: Columns of `ClosingArrays.hit` mean for an exact contact, whose plane is -1: link, kind, element of what it meets,
-#: element of the link, and what it meets (a link, or the number of links for the object).
-#: Columns of `ClosingArrays.point`, but for an exact contact point, normal (both in the palm frame) and gap: contact, outward normal of the object there, normal of its curve,
-#: and the gap at the item's final posture.
+#: For an exact contact the plane is -1, and the columns mean: link, kind, element that is met, group, family, element
+#: of the link, and what is met (a link, or the number of links for the object).
+#: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at
+#: the item's final posture; for an exact contact point and normal in the palm frame, and the gap.
 HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_GAP = 0, 1, 2, 3, 4, 5, 6
 HIT_FLOATS = 7
 

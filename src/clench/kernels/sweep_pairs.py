@@ -75,7 +75,7 @@ def corner_motion(
 @inner_kernel
 def plane_offset(core: Floats, corners: int, nx: float, ny: float, nz: float) -> float:
     """Return the largest coordinate of a core along n."""
-    top = nx * core[0, 0] + ny * core[0, 1] + nz * core[0, 2]
+    top: float = nx * core[0, 0] + ny * core[0, 1] + nz * core[0, 2]
     for k in range(1, corners):
         top = max(top, nx * core[k, 0] + ny * core[k, 1] + nz * core[k, 2])
     return top
@@ -97,7 +97,7 @@ def turn_to_plane(gap: float, slope: float, curvature: float, best: float) -> fl
     if constant >= size:
         return best
     turn = math.atan2(slope, a) + math.acos(min(max(-constant / size, -1.0), 1.0))
-    return turn if turn > 0.0 else 0.0
+    return max(turn, 0.0)
 
 
 @inner_kernel
@@ -254,7 +254,7 @@ def leave_touch(
         if face == 1 and ka == 3:
             nx, ny, nz, size = face_normal(placed)
         if size > 0.0:
-            for flip in range(2):
+            for _ in range(2):
                 nx, ny, nz = -nx, -ny, -nz
                 one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, s, touch, best)
                 found = max(found, one)
@@ -268,7 +268,7 @@ def leave_touch(
             scale = (ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz)
             if size * size > 1e-12 * scale:
                 nx, ny, nz = nx / size, ny / size, nz / size
-                for flip in range(2):
+                for _ in range(2):
                     nx, ny, nz = -nx, -ny, -nz
                     one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, s, touch, best)
                     found = max(found, one)

@@ -28,7 +28,7 @@ class SweepWork(NamedTuple):
         moving, resting: poses of two bodies relative to their pivots, (3, 4). start: pose of the moving one, (3, 4).
         poses: `T_palm_link` of every link, (L, 3, 4). stack: (PAIRS, 2).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
-            moving body, resting body, (4,).
+            moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
 
     core: Floats
@@ -42,6 +42,7 @@ class SweepWork(NamedTuple):
     stack: Ints
     pair: Ints
     winner: Ints
+    skipped: Ints
 
 
 @inner_kernel
@@ -59,6 +60,7 @@ def make_sweep_work(chain: Floats, links: int) -> SweepWork:
         np.empty((PAIRS, 2), dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
     )
 
 
@@ -98,7 +100,7 @@ def balls_miss(
             ax += work.chain[i, 1]
             az += work.chain[i, 2]
         reach += speed * best
-        return (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2 > reach * reach
+        return bool((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2 > reach * reach)
     flat = reach * reach - (ay - by) ** 2
     if flat < 0.0:
         return True
@@ -113,7 +115,8 @@ def balls_miss(
 @inner_kernel
 def ball_of(bodies: BodyArrays, n: int) -> Floats:
     """Return the ball around a node, or around element `-1 - n`."""
-    return bodies.node[n] if n >= 0 else bodies.ball[-1 - n]
+    ball: Floats = bodies.node[n] if n >= 0 else bodies.ball[-1 - n]
+    return ball
 
 
 @inner_kernel
@@ -135,7 +138,7 @@ def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints,
         return waiting + 2
     for k in range(bodies.count[n]):
         stack[waiting + k, column], stack[waiting + k, 1 - column] = -1 - (bodies.first[n] + k), other
-    return waiting + bodies.count[n]
+    return waiting + int(bodies.count[n])
 
 
 @inner_kernel
@@ -157,7 +160,8 @@ def sweep_body(
 
     Args:
         work: has `chain`, `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
-        count: rows of the chain. speed: no point of body `m` is faster [m per travel]. touch: gaps up to this touch [m].
+        count: rows of the chain. speed: no point of body `m` is faster [m per travel].
+        touch: gaps up to this touch [m].
     """
     stack = work.stack
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
@@ -174,9 +178,7 @@ def sweep_body(
             ka, wa = put_item(moving, a, work.moving, work.core)
             kb, wb = put_item(resting, b, work.resting, work.fixed)
             near = touch if a < 0 and b < 0 else COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
-            found = sweep_pair(
-                work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, work.placed
-            )
+            found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, work.placed)
             if found >= best:
                 continue
             if a < 0 and b < 0:
@@ -195,9 +197,7 @@ def sweep_body(
 
 
 @inner_kernel
-def body_gap(
-    moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, work: SweepWork
-) -> float:
+def body_gap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, work: SweepWork) -> float:
     """Return the gap between two bodies if it is below `bound`, else `bound`; writes the closest pair.
 
     Args:

@@ -146,7 +146,14 @@ def describe_hit(
 
 @inner_kernel
 def settle_hit(
-    hand: HandArrays, start: int, shared: SectionArrays, own: SectionArrays, turns: Floats, hit: Ints, point: Floats, work: Work
+    hand: HandArrays,
+    start: int,
+    shared: SectionArrays,
+    own: SectionArrays,
+    turns: Floats,
+    hit: Ints,
+    point: Floats,
+    work: Work,
 ) -> None:
     """Evaluate a contact again at the final posture; what later motions carried along gets its new place."""
     family, plane, o = hit[HIT_FAMILY], hit[HIT_PLANE], hit[HIT_OUTLINE]

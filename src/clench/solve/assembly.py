@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from clench.grasp.motion import asked_fingers, decompose
 from clench.grasp.scene import hash_hand
 from clench.grasp.surface import nearest_body
 
+from .certificate import Certificate
 from .solution import (
     Candidate,
     Contact,
@@ -49,7 +50,7 @@ class Answer:
         fingers: candidates of each finger that closes. chosen: index of the chosen one of each.
         final: posture of the hand, shape (J,) [rad].
         at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the
-            end; None when not measured.
+            end; None when not measured. certificate: what is promised.
     """
 
     fingers: Sequence[Sequence[FingerCandidate]]
@@ -57,6 +58,7 @@ class Answer:
     final: FloatArray
     at_start: Sequence[LinkDepth]
     at_end: Sequence[LinkDepth] | None
+    certificate: Certificate
 
     @property
     def best(self) -> list[FingerCandidate]:
@@ -91,7 +93,8 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         decomposition=decompose(hand, answer.final),
         joint_angles=dict(zip(names, answer.final.tolist(), strict=True)),
         open_angles=dict(zip(names, _opened(answer, problem).tolist(), strict=True)),
-        certified=False,
+        certified=answer.certificate.holds,
+        certificate=asdict(answer.certificate),
         collision_source=str(problem.source),
         object_collision_source=str(problem.obj.collision_source),
         max_penetration=None if answer.at_end is None else max((d.depth for d in answer.at_end), default=0.0),

@@ -23,6 +23,7 @@ from clench.grasp.feasibility import judge_sets
 from clench.grasp.motion import alternatives, asked_fingers, open_posture, palm_pose
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
 from clench.grasp.scene import PackedObject, pack_object
+from clench.grasp.sequence import close_in_sequence
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
@@ -30,13 +31,16 @@ from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
 
 from .assembly import Answer, assemble
+from .certificate import certify
 from .solution import GraspSolution
 
 if TYPE_CHECKING:
+    from clench.kernels.exact import ExactArrays
+
     from .record import Record
 
 _KEPT_PLANS = 64
-_plans: OrderedDict[tuple[object, ...], tuple[Hand, HandPlan]] = OrderedDict()
+_plans: OrderedDict[tuple[object, ...], tuple[Hand, HandPlan, ExactArrays]] = OrderedDict()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +82,9 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     problem = make_problem(hand, obj, command)
     weights = weights_of(command.criteria)
     clock.lap("read")
-    plan = plan_hand(problem)
+    plan, links = _planned(problem)
     clock.lap("plan")
-    exact = pack_exact(
-        hand, plan.plans, plan.whole, checked_pairs(hand, across=False), problem.source, problem.packed.bodies
-    )
+    exact = links._replace(object=problem.packed.bodies)
     closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, command.rounds)
     clock.lap("close")
     overlaps = start_overlaps(hand, plan, closed, problem.packed, problem.T_palm_object, problem.source)
@@ -93,6 +95,11 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     fingers = group_by_finger(plan, scored)
     chosen = [choose(group, weights) for group in fingers]
     clock.lap("choose")
+    best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
+    again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, command.rounds)
+    for group, i, old, new in zip(fingers, chosen, best, again, strict=True):
+        group[i] = old if new is old else replace(new, scores=score_all(new, setting), clear=old.clear)
+    clock.lap("sequence")
     final = combine(hand, problem.start, [group[i] for group, i in zip(fingers, chosen, strict=True)])
     answer = judge_answer(problem, fingers, chosen, final)
     clock.lap("judge")
@@ -119,6 +126,11 @@ def plan_hand(problem: Problem) -> HandPlan:
     Raises:
         HandError: no finger asked for has a closing joint.
     """
+    return _planned(problem)[0]
+
+
+def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
+    """Return the plan of a hand at a posture, and what its exact sweeps need."""
     hand, command = problem.hand, problem.command
     key = (
         id(hand),
@@ -133,7 +145,7 @@ def plan_hand(problem: Problem) -> HandPlan:
     )
     kept = _plans.get(key)
     if kept is not None and kept[0] is hand:
-        return kept[1]
+        return kept[1], kept[2]
     plans, finger, posture = [], [], []
     for f, asked in enumerate(asked_fingers(hand, command)):
         if closing_joints(hand, asked):
@@ -146,10 +158,11 @@ def plan_hand(problem: Problem) -> HandPlan:
     if command.rounds > 1:
         _check_rounds(plans)
     plan = make_hand_plan(plans, finger, posture, command.full_width)
-    _plans[key] = (hand, plan)
+    exact = pack_exact(hand, plan.plans, plan.whole, checked_pairs(hand, across=False), problem.source)
+    _plans[key] = (hand, plan, exact)
     while len(_plans) > _KEPT_PLANS:
         _plans.popitem(last=False)
-    return plan
+    return plan, exact
 
 
 def _check_rounds(plans: list[FingerPlan]) -> None:
@@ -191,12 +204,13 @@ def judge_answer(
     at_start = hand_depths(
         hand, problem.start, problem.packed, problem.T_palm_object, problem.source, links=hand.fixed_links
     )
-    at_end = (
-        hand_depths(hand, final, problem.packed, problem.T_palm_object, problem.source)
-        if problem.command.measure
-        else None
-    )
-    return Answer(fingers, chosen, final, at_start, at_end)
+    best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
+    certificate = certify(problem, best, at_start)
+    # Where nothing can overlap there is nothing to measure but what rests.
+    at_end = at_start if certificate.holds else None
+    if at_end is None and problem.command.measure:
+        at_end = hand_depths(hand, final, problem.packed, problem.T_palm_object, problem.source)
+    return Answer(fingers, chosen, final, at_start, at_end, certificate)
 
 
 class _Clock:

@@ -96,6 +96,7 @@ class _SolutionForm(msgspec.Struct):
     open_angles: _Map = {}
     object_collision_source: str = "raw"
     joint_limits: _Map = {}
+    certificate: dict[str, Any] | None = None
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -124,6 +125,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "max_penetration": _number(s.max_penetration),
         "fingers": {name: _finger_to_dict(finger) for name, finger in s.fingers.items()},
         "contacts": [_contact_to_dict(c) for c in s.contacts],
+        "certificate": _plain(s.certificate),
         "quality": _plain(s.quality),
         "squeeze": _plain(s.squeeze),
         "pregrasp": None if s.pregrasp is None else _numbers(s.pregrasp),
@@ -176,6 +178,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         max_penetration=form.max_penetration,
         fingers={name: _read_finger(name, v, source) for name, v in form.fingers.items()},
         contacts=_read_contacts(form.contacts, source, "contacts"),
+        certificate=form.certificate,
         quality=form.quality,
         squeeze=form.squeeze,
         pregrasp=None if form.pregrasp is None else angles(form.pregrasp, "pregrasp"),

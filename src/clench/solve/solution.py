@@ -140,6 +140,8 @@ class GraspSolution:
         hand_pose: `T_world_palm`; object_pose: `T_world_object`.
         decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
         joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
+        certified, certificate: whether METHOD.md section 5 is promised, and ``"text"`` with what, or why not;
+            ``"deviation"`` of what is swept as polyhedra [m].
         max_penetration: over the whole width and all links [m], None when not computed.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
@@ -164,6 +166,7 @@ class GraspSolution:
     max_penetration: float | None
     fingers: Mapping[str, FingerResult]
     contacts: tuple[Contact, ...]
+    certificate: Mapping[str, Any] | None = None
     quality: Mapping[str, Any] | None = None
     squeeze: Mapping[str, Any] | None = None
     pregrasp: Mapping[str, float] | None = None
