@@ -5,7 +5,10 @@ import pytest
 
 import clench
 from clench.base.pose import Pose
+from clench.grasp.depths import hand_depths
+from clench.grasp.scene import pack_object
 from clench.models.shapes import Shape, ShapeKind
+from engine.collisions import Collisions
 from engine.statistics import HANDS, OBJECTS, Judge
 from engine.surfaces import ShapeSurface, brute_distance, distance_to_tree, volume_tree
 
@@ -55,18 +58,37 @@ def test_contact_points_lie_on_object_and_link(shared_data, model):
 
 
 @pytest.mark.shared
+@pytest.mark.parametrize("model", HANDS.values(), ids=HANDS)
+def test_a_certified_grasp_overlaps_nothing_and_stops_at_what_it_touches(shared_data, model):
+    """Along the path, the last 1e-5 rad of each joint left out, and at its end; a little further they collide."""
+    hand = clench.Hand.load(shared_data / model)
+    seen = 0
+    for name in ("mug", "torus"):
+        obj = clench.GraspObject.load(shared_data / OBJECTS[name])
+        collisions = Collisions(hand, obj)
+        for pose in clench.approach_poses(hand, obj, 2, seed=1):
+            solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+            if solution.certified:
+                seen += collisions.check(solution)
+    assert seen >= 4
+
+
+@pytest.mark.shared
 @pytest.mark.parametrize("model", ["Barrett", "D'Claw"])
-def test_what_planes_miss_between_them_vanishes_with_more_planes(shared_data, model):
-    """The depth that is left is between the planes, and nowhere else."""
+def test_nothing_is_left_between_the_planes(shared_data, model):
+    """On a single plane each, fingers overlap the glass; the full width does not, with as few planes."""
     hand = clench.Hand.load(shared_data / HANDS[model])
     obj = clench.GraspObject.load(shared_data / OBJECTS["wineglass"])
-    coarse, fine = [], []
+    plane, full = [], []
     for pose in clench.approach_poses(hand, obj, 4, seed=0):
-        for planes, depths in ((5, coarse), (161, fine)):
-            solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=planes))
-            depths.append(solution.max_penetration)
-    assert max(coarse) > 2e-5
-    assert max(fine) < 2e-5
+        for full_width, depths in ((False, plane), (True, full)):
+            command = clench.GraspCommand(hand_pose=pose, planes=3, full_width=full_width)
+            solution = clench.solve(hand, obj, command)
+            q = np.array([solution.joint_angles[name] for name in hand.joint_names])
+            T_palm_object = np.linalg.inv(solution.hand_pose.matrix) @ solution.object_pose.matrix
+            depths.append(max((d.depth for d in hand_depths(hand, q, pack_object(obj), T_palm_object)), default=0.0))
+    assert max(plane) > 2e-5
+    assert max(full) <= ONE_MICROMETRE
 
 
 @pytest.mark.shared
@@ -79,7 +101,7 @@ def test_depth_is_there_where_the_engine_sees_a_collision(shared_data):
     judge = Judge(hand, obj)
     seen = set()
     for pose in clench.approach_poses(hand, obj, 6, seed=2):
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, full_width=False))
         q = np.array([solution.joint_angles[name] for name in hand.joint_names])
         T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
         collides = False

@@ -5,14 +5,14 @@ engine's. Advancing by distance over speed passes nothing that is thicker than t
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import fcl
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 import clench
-from chain_hands import HandBuilder, along_x, mount
+from chain_hands import HandBuilder, along_x
 from clench.base.pose import Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
@@ -150,6 +150,13 @@ def unit(v: Floats) -> Floats:
     return v / np.linalg.norm(v)
 
 
+def hull_shape(points: npt.ArrayLike) -> Shape:
+    """Return the convex hull of points as a mesh."""
+    import trimesh
+
+    return mesh_shape(trimesh.convex.convex_hull(points))
+
+
 def link_shape(rng: np.random.Generator, length: float) -> Shape:
     """Return a capsule, a box or the hull of random points along a link."""
     kind = rng.integers(3)
@@ -159,7 +166,7 @@ def link_shape(rng: np.random.Generator, length: float) -> Shape:
         size = (0.45 * length, float(rng.uniform(0.003, 0.01)), float(rng.uniform(0.002, 0.007)))
         return Shape(ShapeKind.BOX, size, Pose([0.5 * length, 0, 0]))
     points = rng.uniform([0.05 * length, -0.009, -0.006], [0.95 * length, 0.009, 0.006], (int(rng.integers(5, 24)), 3))
-    return mesh_shape(trimesh.convex.convex_hull(points))
+    return hull_shape(points)
 
 
 def object_shape(rng: np.random.Generator) -> Shape:
@@ -169,10 +176,12 @@ def object_shape(rng: np.random.Generator) -> Shape:
         return Shape(ShapeKind.BOX, (5e-5, float(rng.uniform(0.005, 0.03)), float(rng.uniform(0.005, 0.03))))
     if kind == 1:
         base = 0.002 * np.array([[1, 0, 0], [-0.5, 0.9, 0], [-0.5, -0.9, 0]])
-        return mesh_shape(trimesh.convex.convex_hull([*base, [0, 0, float(rng.uniform(0.02, 0.05))]]))
+        return hull_shape([*base, [0, 0, float(rng.uniform(0.02, 0.05))]])
     if kind == 2:
-        return mesh_shape(trimesh.convex.convex_hull(rng.normal(scale=0.012, size=(int(rng.integers(6, 40)), 3))))
+        return hull_shape(rng.normal(scale=0.012, size=(int(rng.integers(6, 40)), 3)))
     if kind == 3:
+        import trimesh
+
         return mesh_shape(trimesh.creation.torus(0.015, 0.005, major_sections=16, minor_sections=9))
     if kind == 4:
         return Shape(ShapeKind.BOX, tuple(rng.uniform(0.004, 0.02, 3)))
@@ -181,7 +190,7 @@ def object_shape(rng: np.random.Generator) -> Shape:
     return Shape(ShapeKind.CAPSULE, (float(rng.uniform(0.002, 0.01)), float(rng.uniform(0.005, 0.03)), 0.0))
 
 
-def mesh_shape(mesh: trimesh.Trimesh) -> Shape:
+def mesh_shape(mesh: Any) -> Shape:
     """Return a mesh as a shape."""
     return Shape(
         ShapeKind.MESH, (0.0, 0.0, 0.0), Pose.identity(), TriangleMesh(np.array(mesh.vertices), np.array(mesh.faces))

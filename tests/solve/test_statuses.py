@@ -25,14 +25,25 @@ def palm_and_finger():
 
 
 def test_out_of_reach_of_every_finger():
-    solution = clench.solve(three_links(), clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0])), command())
+    ball = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = clench.solve(three_links(upper=1.2), ball, command())
     assert solution.status == "no_contact"
     assert solution.fingers["index"].status == "limit"
     assert "index" in solution.reason["text"]
     assert solution.contacts == ()
-    assert set(solution.joint_angles.values()) == {3.0}
+    assert set(solution.joint_angles.values()) == {1.2}
     assert solution.max_penetration == 0.0
     assert not solution.is_valid()
+
+
+def test_a_finger_that_curls_into_itself_stops_there():
+    ball = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = clench.solve(three_links(), ball, command())
+    assert solution.status == "no_contact"
+    assert "stopped by the hand's own index_link_0" in solution.fingers["index"].reason
+    assert solution.contacts == ()
+    assert solution.joint_angles["index_1"] < 3.0
+    assert solution.certified
 
 
 def test_a_finger_without_travel_cannot_move():

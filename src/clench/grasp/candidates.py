@@ -58,17 +58,16 @@ class FingerCandidate:
     """Hold one alternative set of a finger.
 
     Args:
-        item: number of its item of work. plan: the finger at its posture. posture: index of the posture alternative.
+        plan: the finger at its posture. posture: index of the posture alternative.
         plane: index, or None for the full width. travel: of the plan's groups [rad].
         q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
         touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
             or None; then nothing moves.
         exact: it was swept over the whole width. clear: it passes through nothing on any of the planes.
         feasible, penetration: over the whole width, path included; None when not measured.
-        scores: criterion name to value.
+        scores: criterion name to value. item: number of its item of work.
     """
 
-    item: int
     plan: FingerPlan
     posture: int
     plane: int | None
@@ -81,6 +80,7 @@ class FingerCandidate:
     feasible: bool | None = None
     penetration: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
+    item: int = -1
 
     @property
     def offset(self) -> float | None:

@@ -57,6 +57,9 @@ def close_group(
     The travel at which a follower starts or stops moving (its own limit) splits the motion into path segments. On each
     of them the planes give a first bound, and the exact sweep, where wanted, what comes before it.
 
+    Args:
+        low, high: the range of planes in use, counted from the family's first.
+
     Returns:
         its travel; the plane of the contact, or -1; what the exact sweep met before that, or -1, as `sweep_stage` says;
         `OVERLAPS` instead where a link overlaps the object already.
@@ -64,6 +67,7 @@ def close_group(
     chain = hand.chain
     length = chain.group_length[group]
     joints = rates.shape[0]
+    low, high = hand.family_plane[family] + low, hand.family_plane[family] + high
     while travel < length:
         end = length
         for j in range(joints):
@@ -227,7 +231,6 @@ def close_item(
             sections, base = shared, 0
             if family > start:
                 sections, base = own, hand.family_plane[start]
-            low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
             travel, plane, met = close_group(
                 hand,
                 exact,
@@ -238,8 +241,8 @@ def close_item(
                 T_palm_object,
                 sections,
                 base,
-                low,
-                high,
+                items.low[i],
+                items.high[i],
                 closed,
                 exact.wanted[i] != 0,
                 answer.travel[i, group],

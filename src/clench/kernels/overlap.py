@@ -89,7 +89,10 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
         if core_holds(outline, sections.disks[row, i, 0], sections.disks[row, i, 1], work):
             return True
     for i in range(sections.counts[row, 2]):
-        if core_holds(outline, sections.ellipses[row, i, 0], sections.ellipses[row, i, 1], work):
+        e = sections.ellipses[row, i]
+        # Its centre may lie beyond the band that belongs to the section.
+        t = min(max(0.0, e[6]), e[7])
+        if core_holds(outline, e[0] + t * e[2], e[1] + t * e[3], work):
             return True
     return False
 

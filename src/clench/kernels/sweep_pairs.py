@@ -286,6 +286,7 @@ def sweep_pair(
     count: int,
     touch: float,
     best: float,
+    rough: bool,
     placed: Floats,
 ) -> float:
     """Return the first `s` before `best` at which two cores come within `w` of each other, else `best`.
@@ -298,7 +299,8 @@ def sweep_pair(
         fixed: the resting one relative to the first pivot [m], (3, 3). kb: its corners.
         w: sum of their radii [m].
         chain, count: what moves, rows (Ω, e_x, e_z); the last row gives only its rate.
-        touch: gaps up to this touch [m]. placed: scratch space, (3, 3); the moving core at the contact.
+        touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
+        placed: scratch space, (3, 3); the moving core at the contact.
     """
     s, level = 0.0, -1.0
     for _ in range(PLANES):
@@ -308,6 +310,8 @@ def sweep_pair(
         if s == 0.0 and crosses(placed, ka, fixed, kb):
             gap = -w
         if level >= 0.0 and gap <= CLOSE * level:
+            return s
+        if level < 0.0 and rough and gap <= touch:
             return s
         if level < 0.0 and gap <= FLAT * touch:
             if w > 0.0:

@@ -178,7 +178,10 @@ def sweep_body(
             ka, wa = put_item(moving, a, work.moving, work.core)
             kb, wb = put_item(resting, b, work.resting, work.fixed)
             near = touch if a < 0 and b < 0 else COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
-            found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, work.placed)
+            rough = a >= 0 or b >= 0
+            found = sweep_pair(
+                work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, rough, work.placed
+            )
             if found >= best:
                 continue
             if a < 0 and b < 0:
