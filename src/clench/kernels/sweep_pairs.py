@@ -19,6 +19,8 @@ from .turning import is_blocking
 
 #: Planes that are laid for one pair at most; a pair that needs more stops there, which is safe.
 PLANES = 400
+#: From this plane on, one is also laid ahead of the present place.
+PLAIN = 8
 #: A pair stops when its gap is below this many times the level that its planes leave open [-].
 CLOSE = 1.5
 #: Below this fraction of the touch tolerance a gap has no direction of its own [-].
@@ -300,10 +302,10 @@ def sweep_pair(
         w: sum of their radii [m].
         chain, count: what moves, rows (Ω, e_x, e_z); the last row gives only its rate.
         touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
-        placed: scratch space, (3, 3); the moving core at the contact.
+        placed: scratch space, (6, 3); its first rows are the moving core at the contact.
     """
-    s, level = 0.0, -1.0
-    for _ in range(PLANES):
+    s, level, leap = 0.0, -1.0, 2.0
+    for turn in range(PLANES):
         move_core(core, ka, chain, count, s, placed)
         d, nx, ny, nz, _, _, _, _, _ = separation(placed, ka, fixed, kb)
         gap = d - w
@@ -330,6 +332,14 @@ def sweep_pair(
             step = step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
             if step <= 0.0:
                 return s
+            if turn >= PLAIN:
+                # Edges almost parallel: the closest points run along them. A plane laid ahead lasts longer.
+                move_core(core, ka, chain, count, s + leap * step, placed[3:])
+                _, nx, ny, nz, _, _, _, _, _ = separation(placed[3:], ka, fixed, kb)
+                offset = plane_offset(fixed, kb, nx, ny, nz) + w + level
+                longer = step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
+                leap = 2.0 * leap if longer > step else max(0.5 * leap, 1.0)
+                step = max(step, longer)
             s += step
             if s >= best:
                 return best

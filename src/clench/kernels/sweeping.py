@@ -24,7 +24,8 @@ class SweepWork(NamedTuple):
     """Hold the scratch space of a sweep.
 
     Args:
-        core, fixed, placed: corners of a pair, (3, 3) each. chain: rows (Ω, e_x, e_z), (J + 1, 3).
+        core, fixed: corners of a pair, (3, 3) each. placed: those of the moving one on its way, (6, 3).
+        chain: rows (Ω, e_x, e_z), (J + 1, 3).
         moving, resting: poses of two bodies relative to their pivots, (3, 4). start: pose of the moving one, (3, 4).
         poses: `T_palm_link` of every link, (L, 3, 4). stack: (PAIRS, 2).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
@@ -51,7 +52,7 @@ def make_sweep_work(chain: Floats, links: int) -> SweepWork:
     return SweepWork(
         np.empty((3, 3)),
         np.empty((3, 3)),
-        np.empty((3, 3)),
+        np.empty((6, 3)),
         chain,
         np.empty((3, 4)),
         np.empty((3, 4)),
