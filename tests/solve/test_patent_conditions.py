@@ -100,7 +100,7 @@ def check(hand, candidate, contact, facet, slope):
     assert -1e-9 <= away @ along <= LENGTHS[link] + 1e-9
     if slope == 0.0:
         offset = contact.offset
-        assert away @ up == pytest.approx(np.sqrt(THICK**2 - offset**2), abs=1e-9)
+        assert away @ up == pytest.approx(np.sqrt(THICK**2 - offset**2), abs=1e-7)
     assert contact.position[1] == pytest.approx(contact.offset, abs=1e-12)
     return 1
 

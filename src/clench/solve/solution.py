@@ -60,7 +60,7 @@ class Contact:
     Args:
         finger, link: names. body: the touched body of the object.
         stops_joint: the joint whose motion this contact stopped, or None.
-        plane: index of the curl plane, offset: its place along the family's y axis [m]; None at full width.
+        plane: index of the curl plane, None between the planes; offset: place along the family's y axis [m].
         kind: see `ContactKind`. passed: a later motion opened it by more than 1 µm.
         position: [m], shape (3,). normal: unit, out of the object, shape (3,).
         gap: distance left at the final posture [m].

@@ -29,8 +29,10 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
         table.add_row(*map(_plain, _finger_row(name, finger, solution)))
     console.print(table)
     if solution.max_penetration is not None:
-        between = "" if solution.certified else " (between the curl planes; not certified over the full width)"
-        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm{between}")
+        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm")
+    if solution.certificate is not None:
+        word = "certified" if solution.certified else "not certified"
+        console.print(f"{word}: {_plain(solution.certificate['text'])}")
     if "total" in solution.timing:
         console.print(f"computed in {solution.timing['total'] * 1e3:.2f} ms")
     _sentences(console, "violation", solution.violations())
@@ -110,7 +112,7 @@ def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tup
     if not 0 <= finger.chosen < len(finger.candidates):
         return name, finger.status.value, "", finger.reason, ""
     chosen = finger.candidates[finger.chosen]
-    plane = "full width" if chosen.plane is None else f"plane {chosen.plane}"
+    plane = "full width" if chosen.plane is None else f"plane {chosen.plane + 1}"
     angles = " ".join(f"{np.rad2deg(a):.1f}" for a in chosen.joint_angles.values())
     return name, finger.status.value, plane, ", ".join(links) or finger.reason, angles
 
