@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import lru_cache, partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,29 +95,79 @@ def close_hand(
         T_palm_object: where it is, shape (4, 4).
         rounds: how often all degrees of freedom are gone through.
     """
-    from clench.kernels.closing import close_items
     from clench.kernels.family_section import cut_first_families, make_sections
     from clench.kernels.overlap import find_overlaps
 
     T = np.ascontiguousarray(T_palm_object[:3])
     shapes = _round_arrays(packed)
-    planes, most = len(plan.arrays.plane_offset), plan.most_planes
+    planes = len(plan.arrays.plane_offset)
     capacity, more = _CAPACITY, len(packed.rounds.kind)
     overlaps = np.empty(len(plan.plans), dtype=np.int64)
     while True:
         shared = make_sections(planes, capacity, more)
-        own = make_sections(most, capacity, more)
         wanted = cut_first_families(plan.arrays, packed.tree, shapes, T, shared)
         if not wanted:
             answer = empty_answer(plan)
             find_overlaps(plan.arrays, packed.tree, shapes, packed.closed, T, shared, overlaps)
-            close_items(
-                plan.arrays, exact, packed.tree, shapes, packed.closed, T, shared, own, plan.items, rounds, answer
-            )
+            close = partial(_close_range, plan, exact, packed, shapes, T, shared, capacity, rounds, answer)
+            ranges = _entry_ranges(plan)
+            # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
+            deque(_threads().map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
             wanted = int(answer.overflow.max(initial=0))
             if not wanted:
                 return ClosedHand(answer, overlaps, shared, T_palm_object)
         capacity = 2 * wanted
+
+
+@lru_cache(maxsize=1)
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="clench")
+
+
+# A forked process has none of its parent's threads.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_threads.cache_clear)
+
+
+def _entry_ranges(plan: HandPlan) -> list[tuple[int, int]]:
+    """Return the range of items of every entry."""
+    firsts = [0, *(np.flatnonzero(np.diff(plan.items.entry)) + 1).tolist(), len(plan.items.entry)]
+    return list(pairwise(firsts))
+
+
+def _close_range(
+    plan: HandPlan,
+    exact: ExactArrays,
+    packed: PackedObject,
+    shapes: RoundArrays,
+    T: FloatArray,
+    shared: SectionArrays,
+    capacity: int,
+    rounds: int,
+    answer: ClosingArrays,
+    span: tuple[int, int],
+) -> None:
+    """Close the items of a range, and write their part of the answer."""
+    from clench.kernels.closing import close_items
+    from clench.kernels.family_section import make_sections
+    from clench.kernels.layout import ClosingArrays, ItemArrays
+
+    own = make_sections(plan.most_planes, capacity, len(shapes.kind))
+    part = slice(*span)
+    columns: list[Any] = [array[part] for array in answer]
+    close_items(
+        plan.arrays,
+        exact._replace(wanted=exact.wanted[part]),
+        packed.tree,
+        shapes,
+        packed.closed,
+        T,
+        shared,
+        own,
+        ItemArrays(*(column[part] for column in plan.items)),
+        rounds,
+        ClosingArrays(*columns),
+    )
 
 
 def only_item(plan: HandPlan, item: int) -> HandPlan:

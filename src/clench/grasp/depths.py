@@ -15,6 +15,7 @@ from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
+from .parts import part_points
 from .scene import PackedObject, shape_mesh
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class LinkMesh:
         tree: all its shapes as triangles, round ones inscribed.
         owners: `feature_owners` of the tree.
         closed: every shape is watertight with outward normals.
-        center, radius: of a ball around it [m], in the link's frame.
+        center, radius: of a ball around it [m], in the link's frame. points: one of every connected part, (N, 3).
     """
 
     link: int
@@ -58,6 +59,7 @@ class LinkMesh:
     closed: bool
     center: FloatArray
     radius: float
+    points: FloatArray
 
 
 def hand_depths(
@@ -221,6 +223,7 @@ def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) ->
         all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True)),
         center,
         float(np.linalg.norm(corners - center, axis=1).max(initial=0.0)),
+        part_points(tree),
     )
 
 

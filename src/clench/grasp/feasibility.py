@@ -32,8 +32,9 @@ def judge_sets(
 ) -> list[FingerCandidate]:
     """Return the candidates with `clear`, and on request `feasible` and `penetration`, filled.
 
-    The full-width set passes through nothing on any plane; a plane's own set that equals it is the same set. Every
-    other one passes through what another plane would have stopped at. What lies between the planes is measured.
+    A set that was swept exactly passes through nothing. Without that, the full-width set passes through nothing on any
+    plane; a plane's own set that equals it is the same set. Every other one passes through what another plane would
+    have stopped at. What lies between the planes is measured.
 
     Args:
         hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
@@ -44,6 +45,9 @@ def judge_sets(
     for c in candidates:
         if c.overlap is not None:
             judged.append(replace(c, feasible=False, penetration=c.overlap.depth))
+            continue
+        if c.exact:
+            judged.append(replace(c, clear=True, feasible=True, penetration=0.0))
             continue
         full = whole.get(id(c.plan))
         clear = full is not None and bool(np.abs(c.travel - full.travel).max(initial=0.0) <= _SAME)

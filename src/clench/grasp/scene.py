@@ -16,6 +16,8 @@ from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
+from .parts import part_points
+
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays, Elements
     from clench.kernels.tree import MeshTree
@@ -62,7 +64,7 @@ class PackedObject:
         body_closed: the same for each body.
         body_names, body_roles: of the bodies that `tree.body` and `rounds.body` number.
         center: middle of the box around the graspable bodies [m], shape (3,).
-        radius: of the ball around `center` that holds everything [m].
+        radius: of the ball around `center` that holds everything [m]. points: one of every connected part, (N, 3).
         geometry_hash: SHA-256 over the arrays, hexadecimal.
     """
 
@@ -78,6 +80,7 @@ class PackedObject:
     body_roles: tuple[BodyRole, ...]
     center: FloatArray
     radius: float
+    points: FloatArray
     geometry_hash: str
 
     @property
@@ -184,6 +187,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         body_roles=tuple(body.role for body in bodies),
         center=center,
         radius=float(np.linalg.norm(corners.reshape(-1, 3) - center, axis=1).max(initial=0.0)),
+        points=part_points(full_tree),
         geometry_hash=_hash_bodies(bodies, source),
     )
 

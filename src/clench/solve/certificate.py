@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate
-from clench.grasp.depths import LinkDepth, hand_depths
+from clench.grasp.containment import contained_link
+from clench.grasp.depths import LinkDepth
 from clench.grasp.exact import swept_deviation
 
 if TYPE_CHECKING:
@@ -48,10 +49,11 @@ def certify(problem: Problem, best: Sequence[FingerCandidate], at_start: Sequenc
         if not c.exact:
             return Certificate(False, f"Links of {name} overlap other links of the hand before it moves.")
         # Surfaces that never cross on the way keep what is inside inside: it is enough that nothing is at the start.
-        inside = hand_depths(
-            hand, c.plan.posture, problem.packed, problem.T_palm_object, problem.source, links=c.plan.finger.links
-        )
-        if any(found.depth > ALLOWED_PENETRATION for found in inside):
+        links = c.plan.finger.links
+        if (
+            contained_link(hand, c.plan.posture, problem.packed, problem.T_palm_object, problem.source, links)
+            is not None
+        ):
             return Certificate(False, f"{name} overlaps the object before it moves.")
     deviation = swept_deviation(hand, problem.source, problem.packed)
     text = f"No link overlaps the object or, where it must not, the hand itself ({problem.source} geometry)"

@@ -1,0 +1,45 @@
+"""Whether a part of a link lies wholly inside the object, or a part of the object inside a link.
+
+Surfaces that do not cross leave only this to be asked, and for each connected part one of its points answers it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from clench.base.pose import FloatArray, invert
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+from .depths import link_meshes
+from .scene import PackedObject
+
+
+def contained_link(
+    hand: Hand,
+    q: FloatArray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource,
+    links: Collection[int],
+) -> int | None:
+    """Return a link that has a part inside the object or around a part of it, or None.
+
+    Args:
+        hand: the hand. q: angles of all its joints [rad], shape (J,). packed: the object.
+        T_palm_object: where it is, shape (4, 4). source: geometry of the hand. links: which links.
+    """
+    from clench.kernels.distance import is_inside
+
+    poses = invert(T_palm_object) @ hand.link_poses(q)
+    for mesh in link_meshes(hand, source):
+        if mesh.link not in links:
+            continue
+        T = poses[mesh.link]
+        for p in mesh.points @ T[:3, :3].T + T[:3, 3]:
+            if is_inside(packed.full_tree, (p[0], p[1], p[2]), packed.closed):
+                return mesh.link
+        for p in (packed.points - T[:3, 3]) @ T[:3, :3]:
+            if is_inside(mesh.tree, (p[0], p[1], p[2]), mesh.closed):
+                return mesh.link
+    return None

@@ -1,0 +1,53 @@
+"""What lies wholly inside something else crosses no surface; one point of every connected part tells."""
+
+import numpy as np
+import pytest
+
+import clench
+from chain_hands import HandBuilder, along_x
+from clench.base.pose import Pose
+from clench.grasp.containment import contained_link
+from clench.grasp.parts import part_points
+from clench.grasp.scene import pack_object
+from clench.kernels.tree import build_tree
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
+
+SPHERE = (0.002, 0.0, 0.0)
+
+
+def thick():
+    """Return a finger of one box, 60 x 30 x 30 mm."""
+    return (
+        HandBuilder().finger("index", [Shape(ShapeKind.BOX, (0.03, 0.015, 0.015), Pose([0.04, 0, 0]))], [0.07]).hand()
+    )
+
+
+@pytest.mark.parametrize(("place", "inside"), [([0.04, 0.004, 0.0], True), ([0.04, 0.004, 0.02], False)])
+def test_a_ball_in_a_thick_link(place, inside):
+    obj = GraspObject.from_shape(Shape(ShapeKind.SPHERE, SPHERE), pose=Pose(place), name="ball")
+    hand = thick()
+    found = contained_link(hand, np.zeros(1), pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, (1,))
+    assert (found == 1) == inside
+
+
+def test_a_link_in_a_large_ball():
+    obj = GraspObject.load("sphere:r=0.3", pose=Pose([0.02, 0.01, 0.03]))
+    hand = HandBuilder().finger("index", [along_x(0.007, 0.05)], [0.05]).hand()
+    assert contained_link(hand, np.zeros(1), pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, (1,)) == 1
+
+
+def test_nothing_is_certified_around_a_ball_between_the_planes():
+    obj = GraspObject.from_shape(Shape(ShapeKind.SPHERE, SPHERE), pose=Pose([0.04, 0.006, 0.0]), name="ball")
+    solution = clench.solve(thick(), obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))
+    assert not solution.certified
+    assert "overlaps" in solution.certificate["text"]
+
+
+def test_a_point_of_every_part():
+    box = Shape(ShapeKind.BOX, (1.0, 1.0, 1.0)).to_mesh(1e-3)
+    vertices = np.vstack([box.vertices, box.vertices + 10.0, box.vertices + 20.0])
+    triangles = np.vstack([box.triangles + 8 * k for k in range(3)])
+    points = part_points(build_tree(vertices, triangles))
+    assert sorted(np.round(points[:, 0] / 10.0)) == [0.0, 1.0, 2.0]
+    assert part_points(build_tree(np.empty((0, 3)), np.empty((0, 3)))).shape == (0, 3)
