@@ -61,7 +61,9 @@ def gap(a: Core, A: Floats, b: Core, B: Floats) -> float:
     """Return the gap between two cores in their poses, shape (4, 4) each [m]; negative where they cross."""
     one = fcl.CollisionObject(a.model, fcl.Transform(A[:3, :3], A[:3, 3]))
     other = fcl.CollisionObject(b.model, fcl.Transform(B[:3, :3], B[:3, 3]))
-    return float(fcl.distance(one, other, fcl.DistanceRequest(), fcl.DistanceResult())) - a.radius - b.radius
+    found = float(fcl.distance(one, other, fcl.DistanceRequest(), fcl.DistanceResult()))
+    # The engine says 0, not how deep, where triangles cross.
+    return found - a.radius - b.radius if found > 0.0 else -1.0
 
 
 class Oracle:
@@ -81,7 +83,7 @@ class Oracle:
             for core in self.links[m]:
                 least = min([least, *(gap(core, poses[m], o, T) for o, T in self.objects)])
                 for r in range(len(self.hand.links)):
-                    if r not in moving and (min(m, r), max(m, r)) not in self.hand.allowed_pairs:
+                    if r != m and (min(m, r), max(m, r)) not in self.hand.allowed_pairs:
                         least = min([least, *(gap(core, poses[m], other, poses[r]) for other in self.links[r])])
         return least
 

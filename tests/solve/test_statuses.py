@@ -6,6 +6,7 @@ import pytest
 import clench
 from chain_hands import HandBuilder, along_x, mount, one_link, three_links, turned
 from clench.base.pose import Pose
+from clench.models.hand.hand import JointRole
 from clench.models.shapes import Shape, ShapeKind
 
 Y, Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -25,7 +26,7 @@ def palm_and_finger():
 
 
 def test_out_of_reach_of_every_finger():
-    ball = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    ball = far_ball()
     solution = clench.solve(three_links(upper=1.2), ball, command())
     assert solution.status == "no_contact"
     assert solution.fingers["index"].status == "limit"
@@ -44,6 +45,51 @@ def test_a_finger_that_curls_into_itself_stops_there():
     assert solution.contacts == ()
     assert solution.joint_angles["index_1"] < 3.0
     assert solution.certified
+
+
+def far_ball():
+    return clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+
+
+def test_coupled_links_stop_each_other():
+    """Three links of one degree of freedom curl until the last meets the first."""
+    shapes = [along_x(0.006, 0.04), along_x(0.006, 0.03), along_x(0.006, 0.04)]
+    builder = HandBuilder().finger("index", shapes, [0.04, 0.03, 0.04], upper=2.6)
+    hand = builder.couple("index_0", "index_1", 1.0).couple("index_0", "index_2", 1.0).hand()
+    solution = clench.solve(hand, far_ball(), command())
+    assert solution.certified
+    assert solution.joint_angles["index_0"] < 2.5
+    assert "index_link_0" in solution.fingers["index"].reason
+
+
+@pytest.mark.parametrize("role", [JointRole.CLOSING, JointRole.POSTURE])
+def test_nothing_is_certified_around_a_finger_that_rests_in_the_object(role):
+    builder = HandBuilder().finger("a", [along_x(0.006, 0.05)], [0.05])
+    hand = builder.finger("b", [along_x(0.006, 0.05)], [0.05], base=mount((0, 0.05, 0)), roles=[role]).hand()
+    ball = clench.GraspObject.load("sphere:r=0.01", pose=Pose([0.03, 0.05, 0]))
+    solution = clench.solve(hand, ball, command(fingers=("a",)))
+    assert not solution.certified
+    assert "b_link_0" in solution.certificate["text"]
+
+
+def test_nothing_is_certified_where_resting_links_overlap():
+    palm = Shape(ShapeKind.BOX, (0.01, 0.05, 0.01), Pose([0.06, 0, 0]))
+    builder = HandBuilder(palm).finger("a", [along_x(0.006, 0.02)], [0.05])
+    hand = builder.finger("b", [None, along_x(0.006, 0.07)], [0.01, 0.07], base=mount((0, 0.03, 0))).hand()
+    solution = clench.solve(hand, far_ball(), command(fingers=("a",)))
+    assert not solution.certified
+    assert "b_link_1 overlaps palm" in solution.certificate["text"]
+
+
+def test_a_touch_of_joints_that_cancel_blocks():
+    """A parallelogram comes down on a point that it touches: the link keeps its direction, and still presses."""
+    point = 5.0 * np.array([[0, 0, 0], [2, 2, 10], [-2, 2, 10], [-2, -2, 10], [2, -2, 10]]) / 1000
+    link = Shape(ShapeKind.BOX, (0.1, 0.05, 0.025), Pose([0.1, 0, 0]))
+    builder = HandBuilder().finger("a", [None, link], [0.2, 0.2], lower=-3.0).couple("a_0", "a_1", -1.0)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [1, 4, 3], [1, 3, 2]])
+    obj = clench.GraspObject.from_meshes([(point, faces)], pose=Pose([0.3, 0.04, 0.025]))
+    solution = clench.solve(builder.hand(), obj, command(planes=1))
+    assert solution.joint_angles["a_0"] < 1e-7
 
 
 def test_a_finger_without_travel_cannot_move():

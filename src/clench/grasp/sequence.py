@@ -45,7 +45,7 @@ def close_in_sequence(
     q = start.copy()
     result = []
     for candidate in chosen:
-        if candidate.plane is None and candidate.overlap is None and len(chosen) > 1:
+        if candidate.plane is None and candidate.overlap is None and len(hand.fingers) > 1:
             entry = int(plan.items.entry[candidate.item])
             posture = q.copy()
             own = list(candidate.plan.finger.joints)

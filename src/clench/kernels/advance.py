@@ -23,7 +23,7 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .turning_pairs import turn_disk, turn_segment
+from .turning_pairs import sooner, turn_disk, turn_segment
 
 #: Several joints at once move on by at most this before gaps are looked at anew [travel].
 STRIDE = 0.06
@@ -295,7 +295,7 @@ def advance_outline(
         found = sweep_outline(outline, sections, row, closed, px, pz, count, speed, touch, stride, work)
         found = sweep_ellipses(outline, sections, row, px, pz, 1.0, count, touch, found, work)
         if found < stride:
-            return begun + found
+            return sooner(begun + found, best)
         begun += stride
     return best
 

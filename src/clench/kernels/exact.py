@@ -12,7 +12,7 @@ from clench.base.tolerances import SWEEP_FRACTION
 from .advance import fill_chain, place_joints
 from .bodies import BodyArrays, pack_bodies
 from .closest import AT_CORNER, separation
-from .compiling import inner_kernel
+from .compiling import inner_kernel, kernel
 from .family_pose import compose_inverse
 from .layout import (
     HIT_FAMILY,
@@ -32,7 +32,7 @@ from .layout import (
     Ints,
     Work,
 )
-from .sweeping import SweepWork, body_gap, put_core, put_point, sweep_body
+from .sweeping import SweepWork, bodies_overlap, body_gap, make_sweep_work, put_core, put_point, sweep_body
 
 
 class ExactArrays(NamedTuple):
@@ -147,6 +147,45 @@ def place_resting(T_palm_family: Floats, T_palm_body: Floats, x: float, z: float
 
 
 @inner_kernel
+def sweep_links(
+    exact: ExactArrays,
+    entry: int,
+    m: int,
+    first: int,
+    joint: int,
+    T_palm_family: Floats,
+    rates: Floats,
+    touch: float,
+    best: float,
+    work: Work,
+    sweep: SweepWork,
+) -> tuple[float, int]:
+    """Return the first contact of a moving link with other links of the hand before `best`, and that link or -1.
+
+    Args:
+        m: the moving link. first, joint: first active joint, and the last one that moves it. `work` has the joints
+            placed; the rest as in `sweep_stage`.
+    """
+    met = -1
+    for r in range(exact.checked.shape[0]):
+        if exact.checked[m, r] == 0 or exact.links.root[r] < 0:
+            continue
+        # Seen from a link that moves as well, only the joints after its own turn.
+        after = first_after(exact, entry, r, first, joint, rates)
+        if after > joint:
+            continue
+        x, z = work.place[after, 0], work.place[after, 1]
+        place_resting(T_palm_family, sweep.poses[r], x, z, sweep.resting)
+        found = sweep_link(exact.links, m, exact.links, r, after, joint, rates, touch, best, work, sweep)
+        if found < 0.0:
+            sweep.skipped[0] += 1
+        elif found < best:
+            best, met = found, r
+            keep_pair(sweep)
+    return best, met
+
+
+@inner_kernel
 def sweep_stage(
     exact: ExactArrays,
     chain: ChainArrays,
@@ -206,28 +245,9 @@ def sweep_stage(
             keep_pair(sweep)
             if best < 0.0:
                 return best, met
-        for r in range(links):
-            if exact.checked[m, r] == 0 or exact.links.root[r] < 0 or is_moving(exact, entry, first, r):
-                continue
-            place_resting(T_palm_family, sweep.poses[r], px, pz, sweep.resting)
-            found = sweep_link(
-                exact.links,
-                m,
-                exact.links,
-                r,
-                first,
-                joint,
-                rates,
-                touch,
-                best,
-                work,
-                sweep,
-            )
-            if found < 0.0:
-                sweep.skipped[0] += 1
-            elif found < best:
-                best, met = found, r
-                keep_pair(sweep)
+        best, other = sweep_links(exact, entry, m, first, joint, T_palm_family, rates, touch, best, work, sweep)
+        if other >= 0:
+            met = other
     return best, met
 
 
@@ -239,12 +259,39 @@ def keep_pair(sweep: SweepWork) -> None:
 
 
 @inner_kernel
-def is_moving(exact: ExactArrays, entry: int, first: int, link: int) -> bool:
-    """Say whether a link is moved by a joint from `first` on."""
+def first_after(exact: ExactArrays, entry: int, link: int, first: int, joint: int, rates: Floats) -> int:
+    """Return the first active joint, up to `joint`, that does not move a link, or one more than `joint`."""
+    last = first - 1
     for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
-        if exact.mover_link[n] == link and exact.mover_joint[n] >= first:
-            return True
-    return False
+        if exact.mover_link[n] == link:
+            last = max(last, exact.mover_joint[n])
+    j = last + 1
+    while j <= joint and rates[j] == 0.0:
+        j += 1
+    return j
+
+
+@kernel
+def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
+    """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
+
+    Args:
+        exact: the hand and the object. poses: `T_palm_link` of every link, (L, 3, 4). T_palm_object: (3, 4).
+        allowed: how far round bodies may overlap [m].
+    """
+    links = exact.checked.shape[0]
+    sweep = make_sweep_work(np.empty((1, 3)), links)
+    for m in range(links):
+        sweep.moving[:] = poses[m]
+        sweep.resting[:] = T_palm_object
+        if bodies_overlap(exact.links, m, exact.object, 0, allowed, sweep):
+            return m, links
+        for r in range(m):
+            if exact.checked[m, r] != 0:
+                sweep.resting[:] = poses[r]
+                if bodies_overlap(exact.links, m, exact.links, r, allowed, sweep):
+                    return m, r
+    return -1, -1
 
 
 @inner_kernel

@@ -25,6 +25,9 @@ PLAIN = 8
 CLOSE = 1.5
 #: Below this fraction of the touch tolerance a gap has no direction of its own [-].
 FLAT = 1.0 / 256.0
+#: A pair that overlaps by up to this many touch tolerances at the start touches: METHOD.md section 3 says 1e-9 of the
+#: finger's length [-].
+OVERLAPPING = 10.0
 #: Answers for a touching pair: no plane permits the motion; no plane separates it.
 BLOCKED, OVERLAP = 0.0, -1.0
 
@@ -45,32 +48,36 @@ def move_core(core: Floats, corners: int, chain: Floats, count: int, s: float, o
 
 
 @inner_kernel
-def base_motion(chain: Floats, count: int, nx: float, nz: float, s: float) -> tuple[float, float, float]:
-    """Return speed and acceleration of the last pivot along n at `s`, and a bound on its acceleration."""
-    slope, curvature, bound = 0.0, 0.0, 0.0
+def base_motion(chain: Floats, count: int, nx: float, nz: float, s: float) -> tuple[float, float, float, float]:
+    """Return speed and acceleration of the last pivot along n at `s`, and bounds on both."""
+    slope, curvature, lever, bound = 0.0, 0.0, 0.0, 0.0
     for i in range(count - 1):
         rate = chain[i, 0]
         c, d = math.cos(rate * s), math.sin(rate * s)
         x, z = c * chain[i, 1] - d * chain[i, 2], d * chain[i, 1] + c * chain[i, 2]
         slope += rate * (nz * x - nx * z)
         curvature -= rate * rate * (nx * x + nz * z)
-        bound += rate * rate * math.sqrt(x * x + z * z)
-    return slope, curvature, bound
+        arm = math.sqrt(x * x + z * z)
+        lever += abs(rate) * arm
+        bound += rate * rate * arm
+    return slope, curvature, lever, bound
 
 
 @inner_kernel
 def corner_motion(
     core: Floats, k: int, chain: Floats, count: int, nx: float, nz: float, s: float
-) -> tuple[float, float, float]:
-    """Return speed and acceleration of a corner along n at `s`, and a bound on its acceleration."""
+) -> tuple[float, float, float, float]:
+    """Return speed and acceleration of a corner along n at `s`, and bounds on both."""
     rate = chain[count - 1, 0]
     c, d = math.cos(rate * s), math.sin(rate * s)
     x, z = c * core[k, 0] - d * core[k, 2], d * core[k, 0] + c * core[k, 2]
-    slope, curvature, bound = base_motion(chain, count, nx, nz, s)
+    slope, curvature, lever, bound = base_motion(chain, count, nx, nz, s)
+    arm = math.sqrt(x * x + z * z)
     return (
         slope + rate * (nz * x - nx * z),
         curvature - rate * rate * (nx * x + nz * z),
-        bound + rate * rate * math.sqrt(x * x + z * z),
+        lever + abs(rate) * arm,
+        bound + rate * rate * arm,
     )
 
 
@@ -125,7 +132,7 @@ def step_to_plane(
     step = best
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
-        slope, curvature, bound = corner_motion(core, k, chain, count, nx, nz, s)
+        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, nz, s)
         if gap <= 0.0:
             return 0.0
         if count == 1:
@@ -156,8 +163,8 @@ def plane_permits(
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
         if gap <= touch:
-            slope, curvature, bound = corner_motion(core, k, chain, count, nx, nz, s)
-            if is_blocking(slope, curvature, bound / max(abs(chain[count - 1, 0]), 1e-300), touch):
+            slope, curvature, lever, _ = corner_motion(core, k, chain, count, nx, nz, s)
+            if is_blocking(slope, curvature, lever, touch):
                 return False
     return True
 
@@ -182,7 +189,7 @@ def leave_plane(
     rate = abs(chain[count - 1, 0])
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
-        slope, curvature, bound = corner_motion(core, k, chain, count, nx, nz, s)
+        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, nz, s)
         if bound == 0.0:
             continue
         if count == 1:
@@ -223,11 +230,26 @@ def try_direction(
     `BLOCKED` when the plane does not permit it, `OVERLAP` when it does not even separate.
     """
     offset = plane_offset(fixed, kb, nx, ny, nz) + w
-    if -plane_offset(placed, ka, -nx, -ny, -nz) - offset < -touch:
+    if -plane_offset(placed, ka, -nx, -ny, -nz) - offset < -OVERLAPPING * touch:
         return OVERLAP
     if not plane_permits(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch):
         return BLOCKED
     return leave_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch, best)
+
+
+@inner_kernel
+def lies_in_plane(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float, touch: float) -> bool:
+    """Say whether two cores lie in one plane with normal n, so that it separates them whichever way it looks."""
+    high = max(plane_offset(a, ka, nx, ny, nz), plane_offset(b, kb, nx, ny, nz))
+    low = -max(plane_offset(a, ka, -nx, -ny, -nz), plane_offset(b, kb, -nx, -ny, -nz))
+    return high - low <= touch
+
+
+@inner_kernel
+def is_under(face: Floats, nx: float, ny: float, nz: float) -> bool:
+    """Say whether a moving face looks against n, so that its body lies on the side to which n points."""
+    mx, my, mz, _ = face_normal(face)
+    return nx * mx + ny * my + nz * mz <= 0.0
 
 
 @inner_kernel
@@ -256,8 +278,11 @@ def leave_touch(
         if face == 1 and ka == 3:
             nx, ny, nz, size = face_normal(placed)
         if size > 0.0:
+            flat = lies_in_plane(fixed, kb, placed, ka, nx, ny, nz, touch)
             for _ in range(2):
                 nx, ny, nz = -nx, -ny, -nz
+                if flat and not is_under(placed, nx, ny, nz):
+                    continue
                 one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, s, touch, best)
                 found = max(found, one)
     for i in range(ka if ka > 1 else 0):

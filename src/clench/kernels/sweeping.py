@@ -9,7 +9,7 @@ import numpy as np
 
 from .advance import misses
 from .bodies import BodyArrays
-from .closest import separation
+from .closest import crosses, separation
 from .compiling import inner_kernel
 from .layout import Floats, Ints
 from .sweep_pairs import sweep_pair
@@ -238,6 +238,34 @@ def body_gap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: flo
             stack[waiting + 1, 0], stack[waiting + 1, 1] = a, b + 1
             waiting += 2
     return best
+
+
+@inner_kernel
+def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, work: SweepWork) -> bool:
+    """Say whether two bodies cross each other's surface; see `body_gap`. Round ones may overlap by `allowed`."""
+    stack = work.stack
+    stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
+    waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
+    while waiting > 0:
+        waiting -= 1
+        a, b = stack[waiting, 0], stack[waiting, 1]
+        ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
+        put_point(work.moving, ball_a, work.core[0])
+        put_point(work.resting, ball_b, work.fixed[0])
+        if point_distance(work.core, work.fixed) > ball_a[3] + ball_b[3]:
+            continue
+        if a < 0 and b < 0:
+            ka, wa = put_item(moving, a, work.moving, work.core)
+            kb, wb = put_item(resting, b, work.resting, work.fixed)
+            if crosses(work.core, ka, work.fixed, kb):
+                return True
+            if wa + wb > 0.0 and separation(work.core, ka, work.fixed, kb)[0] < wa + wb - allowed:
+                return True
+        elif b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
+            waiting = push_parts(moving, a, 0, b, stack, waiting)
+        else:
+            waiting = push_parts(resting, b, 1, a, stack, waiting)
+    return False
 
 
 @inner_kernel

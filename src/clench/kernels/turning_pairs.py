@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .compiling import inner_kernel
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
+
+
+@inner_kernel
+def sooner(found: float, best: float) -> float:
+    """Return a winner's travel below `best`, which rounding may have lost."""
+    return min(found, float(np.nextafter(best, 0.0)))
 
 
 @inner_kernel
@@ -80,7 +88,7 @@ def turn_segment(
                 note(pair, outline.tip, outline.number, v, i, 3, 0)
     found = turn_sides(outline, i, 0, ax, az, 0.0, 0, touch, turn, side, pair)
     turn = turn_sides(outline, i, 1, bx, bz, 0.0, 0, touch, found, side, pair)
-    return turn / rate if turn < limit else best
+    return sooner(turn / rate, best) if turn < limit else best
 
 
 @inner_kernel
@@ -144,4 +152,4 @@ def turn_disk(
             turn = found
             note(pair, outline.tip, outline.number, v, i, 0, 1)
     turn = turn_sides(outline, i, 0, qx, qz, radius, 1, touch, turn, side, pair)
-    return turn / rate if turn < limit else best
+    return sooner(turn / rate, best) if turn < limit else best

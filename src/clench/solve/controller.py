@@ -101,7 +101,7 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
         group[i] = old if new is old else replace(new, scores=score_all(new, setting), clear=old.clear)
     clock.lap("sequence")
     final = combine(hand, problem.start, [group[i] for group, i in zip(fingers, chosen, strict=True)])
-    answer = judge_answer(problem, fingers, chosen, final)
+    answer = judge_answer(problem, fingers, chosen, final, exact)
     clock.lap("judge")
     solution = assemble(answer, problem, clock.stages())
     if record is not None:
@@ -197,7 +197,11 @@ def combine(hand: Hand, start: FloatArray, chosen: list[FingerCandidate]) -> Flo
 
 
 def judge_answer(
-    problem: Problem, fingers: list[list[FingerCandidate]], chosen: list[int], final: FloatArray
+    problem: Problem,
+    fingers: list[list[FingerCandidate]],
+    chosen: list[int],
+    final: FloatArray,
+    exact: ExactArrays,
 ) -> Answer:
     """Measure what overlaps at the start and at the end, over the whole width."""
     hand = problem.hand
@@ -205,7 +209,7 @@ def judge_answer(
         hand, problem.start, problem.packed, problem.T_palm_object, problem.source, links=hand.fixed_links
     )
     best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
-    certificate = certify(problem, best, at_start)
+    certificate = certify(problem, best, at_start, final, exact)
     # Where nothing can overlap there is nothing to measure but what rests.
     at_end = at_start if certificate.holds else None
     if at_end is None and problem.command.measure:
