@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
+
 from clench.base.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
-from .depths import link_meshes
+from .depths import LinkMesh, link_meshes
 from .scene import PackedObject
 
 
@@ -36,10 +38,19 @@ def contained_link(
         if mesh.link not in links:
             continue
         T = poses[mesh.link]
-        for p in mesh.points @ T[:3, :3].T + T[:3, 3]:
+        for p in mesh.points @ T[:3, :3].T + T[:3, 3] if _fits(mesh, T, packed) else ():
             if is_inside(packed.full_tree, (p[0], p[1], p[2]), packed.closed):
                 return mesh.link
         for p in (packed.points - T[:3, 3]) @ T[:3, :3]:
             if is_inside(mesh.tree, (p[0], p[1], p[2]), mesh.closed):
                 return mesh.link
     return None
+
+
+def _fits(mesh: LinkMesh, T_object_link: FloatArray, packed: PackedObject) -> bool:
+    """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
+    if len(mesh.points) != 1 or not len(packed.full_tree.low):
+        return True
+    placed = mesh.tree.vertices @ T_object_link[:3, :3].T + T_object_link[:3, 3]
+    low, high = packed.full_tree.low[0], packed.full_tree.high[0]
+    return bool(np.all(placed >= low) and np.all(placed <= high))
