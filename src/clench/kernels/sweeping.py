@@ -254,14 +254,16 @@ def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allo
         put_point(work.resting, ball_b, work.fixed[0])
         if point_distance(work.core, work.fixed) > ball_a[3] + ball_b[3]:
             continue
-        if a < 0 and b < 0:
+        if a < 0 or b < 0:
             ka, wa = put_item(moving, a, work.moving, work.core)
             kb, wb = put_item(resting, b, work.resting, work.fixed)
-            if crosses(work.core, ka, work.fixed, kb):
+            crossing = a < 0 and b < 0 and crosses(work.core, ka, work.fixed, kb)
+            apart = separation(work.core, ka, work.fixed, kb)[0]
+            if crossing or (a < 0 and b < 0 and apart < wa + wb - allowed):
                 return True
-            if wa + wb > 0.0 and separation(work.core, ka, work.fixed, kb)[0] < wa + wb - allowed:
-                return True
-        elif b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
+            if apart > wa + wb or (a < 0 and b < 0):
+                continue
+        if b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
             waiting = push_parts(moving, a, 0, b, stack, waiting)
         else:
             waiting = push_parts(resting, b, 1, a, stack, waiting)
