@@ -12,8 +12,8 @@ from clench.kernels.layout import (
     HandArrays,
     ItemArrays,
     OutlineArrays,
-    RoundArrays,
     SectionArrays,
+    no_rounds,
 )
 from clench.kernels.tree import build_tree
 
@@ -22,7 +22,6 @@ from .planar import StageAnswer
 from .scene import PlanarCurve, PlanarFinger, PlanarOutline
 
 EMPTY_TREE = build_tree(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
-NO_ROUNDS = RoundArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)))
 
 
 def _ints(values: npt.ArrayLike) -> Ints:
@@ -129,7 +128,7 @@ def solve_planar(finger: PlanarFinger, curve: PlanarCurve) -> tuple[tuple[StageA
     answer = empty_answer(hand, 1, finger.groups)
     closed = not curve.two_sided
     T = np.eye(4)[:3].copy()
-    close_items(hand, planes_only(1, 1), EMPTY_TREE, NO_ROUNDS, closed, T, sections, sections, items, 1, answer)
+    close_items(hand, planes_only(1, 1), EMPTY_TREE, no_rounds(), closed, T, sections, sections, items, 1, answer)
     stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
     stages = tuple(
         StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,10 @@ from .plan import FingerPlan
 from .scene import PackedObject
 
 if TYPE_CHECKING:
+    from clench.kernels.bodies import BodyArrays
     from clench.kernels.exact import ExactArrays
     from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
+    from clench.kernels.tree import MeshTree
 
 #: Segments per plane that the arena holds before it has to grow.
 _CAPACITY = 512
@@ -91,7 +93,7 @@ def close_hand(
     """Cut the object, look for overlaps at the start, and close every item.
 
     Args:
-        plan: of the hand. exact: for the items that are swept exactly. packed: the object.
+        plan: of the hand. exact: for the items that are swept exactly; the object is put in. packed: the object.
         T_palm_object: where it is, shape (4, 4).
         rounds: how often all degrees of freedom are gone through.
     """
@@ -99,23 +101,64 @@ def close_hand(
     from clench.kernels.overlap import find_overlaps
 
     T = np.ascontiguousarray(T_palm_object[:3])
-    shapes = _round_arrays(packed)
-    planes = len(plan.arrays.plane_offset)
-    capacity, more = _CAPACITY, len(packed.rounds.kind)
+    obj = _there(packed)
+    capacity = _CAPACITY
+    shared = make_sections(len(plan.arrays.plane_offset), capacity, len(obj.rounds.kind))
+    while wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared):
+        capacity = 2 * wanted
+        shared = make_sections(len(plan.arrays.plane_offset), capacity, len(obj.rounds.kind))
     overlaps = np.empty(len(plan.plans), dtype=np.int64)
+    find_overlaps(plan.arrays, obj.tree, obj.rounds, obj.closed, T, shared, overlaps)
+    answer = _close_plan(plan, exact, obj, T, shared, capacity, rounds)
+    return ClosedHand(answer, overlaps, shared, T_palm_object)
+
+
+class _KernelObject(NamedTuple):
+    """Hold an object as the closing kernels take it."""
+
+    tree: MeshTree
+    rounds: RoundArrays
+    closed: bool
+    bodies: BodyArrays
+
+
+def _there(packed: PackedObject) -> _KernelObject:
+    from clench.kernels.layout import RoundArrays
+
+    r = packed.rounds
+    rounds = RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)
+    return _KernelObject(packed.tree, rounds, packed.closed, packed.bodies)
+
+
+@lru_cache(maxsize=1)
+def _nothing() -> _KernelObject:
+    from clench.kernels.bodies import no_body
+    from clench.kernels.layout import no_rounds
+    from clench.kernels.tree import build_tree
+
+    return _KernelObject(build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True, no_body())
+
+
+def _close_plan(
+    plan: HandPlan,
+    exact: ExactArrays,
+    obj: _KernelObject,
+    T: FloatArray,
+    shared: SectionArrays,
+    capacity: int,
+    rounds: int,
+) -> ClosingArrays:
+    """Close the items of a plan, with arenas for later families that grow until they are large enough."""
+    ranges = _entry_ranges(plan)
+    exact = exact._replace(object=obj.bodies)
     while True:
-        shared = make_sections(planes, capacity, more)
-        wanted = cut_first_families(plan.arrays, packed.tree, shapes, T, shared)
+        answer = empty_answer(plan)
+        close = partial(_close_range, plan, exact, obj, T, shared, capacity, rounds, answer)
+        # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
+        deque(_threads().map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
+        wanted = int(answer.overflow.max(initial=0))
         if not wanted:
-            answer = empty_answer(plan)
-            find_overlaps(plan.arrays, packed.tree, shapes, packed.closed, T, shared, overlaps)
-            close = partial(_close_range, plan, exact, packed, shapes, T, shared, capacity, rounds, answer)
-            ranges = _entry_ranges(plan)
-            # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
-            deque(_threads().map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
-            wanted = int(answer.overflow.max(initial=0))
-            if not wanted:
-                return ClosedHand(answer, overlaps, shared, T_palm_object)
+            return answer
         capacity = 2 * wanted
 
 
@@ -138,8 +181,7 @@ def _entry_ranges(plan: HandPlan) -> list[tuple[int, int]]:
 def _close_range(
     plan: HandPlan,
     exact: ExactArrays,
-    packed: PackedObject,
-    shapes: RoundArrays,
+    obj: _KernelObject,
     T: FloatArray,
     shared: SectionArrays,
     capacity: int,
@@ -152,15 +194,15 @@ def _close_range(
     from clench.kernels.family_section import make_sections
     from clench.kernels.layout import ClosingArrays, ItemArrays
 
-    own = make_sections(plan.most_planes, capacity, len(shapes.kind))
+    own = make_sections(plan.most_planes, capacity, len(obj.rounds.kind))
     part = slice(*span)
     columns: list[Any] = [array[part] for array in answer]
     close_items(
         plan.arrays,
         exact._replace(wanted=exact.wanted[part]),
-        packed.tree,
-        shapes,
-        packed.closed,
+        obj.tree,
+        obj.rounds,
+        obj.closed,
         T,
         shared,
         own,
@@ -188,31 +230,16 @@ def close_item_again(
         plan: of the hand. exact: for the item alone. packed: the object, or None to leave it out.
         closed: as the whole hand was closed before. item: its number. rounds: as for `close_hand`.
     """
-    from clench.kernels.bodies import no_body
-    from clench.kernels.closing import close_items
     from clench.kernels.family_section import make_sections
-    from clench.kernels.layout import no_rounds
-    from clench.kernels.tree import build_tree
 
-    one = only_item(plan, item)
     T = np.ascontiguousarray(closed.T_palm_object[:3])
+    obj, shared = _nothing(), closed.sections
     if packed is None:
-        tree, shapes, winding = build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True
-        shared, more = make_sections(len(plan.arrays.plane_offset), 0, 0), 0
-        exact = exact._replace(object=no_body())
+        shared = make_sections(len(plan.arrays.plane_offset), 0, 0)
     else:
-        tree, shapes, winding = packed.tree, _round_arrays(packed), packed.closed
-        shared, more = closed.sections, len(packed.rounds.kind)
-        exact = exact._replace(object=packed.bodies)
-    capacity = _CAPACITY
-    while True:
-        answer = empty_answer(one)
-        own = make_sections(plan.most_planes, capacity, more)
-        close_items(plan.arrays, exact, tree, shapes, winding, T, shared, own, one.items, rounds, answer)
-        wanted = int(answer.overflow.max(initial=0))
-        if not wanted:
-            return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
-        capacity = 2 * wanted
+        obj = _there(packed)
+    answer = _close_plan(only_item(plan, item), exact, obj, T, shared, _CAPACITY, rounds)
+    return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
 
 
 def empty_answer(plan: HandPlan) -> ClosingArrays:
@@ -232,10 +259,3 @@ def empty_answer(plan: HandPlan) -> ClosingArrays:
         overlap=np.full(items, -1, dtype=np.int64),
         skipped=np.zeros(items, dtype=np.int64),
     )
-
-
-def _round_arrays(packed: PackedObject) -> RoundArrays:
-    from clench.kernels.layout import RoundArrays
-
-    r = packed.rounds
-    return RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)

@@ -195,8 +195,7 @@ def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[Link
     kept = _kept.get(key)
     if kept is not None and kept[0] is hand:
         return kept[1]
-    numbers = sorted({*hand.fixed_links, *(link for finger in hand.fingers for link in finger.links)})
-    meshes = tuple(_link_mesh(n, hand.links[n].shapes.get(chosen, ()), chosen) for n in numbers)
+    meshes = tuple(_link_mesh(n, hand.links[n].shapes.get(chosen, ()), chosen) for n in hand.solid_links)
     meshes = tuple(mesh for mesh in meshes if len(mesh.tree.triangles))
     _kept[key] = (hand, meshes)
     while len(_kept) > _KEPT_HANDS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -20,62 +20,70 @@ if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
 
 _KEPT_HANDS: Final = 16
-_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, BodyArrays]] = OrderedDict()
+_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, HandBodies]] = OrderedDict()
 
 
-def link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
-    """Return every link of a hand that can touch as a body, in its own frame; made once per hand and source."""
+class HandBodies(NamedTuple):
+    """Hold what exact sweeps need of a hand at any posture; L links.
+
+    Args:
+        links: every link that can touch as a body, in its own frame.
+        within: whether a moving link (row) may not overlap a resting one, of the same finger or fixed, (L, L).
+        across: the same, with links of different fingers, (L, L).
+    """
+
+    links: BodyArrays
+    within: np.ndarray
+    across: np.ndarray
+
+
+def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
+    """Return a hand's links as bodies, and which of them may not overlap; made once per hand and source."""
     from clench.kernels.bodies import join_elements, pack_bodies
 
     kept = _kept.get((id(hand), source))
     if kept is not None and kept[0] is hand:
         return kept[1]
-    solid = {*hand.fixed_links, *(link for finger in hand.fingers for link in finger.links)}
+    solid = set(hand.solid_links)
     parts = [
         join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
         for i, link in enumerate(hand.links)
     ]
-    bodies = pack_bodies(parts)
+    across = _across(hand)
+    bodies = HandBodies(pack_bodies(parts), _within(hand, across), across)
     _kept[id(hand), source] = (hand, bodies)
     while len(_kept) > _KEPT_HANDS:
         _kept.popitem(last=False)
     return bodies
 
 
-def checked_pairs(hand: Hand, *, across: bool) -> np.ndarray:
-    """Return which links may not overlap, shape (L, L): moving by resting.
-
-    Args:
-        hand: the hand. across: links of different fingers, too.
-    """
+def _across(hand: Hand) -> np.ndarray:
     checked = np.ones((len(hand.links),) * 2, dtype=np.int64)
     np.fill_diagonal(checked, 0)
     for a, b in hand.allowed_pairs:
         checked[a, b] = checked[b, a] = 0
-    if not across:
-        for one in hand.fingers:
-            for other in hand.fingers:
-                if one is not other:
-                    checked[np.ix_(one.links, other.links)] = 0
     return checked
 
 
-def pack_exact(
-    hand: Hand,
-    plans: Sequence[FingerPlan],
-    wanted: Sequence[bool],
-    checked: np.ndarray,
-    source: CollisionSource,
-) -> ExactArrays:
+def _within(hand: Hand, across: np.ndarray) -> np.ndarray:
+    checked = across.copy()
+    for one in hand.fingers:
+        for other in hand.fingers:
+            if one is not other:
+                checked[np.ix_(one.links, other.links)] = 0
+    return checked
+
+
+def pack_exact(hand: Hand, plans: Sequence[FingerPlan], wanted: Sequence[bool], source: CollisionSource) -> ExactArrays:
     """Pack the links of the plans' fingers and how their joints move them; the object is left out.
 
     Args:
-        hand: the hand. plans: one per entry. wanted: per item. checked: see `checked_pairs`.
-        source: geometry of the links.
+        hand: the hand. plans: one per entry. wanted: per item. source: geometry of the links.
     """
     from clench.kernels.bodies import no_body
     from clench.kernels.exact import ExactArrays
 
+    bodies = hand_bodies(hand, source)
     first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
     movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
     axes = [_axis(plan, k) for plan in plans for k in range(len(plan.joints))]
@@ -84,7 +92,7 @@ def pack_exact(
     return ExactArrays(
         joint_first=first.astype(np.int64),
         wanted=np.array(wanted, dtype=np.int64),
-        links=link_bodies(hand, source),
+        links=bodies.links,
         object=no_body(),
         mover_first=np.cumsum([0, *(len(found) for found in movers)]).astype(np.int64),
         mover_link=np.array([row[0] for row in rows], dtype=np.int64),
@@ -93,7 +101,7 @@ def pack_exact(
         axis=np.array([axis for axis, _ in axes]).reshape(-1, 3),
         anchor=np.array([anchor for _, anchor in axes]).reshape(-1, 3),
         link_pose=np.ascontiguousarray(poses),
-        checked=checked,
+        checked=bodies.within,
     )
 
 
@@ -114,8 +122,7 @@ def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
 
 def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:
     """Return how far the surfaces that are swept may lie inside the true ones [m]: 0 but for cylinders, ellipsoids."""
-    solid = {*hand.fixed_links, *(link for finger in hand.fingers for link in finger.links)}
-    shapes = [s for i in solid for s in hand.links[i].shapes.get(source, ())]
+    shapes = [s for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())]
     return sum(
         max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)
         for sizes in ([(s.kind, s.size) for s in shapes], packed.round_sizes)

@@ -13,7 +13,7 @@ from clench.models.hand.hand import Hand
 
 from .candidates import FingerCandidate, read_candidates
 from .closing import ClosedHand, HandPlan, close_item_again, only_item
-from .exact import checked_pairs
+from .exact import HandBodies
 from .scene import PackedObject
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def close_in_sequence(
     chosen: Sequence[FingerCandidate],
     start: FloatArray,
     rounds: int,
+    bodies: HandBodies,
 ) -> list[FingerCandidate]:
     """Return the chosen sets, closed anew where an earlier finger, or one still open, is in the way.
 
@@ -38,10 +39,9 @@ def close_in_sequence(
     Args:
         hand: the hand. plan, exact, closed: of its fingers, as closed without each other. packed: the object.
         chosen: one set per finger, in closing order. start: posture before closing [rad], shape (J,).
-        rounds: how often all degrees of freedom are gone through.
+        rounds: how often all degrees of freedom are gone through. bodies: see `hand_bodies`.
     """
-    everything = checked_pairs(hand, across=True)
-    others = everything - checked_pairs(hand, across=False)
+    others = bodies.across - bodies.within
     q = start.copy()
     result = []
     for candidate in chosen:
@@ -54,9 +54,8 @@ def close_in_sequence(
             placed[entry] = hand.link_poses(posture)[:, :3]
             among = exact._replace(link_pose=placed, wanted=np.ones(1, dtype=np.int64))
             if _meets_another(plan, among._replace(checked=others), closed, candidate, entry, rounds):
-                candidate = _closed_anew(
-                    hand, plan, among._replace(checked=everything), closed, packed, candidate, rounds
-                )
+                among = among._replace(checked=bodies.across)
+                candidate = _closed_anew(hand, plan, among, closed, packed, candidate, rounds)
         own = list(candidate.plan.finger.joints)
         q[own] = candidate.q[own]
         result.append(candidate)

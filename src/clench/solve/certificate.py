@@ -13,7 +13,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate
 from clench.grasp.containment import contained_link
 from clench.grasp.depths import LinkDepth
-from clench.grasp.exact import checked_pairs, swept_deviation
+from clench.grasp.exact import hand_bodies, swept_deviation
 
 if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
@@ -46,7 +46,7 @@ def certify(
 
     Args:
         problem: the three inputs. best: one set per finger. at_start: depths of the links that rest.
-        final: posture at the end, shape (J,) [rad]. exact: the hand and the object as they were swept.
+        final: posture at the end, shape (J,) [rad]. exact: the hand as it was swept.
     """
     hand = problem.hand
     for found in at_start:
@@ -85,7 +85,7 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
     inside = contained_link(hand, opened, problem.packed, T, problem.source, links)
     if inside is not None:
         return f"{hand.links[inside].name} overlaps the object before anything moves."
-    everything = exact._replace(checked=checked_pairs(hand, across=True))
+    everything = exact._replace(object=problem.packed.bodies, checked=hand_bodies(hand, problem.source).across)
     poses = np.ascontiguousarray(hand.link_poses(final)[:, :3])
     one, other = find_link_overlap(everything, poses, np.ascontiguousarray(T[:3]), ALLOWED_PENETRATION)
     if one < 0:

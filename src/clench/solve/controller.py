@@ -18,7 +18,7 @@ from clench.grasp.choice import choose
 from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
 from clench.grasp.criteria import Setting, score_all
 from clench.grasp.depths import hand_depths
-from clench.grasp.exact import checked_pairs, pack_exact
+from clench.grasp.exact import hand_bodies, pack_exact
 from clench.grasp.feasibility import judge_sets
 from clench.grasp.motion import alternatives, asked_fingers, open_posture, palm_pose
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
@@ -82,9 +82,8 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     problem = make_problem(hand, obj, command)
     weights = weights_of(command.criteria)
     clock.lap("read")
-    plan, links = _planned(problem)
+    plan, exact = _planned(problem)
     clock.lap("plan")
-    exact = links._replace(object=problem.packed.bodies)
     closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, command.rounds)
     clock.lap("close")
     overlaps = start_overlaps(hand, plan, closed, problem.packed, problem.T_palm_object, problem.source)
@@ -96,12 +95,13 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     chosen = [choose(group, weights) for group in fingers]
     clock.lap("choose")
     best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
-    again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, command.rounds)
-    for group, i, old, new in zip(fingers, chosen, best, again, strict=True):
-        group[i] = old if new is old else replace(new, scores=score_all(new, setting), clear=old.clear)
+    bodies = hand_bodies(hand, problem.source)
+    again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, command.rounds, bodies)
+    for k, (old, new) in enumerate(zip(best, again, strict=True)):
+        if new is not old:
+            best[k] = fingers[k][chosen[k]] = replace(new, scores=score_all(new, setting), clear=old.clear)
     clock.lap("sequence")
-    final = combine(hand, problem.start, [group[i] for group, i in zip(fingers, chosen, strict=True)])
-    answer = judge_answer(problem, fingers, chosen, final, exact)
+    answer = judge_answer(problem, fingers, chosen, best, exact)
     clock.lap("judge")
     solution = assemble(answer, problem, clock.stages())
     if record is not None:
@@ -158,7 +158,7 @@ def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
     if command.rounds > 1:
         _check_rounds(plans)
     plan = make_hand_plan(plans, finger, posture, command.full_width)
-    exact = pack_exact(hand, plan.plans, plan.whole, checked_pairs(hand, across=False), problem.source)
+    exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
     _plans[key] = (hand, plan, exact)
     while len(_plans) > _KEPT_PLANS:
         _plans.popitem(last=False)
@@ -200,15 +200,15 @@ def judge_answer(
     problem: Problem,
     fingers: list[list[FingerCandidate]],
     chosen: list[int],
-    final: FloatArray,
+    best: list[FingerCandidate],
     exact: ExactArrays,
 ) -> Answer:
-    """Measure what overlaps at the start and at the end, over the whole width."""
+    """Combine the best sets, and measure what overlaps at the start and at the end, over the whole width."""
     hand = problem.hand
+    final = combine(hand, problem.start, best)
     at_start = hand_depths(
         hand, problem.start, problem.packed, problem.T_palm_object, problem.source, links=hand.fixed_links
     )
-    best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
     certificate = certify(problem, best, at_start, final, exact)
     # Where nothing can overlap there is nothing to measure but what rests.
     at_end = at_start if certificate.holds else None

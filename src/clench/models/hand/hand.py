@@ -189,6 +189,11 @@ class Hand:
         """Names of all joints, in model order."""
         return tuple(j.name for j in self.joints)
 
+    @property
+    def solid_links(self) -> tuple[int, ...]:
+        """Indices of the links that can touch, ascending: the fixed ones and those of the fingers."""
+        return tuple(sorted({*self.fixed_links, *(link for finger in self.fingers for link in finger.links)}))
+
     def joint_index(self, name: str) -> int:
         """Return the index of a joint.
 
