@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from clench.base.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
     from clench.base.pose import Pose
+    from clench.execution.driven_hand import DrivenHand
+    from clench.execution.driver import DriverError, DriverLimits, HandDriver, HandState, JointPath
     from clench.execution.executing import Actuator, execute
+    from clench.execution.history import ExecutionHistory
+    from clench.execution.joint_map import JointMap
     from clench.execution.report import ExecutionReport
     from clench.execution.simulation import SimulatedHand
     from clench.execution.trajectory import Trajectory, plan_trajectory
@@ -49,6 +53,10 @@ _HOMES = {
     "Contact": "clench.solve.solution",
     "ContactKind": "clench.solve.solution",
     "Criterion": "clench.grasp.criteria",
+    "DrivenHand": "clench.execution.driven_hand",
+    "DriverError": "clench.execution.driver",
+    "DriverLimits": "clench.execution.driver",
+    "ExecutionHistory": "clench.execution.history",
     "ExecutionReport": "clench.execution.report",
     "FileError": "clench.base.errors",
     "FingerResult": "clench.solve.solution",
@@ -57,7 +65,11 @@ _HOMES = {
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspSolution": "clench.solve.solution",
     "Hand": "clench.models.hand.hand",
+    "HandDriver": "clench.execution.driver",
     "HandError": "clench.base.errors",
+    "HandState": "clench.execution.driver",
+    "JointMap": "clench.execution.joint_map",
+    "JointPath": "clench.execution.driver",
     "JointRole": "clench.models.hand.hand",
     "ObjectError": "clench.base.errors",
     "Pose": "clench.base.pose",
@@ -85,6 +97,10 @@ __all__ = [
     "Contact",
     "ContactKind",
     "Criterion",
+    "DrivenHand",
+    "DriverError",
+    "DriverLimits",
+    "ExecutionHistory",
     "ExecutionReport",
     "FileError",
     "FingerResult",
@@ -93,7 +109,11 @@ __all__ = [
     "GraspObject",
     "GraspSolution",
     "Hand",
+    "HandDriver",
     "HandError",
+    "HandState",
+    "JointMap",
+    "JointPath",
     "JointRole",
     "ObjectError",
     "Pose",

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from clench.base.pose import FloatArray, Pose
+from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Coupling, Finger, Hand, Joint, JointRole, Link
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
@@ -113,7 +114,7 @@ def index_angle() -> float:
 
 
 @pytest.fixture
-def pinch() -> GraspSolution:
+def pinch(pincer: Hand, ball: GraspObject) -> GraspSolution:
     """Return the solution of the pincer on the ball, from closed form and bisection."""
     thumb, index = thumb_angle(), index_angle()
     along = np.array([-np.sin(thumb), 0.0, np.cos(thumb)])
@@ -126,6 +127,7 @@ def pinch() -> GraspSolution:
     contacts = {n: make_contact(finger=n, link=links[n], position=PALM_POSE.apply(p)) for n, p in points.items()}
     return make_solution(
         status="grasp",
+        geometry_hash=f"{hash_hand(pincer, CollisionSource.ENGINE)}+{hash_bodies(ball.bodies, CollisionSource.RAW)}",
         hand_pose=PALM_POSE,
         object_pose=PALM_POSE @ Pose([0.0, 0.0, BALL_HEIGHT]),
         decomposition={"posture": {}, "closing": {**angles["thumb"], **angles["index"]}},

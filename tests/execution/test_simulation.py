@@ -13,8 +13,10 @@ from clench.base.errors import CommandError, HandError, ObjectError
 from clench.base.pose import Pose
 from clench.execution.convex_pieces import convex_pieces
 from clench.execution.executing import execute
+from clench.execution.report import ExecutionReport
 from clench.execution.scene import body_pose, build_scene
 from clench.execution.simulation import SimulatedHand, nearest
+from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
@@ -49,6 +51,11 @@ def angle_table() -> TriangleMesh:
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("CLENCH_CACHE_DIR", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+def carried_out(solution: GraspSolution, hand: Hand, obj: GraspObject) -> ExecutionReport:
+    """Carry a solution out on another object than it was computed for, which `execute` refuses."""
+    return SimulatedHand(hand, obj).carry_out(solution, plan_trajectory(solution, hand))
 
 
 def test_a_pinch_is_reached(pincer: Hand, pinch: GraspSolution, ball: GraspObject, tmp_path: Path) -> None:
@@ -87,7 +94,7 @@ def test_the_watcher_sees_the_motion(pincer: Hand, pinch: GraspSolution, ball: G
 
 def test_an_object_in_the_way_is_not_success(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
     wall = Body("wall", (Shape(ShapeKind.BOX, (0.004, 0.03, 0.03), Pose([0.03, 0, 0.01])),), BodyRole.OBSTACLE)
-    report = execute(pinch, SimulatedHand(pincer, ball.with_body(wall)))
+    report = carried_out(pinch, pincer, ball.with_body(wall))
     assert not report.success
     assert "joint 'thumb' is" in report.reason
     assert report.joints["thumb"].error < -0.02
@@ -95,7 +102,7 @@ def test_an_object_in_the_way_is_not_success(pincer: Hand, pinch: GraspSolution,
 
 def test_a_missing_object_is_not_success(pincer: Hand, pinch: GraspSolution) -> None:
     dot = GraspObject("ball", (Body("ball", (Shape(ShapeKind.SPHERE, (0.001, 0, 0)),)),))
-    report = execute(pinch, SimulatedHand(pincer, dot))
+    report = carried_out(pinch, pincer, dot)
     assert not report.success
     assert report.reason.startswith("Finger 'thumb' does not touch")
     assert report.first_touch == {"thumb": None, "index": None}
@@ -104,6 +111,15 @@ def test_a_missing_object_is_not_success(pincer: Hand, pinch: GraspSolution) -> 
 
 
 BALL_TO_DOT = 0.02 - 0.001
+
+
+def test_another_geometry_is_refused(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
+    larger = GraspObject("ball", (Body("ball", (Shape(ShapeKind.SPHERE, (0.021, 0, 0)),)),))
+    with pytest.raises(CommandError, match=r"geometry_hash: .* another geometry of object 'ball'; .* scale"):
+        execute(pinch, SimulatedHand(pincer, larger), force=True)
+    bent = replace(pincer, joints=(replace(pincer.joints[0], upper=1.4), *pincer.joints[1:]))
+    with pytest.raises(CommandError, match=r"geometry_hash: .* another geometry of hand 'pincer'; .* hand file"):
+        execute(pinch, SimulatedHand(bent, ball))
 
 
 def test_passed_contacts_are_not_asked_for(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 from clench.base.errors import CommandError
+from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
 
 from .report import ExecutionReport
@@ -23,6 +26,10 @@ class Actuator(Protocol):
     def hand(self) -> Hand:
         """The hand that it moves."""
 
+    @property
+    def obj(self) -> GraspObject | None:
+        """The object that it closes on; None when it knows of none."""
+
     def carry_out(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
         """Open the hand, follow the trajectory to the touch, and compare with the solution."""
 
@@ -39,13 +46,38 @@ def execute(solution: GraspSolution, actuator: Actuator, *, speed: float = 1.0, 
         force: carry it out although it is not valid.
 
     Raises:
-        CommandError: the solution is for another hand, or `speed` is out of range.
+        CommandError: the solution is for another hand or another geometry of hand or object, or `speed` is out of
+            range.
     """
     if solution.hand != actuator.hand.name:
         raise CommandError(f"The solution is for hand '{solution.hand}', the actuator moves '{actuator.hand.name}'.")
+    check_geometry(solution, actuator.hand, actuator.obj)
     trajectory = plan_trajectory(solution, actuator.hand, speed=speed)
     if not (force or solution.is_valid()):
         found = solution.violations()
         why = found[0] if found else f"its status is '{solution.status.value}'"
         return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {why.rstrip('.')}.")
     return actuator.carry_out(solution, trajectory)
+
+
+def check_geometry(solution: GraspSolution, hand: Hand, obj: GraspObject | None) -> None:
+    """Check that a solution was computed for exactly this geometry of hand and object.
+
+    Args:
+        solution: its `geometry_hash` is compared. hand: the hand. obj: the object, None when it is not known.
+
+    Raises:
+        CommandError: it was computed for another one.
+    """
+    source = CollisionSource(solution.collision_source)
+    for_hand, _, for_object = solution.geometry_hash.partition("+")
+    if for_hand != hash_hand(hand, source):
+        raise CommandError(
+            f"geometry_hash: the solution was computed for another geometry of hand '{hand.name}'; load the hand from "
+            f"the same model, with the same hand file and palm, or solve again."
+        )
+    if obj is not None and for_object != hash_bodies(obj.bodies, CollisionSource(obj.collision_source)):
+        raise CommandError(
+            f"geometry_hash: the solution was computed for another geometry of object '{obj.name}'; load the object "
+            f"from the same model, with the same scale and obstacles, or solve again."
+        )

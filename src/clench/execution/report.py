@@ -10,6 +10,8 @@ from typing import Any
 from clench.base.json_files import write_json
 from clench.base.pose import FloatArray
 
+from .history import ExecutionHistory
+
 SCHEMA = "clench.execution/1"
 
 
@@ -61,6 +63,7 @@ class ExecutionReport:
         largest_angle_error: over all joints [rad].
         angle_tolerance: [rad], contact_tolerance: [m]: what counted as reached.
         notes: sentences about what the comparison does not show.
+        history: what was told and measured on the way, None when it was not kept.
     """
 
     actuator: str
@@ -75,6 +78,7 @@ class ExecutionReport:
     angle_tolerance: float | None = None
     contact_tolerance: float | None = None
     notes: tuple[str, ...] = ()
+    history: ExecutionHistory | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, schema `clench.execution/1`."""
@@ -106,6 +110,7 @@ class ExecutionReport:
             "angle_tolerance": self.angle_tolerance,
             "contact_tolerance": self.contact_tolerance,
             "notes": list(self.notes),
+            "history": None if self.history is None else self.history.to_dict(),
         }
 
     def save(self, path: str | Path) -> None:

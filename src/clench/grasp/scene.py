@@ -188,7 +188,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         center=center,
         radius=float(np.linalg.norm(corners.reshape(-1, 3) - center, axis=1).max(initial=0.0)),
         points=part_points(full_tree),
-        geometry_hash=_hash_bodies(bodies, source),
+        geometry_hash=hash_bodies(bodies, source),
     )
 
 
@@ -220,7 +220,8 @@ def _middle(points: FloatArray) -> FloatArray:
     return center
 
 
-def _hash_bodies(bodies: tuple[Body, ...], source: CollisionSource) -> str:
+def hash_bodies(bodies: tuple[Body, ...], source: CollisionSource) -> str:
+    """Return a SHA-256 over an object's bodies for one collision source, hexadecimal; its pose plays no part."""
     digest = hashlib.sha256()
     for body in bodies:
         digest.update(f"|{body.role} {source is CollisionSource.ENGINE}".encode())

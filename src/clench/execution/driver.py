@@ -1,0 +1,101 @@
+"""The small interface between a hand's controller and what supervises it: connect, joints, read, command, stop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from clench.base.errors import ClenchError
+from clench.base.pose import FloatArray
+
+
+class DriverError(ClenchError):
+    """Say that a controller failed while it was used: absent, silent, refusing. Execution fails; nothing was wrong
+    with the input.
+    """
+
+
+class RefusedCommandError(DriverError):
+    """Say why a command was not sent to the controller."""
+
+
+@dataclass(frozen=True)
+class HandState:
+    """Hold what a controller said last, in its own names and units.
+
+    Args:
+        positions: of its joints. age: how long ago they were measured, as far as known here [s].
+    """
+
+    positions: Mapping[str, float]
+    age: float
+
+
+@dataclass(frozen=True, eq=False)
+class JointPath:
+    """Hold where joints shall be at times from now on; between two points they move at constant speed.
+
+    Args:
+        joints: the controller's names. times: from now [s], shape (N,), rising, above 0.
+        positions: in the controller's units, shape (N, J). period: when the next path is due to replace this one [s].
+    """
+
+    joints: tuple[str, ...]
+    times: FloatArray
+    positions: FloatArray
+    period: float
+
+    def at(self, time: float) -> dict[str, float]:
+        """Return the targets at a time from the moment of sending [s]; before the first point those of the first."""
+        values = [float(np.interp(time, self.times, column)) for column in self.positions.T]
+        return dict(zip(self.joints, values, strict=True))
+
+
+@dataclass(frozen=True)
+class DriverLimits:
+    """Hold what the controller itself allows, in its own names and units; joints that are left out have no limit.
+
+    Args:
+        positions: lowest and highest. velocities: largest, per second.
+    """
+
+    positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    velocities: Mapping[str, float] = field(default_factory=dict)
+
+
+class HandDriver(Protocol):
+    """Talk to the controller of a hand, in the controller's own joint names and units.
+
+    Every method returns within its timeout or a fraction of a second, and raises `DriverError` when the controller
+    fails. A driver need not check commands: `DrivenHand` does, before it calls `command`.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the driver, for reports."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that it reads and moves; known once connected."""
+
+    @property
+    def limits(self) -> DriverLimits:
+        """What the controller allows; known once connected."""
+
+    def connect(self, timeout: float) -> None:
+        """Find the controller and its joints, within a time [s]; moves nothing."""
+
+    def read(self) -> HandState:
+        """Return the newest state, without waiting for another one."""
+
+    def command(self, path: JointPath) -> None:
+        """Replace what the hand is doing by a path; at its end the hand stands still, whether more comes or not."""
+
+    def stop(self) -> None:
+        """Make the hand stand still where it is, now; may be called at any time, from any thread, more than once."""
+
+    def disconnect(self) -> None:
+        """Let the controller go; may be called more than once."""

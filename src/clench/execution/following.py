@@ -1,0 +1,178 @@
+"""Follow a timed plan on a controller, never further ahead than a short horizon, and stop on any trouble.
+
+A controller is only ever told the next fraction of a second. When this program, its machine or the connection fails,
+no more arrives, and the hand stands still at the end of what it was told.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+
+from .command_check import CommandCheck
+from .driver import DriverError, HandDriver, HandState, JointPath
+
+#: How often the controller is read and told more [s].
+PERIOD = 0.05
+#: How far ahead it is told [s]: how long a hand moves on after its connection was cut.
+HORIZON = 0.3
+#: Points of a path that are closer than this are one [s].
+CLOSEST = 1e-4
+#: How long is waited for a hand to stand still after a stop [s].
+STOP_WAIT = 1.0
+#: A joint stands still when it is slower than this fraction of its largest speed [-].
+STILL = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class TimedPlan:
+    """Hold way-points in a controller's names and units; between two of them joints move at constant speed.
+
+    Args:
+        joints: the controller's names. times: shape (N,), rising from 0 [s]. positions: shape (N, J).
+    """
+
+    joints: tuple[str, ...]
+    times: FloatArray
+    positions: FloatArray
+
+    @property
+    def duration(self) -> float:
+        """Time from the first way-point to the last [s]."""
+        return float(self.times[-1])
+
+    def at(self, moment: float) -> dict[str, float]:
+        """Return the targets at a time [s] from the plan's start."""
+        values = [float(np.interp(moment, self.times, column)) for column in self.positions.T]
+        return dict(zip(self.joints, values, strict=True))
+
+    def window(self, moment: float, horizon: float) -> JointPath:
+        """Return the way-points of the next `horizon` [s], with times from `moment` [s] on."""
+        end = moment + horizon
+        inside = (self.times > moment + CLOSEST) & (self.times < end - CLOSEST)
+        points = np.array(list(self.at(end).values()))
+        return JointPath(
+            joints=self.joints,
+            times=np.append(self.times[inside] - moment, horizon),
+            positions=np.vstack([self.positions[inside], points]),
+            period=PERIOD,
+        )
+
+
+@dataclass
+class Followed:
+    """Collect what happened: samples of commanded and measured positions, and why it ended early.
+
+    Args:
+        times: of the samples [s]. commanded, measured: by the controller's names and units.
+        trouble: one sentence, None when the plan was followed to its end. stopped: whether the hand was seen to stand
+            still after a stop; None when none was sent.
+    """
+
+    times: list[float] = field(default_factory=list)
+    commanded: list[Mapping[str, float]] = field(default_factory=list)
+    measured: list[Mapping[str, float]] = field(default_factory=list)
+    trouble: str | None = None
+    stopped: bool | None = None
+
+    def sample(self, moment: float, commanded: Mapping[str, float], state: HandState) -> None:
+        """Keep one sample."""
+        self.times.append(moment)
+        self.commanded.append(commanded)
+        self.measured.append(state.positions)
+
+
+@dataclass(frozen=True)
+class Follower:
+    """Make a controller follow plans.
+
+    Args:
+        driver: connected. check: what every command and state must pass. stopping: set to stop it from elsewhere.
+        settling: how long the hand may take to arrive after the plan's end [s].
+        arrived: how near to its target every joint shall be, by the controller's names and in its units.
+    """
+
+    driver: HandDriver
+    check: CommandCheck
+    stopping: threading.Event
+    settling: float
+    arrived: Mapping[str, float]
+
+    def follow(self, plan: TimedPlan) -> Followed:
+        """Follow a plan to its end, or stop the hand and say why; a stop is sent whatever is raised here."""
+        found = Followed()
+        try:
+            self._move(plan, found)
+            self._settle(plan, found)
+        except DriverError as error:
+            found.trouble = str(error)
+            found.stopped = self._stop(found)
+        except BaseException:
+            self._stop(found, wait=0.0)
+            raise
+        return found
+
+    def _move(self, plan: TimedPlan, found: Followed) -> None:
+        begun = latest = time.monotonic()
+        moment, told = 0.0, 0.0
+        while True:
+            state, expected = self.driver.read(), plan.at(moment)
+            self.check.state(state, plan.at(moment - state.age))
+            found.sample(latest - begun, expected, state)
+            if self.stopping.is_set():
+                raise DriverError("Stopped on request.")
+            if moment >= plan.duration:
+                return
+            path = plan.window(moment, HORIZON)
+            self.check.command(path, expected)
+            self.driver.command(path)
+            told = moment + HORIZON
+            self.stopping.wait(max(0.0, latest + PERIOD - time.monotonic()))
+            now = time.monotonic()
+            # After a pause of this program the hand stands where it was told last: the plan goes on from there.
+            moment, latest = min(moment + (now - latest), told), now
+
+    def _settle(self, plan: TimedPlan, found: Followed) -> None:
+        begun, before = time.monotonic(), found.times[-1]
+        end = plan.at(plan.duration)
+        while time.monotonic() - begun < self.settling:
+            self.stopping.wait(PERIOD)
+            if self.stopping.is_set():
+                raise DriverError("Stopped on request.")
+            state = self.driver.read()
+            self.check.state(state, end)
+            found.sample(before + time.monotonic() - begun, end, state)
+            if all(abs(state.positions[name] - end[name]) <= near for name, near in self.arrived.items()):
+                return
+
+    def _stop(self, found: Followed, wait: float = STOP_WAIT) -> bool:
+        """Stop the hand; return whether it was seen to stand still, and keep where it stands."""
+        try:
+            self.driver.stop()
+            until, before = time.monotonic() + wait, None
+            while time.monotonic() < until:
+                time.sleep(2.0 * PERIOD)
+                state = self.driver.read()
+                fresh = state.age <= 2.0 * PERIOD
+                if fresh and before is not None and self._still(before, state):
+                    if found.times:
+                        found.sample(found.times[-1] + wait - (until - time.monotonic()), found.commanded[-1], state)
+                    return True
+                before = state if fresh else None
+        except DriverError:
+            return False
+        return False
+
+    def _still(self, before: HandState, state: HandState) -> bool:
+        nowhere = float("nan")  # is never still
+        return all(
+            abs(state.positions.get(name, nowhere) - before.positions.get(name, nowhere))
+            <= STILL * limits.velocity * 2.0 * PERIOD
+            for name, limits in self.check.limits.items()
+        )

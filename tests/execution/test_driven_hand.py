@@ -1,0 +1,281 @@
+"""A real hand's supervision: followed to the end, or stopped with the reason; nothing wrong is ever sent."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_driver import FakeDriver
+from hypothesis import given
+from hypothesis import strategies as st
+
+from clench.base.errors import CommandError, UnknownNameError
+from clench.execution.command_check import CommandCheck, CommandLimits, slowed_down
+from clench.execution.driven_hand import DrivenHand
+from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath, RefusedCommandError
+from clench.execution.executing import execute
+from clench.execution.following import HORIZON, PERIOD, TimedPlan
+from clench.execution.joint_map import JointMap, MappedJoint
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.solution import GraspSolution
+
+OPEN = {"thumb": 0.0, "index": 0.0}
+
+
+@pytest.fixture
+def solution(pinch: GraspSolution) -> GraspSolution:
+    return pinch
+
+
+def run(driver: FakeDriver, hand: Hand, solution: GraspSolution, speed: float = 1.0, **options: object):
+    return execute(solution, DrivenHand(hand, driver, **options), speed=speed)  # type: ignore[arg-type]
+
+
+def test_a_trajectory_is_followed_to_its_end(pincer: Hand, solution: GraspSolution, ball: GraspObject) -> None:
+    driver = FakeDriver(OPEN)
+    report = run(driver, pincer, solution, obj=ball)
+    assert report.success, report.reason
+    assert driver.stops == 0
+    assert not driver.connected
+    assert set(report.joints) == {"thumb", "index"}  # the coupled tip is moved by its leader
+    for name, joint in report.joints.items():
+        assert joint.computed == solution.joint_angles[name]
+        assert driver.where()[name] == pytest.approx(joint.computed, abs=1e-9)
+    assert report.history is not None
+    np.testing.assert_allclose(report.history.measured[0], 0.0)
+    assert (np.diff(report.history.times) > 0).all()
+    assert report.to_dict()["history"]["joints"] == ["thumb", "index"]
+
+
+def test_no_command_reaches_beyond_the_horizon_and_all_are_slow_enough(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver({"thumb": 0.4, "index": 0.3})  # first back to the open hand
+    report = run(driver, pincer, solution)
+    assert report.success, report.reason
+    assert "0.4 rad at most" in report.notes[0]
+    for path in driver.commands:
+        assert path.times[-1] == pytest.approx(HORIZON)
+        steps = np.abs(np.diff(path.positions, axis=0)) / np.diff(path.times)[:, None]
+        assert (steps <= np.array([3.0, 2.0]) * (1 + 1e-6)).all()
+    lowest = min(path.positions[:, 0].min() for path in driver.commands)
+    assert lowest == pytest.approx(0.0, abs=1e-12)
+
+
+def test_other_names_units_offsets_and_directions(pincer: Hand, solution: GraspSolution) -> None:
+    deg = 180.0 / np.pi
+    joint_map = JointMap(
+        {
+            "thumb": MappedJoint("T1", scale=-deg, offset=90.0, unit="deg"),
+            "index": MappedJoint("I1", scale=2048 / np.pi, offset=2048.0, unit="units"),
+        }
+    )
+    driver = FakeDriver({"T1": 90.0, "I1": 2048.0, "arm": 1.0})
+    report = run(driver, pincer, solution, joint_map=joint_map)
+    assert report.success, report.reason
+    where = driver.where()
+    assert where["T1"] == pytest.approx(90.0 - deg * solution.joint_angles["thumb"])
+    assert where["I1"] == pytest.approx(2048.0 + 2048 / np.pi * solution.joint_angles["index"])
+    assert report.joints["thumb"].reached == pytest.approx(solution.joint_angles["thumb"])
+
+
+def test_a_slower_controller_gets_a_slower_path(pincer: Hand, solution: GraspSolution) -> None:
+    fast = run(FakeDriver(OPEN), pincer, solution)
+    slow = run(FakeDriver(OPEN, DriverLimits(velocities={"thumb": 0.5})), pincer, solution)
+    assert slow.success, slow.reason
+    assert slow.duration > 1.5 * fast.duration
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        (lambda t: {"age": t} if t > 0.2 else {}, r"The state of the hand is stale: 0\.\d+ s old; at most 0\.15 s"),
+        (lambda t: {"positions": {"index": np.nan}} if t > 0.2 else {}, r"Joint 'index' is said to be at nan rad\."),
+        (lambda t: {"positions": {"index": None}} if t > 0.2 else {}, r"says nothing of joint 'index'\."),
+        (lambda t: {"positions": {"thumb": 0.0}}, r"Joint 'thumb' does not follow: it is at 0 rad and was told to be"),
+    ],
+    ids=["stale", "nan", "absent", "stuck"],
+)
+def test_trouble_on_the_way_stops_the_hand(pincer: Hand, solution: GraspSolution, fault: object, reason: str) -> None:
+    driver = FakeDriver(OPEN, fault=fault)  # type: ignore[arg-type]
+    begun = time.monotonic()
+    report = run(driver, pincer, solution, speed=0.3, max_age=0.15, max_deviation=0.1)
+    assert not report.success
+    assert time.monotonic() - begun < 5.0
+    assert re.search(reason, report.reason), report.reason
+    assert "The hand was told to stop" in report.reason
+    assert driver.stops == 1
+    sent = len(driver.commands)
+    assert driver.where()["thumb"] < 0.9 * solution.joint_angles["thumb"]
+    time.sleep(2 * PERIOD)
+    assert len(driver.commands) == sent
+
+
+def test_a_controller_that_fails_stops_the_hand(pincer: Hand, solution: GraspSolution) -> None:
+    def fault(t: float) -> dict[str, object]:
+        if t > 0.2:
+            raise DriverError("The line is dead.")
+        return {}
+
+    driver = FakeDriver(OPEN, fault=fault)
+    report = run(driver, pincer, solution, speed=0.3)
+    assert report.reason.startswith("The line is dead. The hand was told to stop: that was not confirmed")
+    assert driver.stops == 1
+
+
+def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN)
+    hand = DrivenHand(pincer, driver)
+    threading.Timer(0.3, hand.stop).start()
+    report = execute(solution, hand, speed=0.2)
+    assert report.reason.startswith("Stopped on request. The hand was told to stop: it was seen to stand still")
+    assert report.joints["thumb"].reached < 0.9 * solution.joint_angles["thumb"]
+    assert driver.stopped_after == pytest.approx(0.3, abs=0.25)
+
+
+def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSolution) -> None:
+    def fault(t: float) -> dict[str, object]:
+        if t > 0.1:
+            raise KeyboardInterrupt
+        return {}
+
+    driver = FakeDriver(OPEN, fault=fault)
+    with pytest.raises(KeyboardInterrupt):
+        run(driver, pincer, solution, speed=0.3)
+    assert driver.stops == 1
+    assert not driver.connected
+
+
+def test_nothing_moves_when_the_plan_breaks_a_limit(pincer: Hand, solution: GraspSolution) -> None:
+    narrow = DriverLimits(positions={"thumb": (0.0, 0.2)})
+    driver = FakeDriver(OPEN, narrow)
+    report = run(driver, pincer, solution)
+    assert report.reason.startswith("Not carried out: Joint 'thumb' would be told 0.2")
+    assert "outside its limits [0, 0.2] rad" in report.reason
+    assert driver.commands == []
+    assert driver.stops == 0
+
+
+def test_a_controller_in_degrees_without_a_map_is_noticed(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver({"thumb": 30.0, "index": 0.0})
+    report = run(driver, pincer, solution)
+    assert "Joint 'thumb' is said to be at 30 rad, far outside its limits [0, 1.5] rad; is the" in report.reason
+    assert driver.commands == []
+
+
+def test_a_joint_found_just_outside_is_led_back_inside(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver({"thumb": -0.05, "index": 0.0})
+    report = run(driver, pincer, solution)
+    assert report.success, report.reason
+    lowest = [path.positions[:, 0].min() for path in driver.commands]
+    assert min(lowest) > -0.05
+    assert lowest == sorted(lowest)
+
+
+def test_joints_that_the_controller_lacks(pincer: Hand, solution: GraspSolution) -> None:
+    with pytest.raises(UnknownNameError, match=r"Joint 'index' is not in controller 'fake'. Did you mean 'indx'\?"):
+        run(FakeDriver({"thumb": 0.0, "indx": 0.0}), pincer, solution)
+    joint_map = JointMap({"thumb": MappedJoint("T"), "index": MappedJoint("I")})
+    with pytest.raises(UnknownNameError, match=r"'T' is not in controller 'fake' \(joint 'thumb' of the hand\)"):
+        run(FakeDriver(OPEN), pincer, solution, joint_map=joint_map)
+
+
+def test_an_angle_that_is_not_reached(pincer: Hand, solution: GraspSolution) -> None:
+    stuck = 0.8 * solution.joint_angles["thumb"]
+    driver = FakeDriver(OPEN)
+    driver.fault = lambda _: {"positions": {"thumb": min(driver.where()["thumb"], stuck)}}
+    report = run(driver, pincer, solution, settling=0.2, angle_tolerance=0.01)
+    assert not report.success
+    assert report.reason.startswith("Not reached: joint 'thumb' is")
+    assert report.reason.endswith("from its computed angle; tolerance 0.01 rad.")
+
+
+def test_a_solution_of_another_geometry_never_reaches_the_driver(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN)
+    with pytest.raises(CommandError, match="geometry_hash"):
+        run(driver, pincer, replace(solution, geometry_hash="ab+cd"))
+    assert driver.commands == []
+
+
+LIMITS = {"a": CommandLimits(-1.0, 1.0, 2.0, 1.0, "rad"), "b": CommandLimits(0.0, 90.0, 60.0, 57.3, "deg")}
+CHECK = CommandCheck(LIMITS, max_age=0.5, max_deviation=0.2)
+
+
+def path(times: list[float], positions: list[list[float]], joints: tuple[str, ...] = ("a", "b")) -> JointPath:
+    return JointPath(joints, np.array(times), np.array(positions), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("sent", "message"),
+    [
+        (path([0.1], [[0.0, 0.0]], ("a", "c")), "Joint 'c' is none of the controller's joints: a, b"),
+        (path([0.1], [[0.0, np.inf]]), "not finite"),
+        (path([np.nan], [[0.0, 0.0]]), "not finite"),
+        (path([0.2, 0.1], [[0.0, 0.0]] * 2), "times of a command do not rise"),
+        (path([0.0], [[0.0, 0.0]]), "times of a command do not rise"),
+        (path([0.1], [[0.0]]), "shape"),
+        (path([], []), "shape"),
+        (path([1.0], [[1.01, 0.0]]), r"'a' would be told 1.01 rad, outside its limits \[-1, 1\] rad"),
+        (path([0.1], [[0.3, 0.0]]), r"'a' would be told to move at 3 rad/s; its limit is 2 rad/s"),
+        (path([1.0, 1.1], [[0.0, 20.0], [0.0, 27.0]]), r"'b' would be told to move at 70 deg/s; its limit is 60 deg/s"),
+    ],
+)
+def test_wrong_commands_are_refused(sent: JointPath, message: str) -> None:
+    with pytest.raises(RefusedCommandError, match=message):
+        CHECK.command(sent, {"a": 0.0, "b": 0.0})
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-3, 3), st.floats(-100, 200)), min_size=1, max_size=6),
+    st.floats(-1, 1),
+    st.floats(0, 90),
+)
+def test_what_passes_keeps_every_limit(steps: list[tuple[float, float, float]], a: float, b: float) -> None:
+    times = np.cumsum([s[0] for s in steps])
+    positions = np.array([s[1:] for s in steps])
+    sent = JointPath(("a", "b"), times, positions, 0.05)
+    rates = np.abs(np.diff(np.vstack([[a, b], positions]), axis=0)) / np.diff(times, prepend=0.0)[:, None]
+    inside = (np.abs(positions[:, 0]) <= 1).all() and (positions[:, 1] >= 0).all() and (positions[:, 1] <= 90).all()
+    good = bool(inside and (rates <= [2.0, 60.0]).all())
+    near = bool(
+        (np.abs(positions[:, 0]) <= 1 + 1e-5).all()
+        and (np.abs(positions[:, 1] - 45) <= 45.001).all()
+        and (rates <= np.array([2.0, 60.0]) * (1 + 1e-5) + 1e-5).all()
+    )
+    try:
+        CHECK.command(sent, {"a": a, "b": b})
+        assert near
+    except RefusedCommandError:
+        assert not good
+
+
+def test_states_are_checked() -> None:
+    CHECK.state(HandState({"a": 0.0, "b": 1.0, "other": np.nan}, 0.1), {"a": 0.1, "b": 0.0})
+    with pytest.raises(RefusedCommandError, match="stale"):
+        CHECK.state(HandState({"a": 0.0, "b": 0.0}, np.nan))
+    with pytest.raises(RefusedCommandError, match="'b' does not follow: it is at 20 deg and was told to be at 0 deg"):
+        CHECK.state(HandState({"a": 0.0, "b": 20.0}, 0.0), {"a": 0.0, "b": 0.0})
+
+
+@given(st.lists(st.floats(-2, 2), min_size=2, max_size=8), st.floats(0.1, 5))
+def test_slowing_down_keeps_the_path_and_the_limit(angles: list[float], speed: float) -> None:
+    times = np.arange(len(angles)) * 0.1
+    positions = np.array(angles)[:, None]
+    slower = slowed_down(times, positions, np.array([speed]))
+    assert (slower >= times).all()
+    assert (np.abs(np.diff(positions[:, 0])) / np.diff(slower) <= speed * (1 + 1e-9)).all()
+    ratio = slower[1:] / times[1:]
+    np.testing.assert_allclose(ratio, ratio[0])
+
+
+@given(st.floats(0, 2), st.floats(0.05, 1))
+def test_a_window_is_the_plan_seen_from_now(moment: float, horizon: float) -> None:
+    plan = TimedPlan(("a",), np.array([0.0, 0.5, 0.7, 1.5]), np.array([[0.0], [1.0], [0.2], [0.4]]))
+    window = plan.window(moment, horizon)
+    assert (np.diff(window.times) > 0).all()
+    assert window.times[0] > 0
+    for t in np.linspace(window.times[0], horizon, 9):
+        assert window.at(t)["a"] == pytest.approx(plan.at(moment + t)["a"], abs=1e-3)
