@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from clench.execution.trajectory import Trajectory, plan_trajectory
     from clench.grasp.approach import approach_poses
     from clench.grasp.criteria import Criterion
+    from clench.grasp.self_check import check_hand
     from clench.models.command import ClosingOrder, GraspCommand
     from clench.models.command_file import load_command
+    from clench.models.hand.findings import Finding, FindingCode
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
     from clench.models.shapes import CollisionSource, ShapeKind
@@ -59,6 +61,8 @@ _HOMES = {
     "ExecutionHistory": "clench.execution.history",
     "ExecutionReport": "clench.execution.report",
     "FileError": "clench.base.errors",
+    "Finding": "clench.models.hand.findings",
+    "FindingCode": "clench.models.hand.findings",
     "FingerResult": "clench.solve.solution",
     "FingerStatus": "clench.solve.solution",
     "GraspCommand": "clench.models.command",
@@ -80,6 +84,7 @@ _HOMES = {
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
     "approach_poses": "clench.grasp.approach",
+    "check_hand": "clench.grasp.self_check",
     "execute": "clench.execution.executing",
     "load_command": "clench.models.command_file",
     "plan_trajectory": "clench.execution.trajectory",
@@ -103,6 +108,8 @@ __all__ = [
     "ExecutionHistory",
     "ExecutionReport",
     "FileError",
+    "Finding",
+    "FindingCode",
     "FingerResult",
     "FingerStatus",
     "GraspCommand",
@@ -125,6 +132,7 @@ __all__ = [
     "UnknownNameError",
     "__version__",
     "approach_poses",
+    "check_hand",
     "execute",
     "load_command",
     "plan_trajectory",

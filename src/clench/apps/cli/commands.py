@@ -119,7 +119,7 @@ def hand(
     collision_source: Source | None = None,
     json: bool = False,
 ) -> int:
-    """Show what was understood of a hand: fingers, roles, directions, coupling, warnings.
+    """Show what was understood of a hand, check it, and say what to do: fingers, roles, coupling, findings.
 
     Args:
         model: built-in name, or path to a .urdf or .xml file.
@@ -134,7 +134,8 @@ def hand(
     from .printing import print_hand
     from .results import print_json
 
-    report = describe_hand(clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source))
+    loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
+    report = describe_hand(loaded, clench.check_hand(loaded))
     if json:
         print_json(report.to_dict())
     else:

@@ -62,7 +62,13 @@ def print_hand(report: HandReport) -> None:
         console.print(table)
     pairs = ", ".join(f"{a} - {b}" for a, b in report.allowed_pairs)
     console.print(f"may overlap: {_plain(pairs) or 'none'}")
-    _sentences(console, "warning", report.warnings)
+    if not report.findings:
+        console.print("[green]nothing looks wrong[/green]")
+    for finding in report.findings:
+        label = "[yellow]warning[/yellow]" if finding.severity == "warning" else "note"
+        console.print(f"{label} ({finding.code}): {_plain(finding.text)}", soft_wrap=True)
+        if finding.advice:
+            console.print(f"    -> {_plain(finding.advice)}", soft_wrap=True)
 
 
 def print_report(report: ExecutionReport) -> None:

@@ -24,7 +24,7 @@ def allowed_pairs(compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link
     Args:
         compiled: the model. skeleton: its kinematics. links: with shapes.
     """
-    pairs = _adjacent(links) | _excluded(compiled, skeleton) | _overlapping(compiled, skeleton)
+    pairs = adjacent_pairs(links) | _excluded(compiled, skeleton) | _overlapping(compiled, skeleton)
     return tuple(sorted(pairs))
 
 
@@ -48,7 +48,7 @@ def _pair(a: int, b: int) -> tuple[int, int]:
     return (a, b) if a < b else (b, a)
 
 
-def _adjacent(links: tuple[Link, ...]) -> set[tuple[int, int]]:
+def adjacent_pairs(links: tuple[Link, ...]) -> set[tuple[int, int]]:
     """Return pairs that are fixed to each other, and neighbours across one place of the chain.
 
     Links fixed to each other are one piece; several joints at one place (links without geometry between) are

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from clench.base.errors import FileError, HandError
 
 from .model_files import ModelText
+
+
+@dataclass(frozen=True)
+class StatedJoints:
+    """Hold what a model states of its joints and MuJoCo corrects or ignores without a word, by joint name.
+
+    Args:
+        reversed: limits whose lower one is above the upper one [rad]; they are swapped before compiling.
+        still: the one angle of joints whose limits are equal [rad]. axis_lengths: of the axes as written [-].
+    """
+
+    reversed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    still: Mapping[str, float] = field(default_factory=dict)
+    axis_lengths: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -17,13 +34,14 @@ class CompiledModel:
     Args:
         spec: `mujoco.MjSpec`. model: `mujoco.MjModel`.
         xml: text that compiles to the same model with the assets of the model text.
-        label: how to name the model in messages.
+        label: how to name the model in messages. stated: see `StatedJoints`.
     """
 
     spec: Any
     model: Any
     xml: str
     label: str
+    stated: StatedJoints = StatedJoints()
 
     def body_name(self, body: int) -> str:
         """Return a body's name, or one made from its number."""
@@ -50,15 +68,19 @@ def compile_model(text: ModelText) -> CompiledModel:
         spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.assets))
     except ValueError as error:
         raise FileError(text.label, f"MuJoCo cannot read it: {_first_lines(error)}") from None
+    stated = _stated(spec, text)
+    if stated.reversed:
+        return _recompiled(spec, text.label, stated)
     try:
-        return CompiledModel(spec, spec.compile(), text.xml, text.label)
+        return CompiledModel(spec, spec.compile(), text.xml, text.label, stated)
     except ValueError as error:
-        if "volume" not in str(error):
+        if "volume" not in str(error) and "mjMINVAL" not in str(error):
             raise FileError(text.label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
-    # Flat or open meshes have no volume to take a mass from; their surface does as well.
+    # Flat or open meshes have no volume to take a mass from: their surface does as well. What has none is given some.
+    spec.compiler.boundmass, spec.compiler.boundinertia = 1e-6, 1e-12
     for mesh in spec.meshes:
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    return _recompiled(spec, text.label)
+    return _recompiled(spec, text.label, stated)
 
 
 def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
@@ -75,7 +97,7 @@ def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
         spec.delete(bodies[body])
     for key in list(spec.keys):
         spec.delete(key)
-    return _recompiled(spec, compiled.label)
+    return _recompiled(spec, compiled.label, compiled.stated)
 
 
 def collide_visuals(compiled: CompiledModel, bodies: set[int]) -> CompiledModel:
@@ -86,7 +108,7 @@ def collide_visuals(compiled: CompiledModel, bodies: set[int]) -> CompiledModel:
         for geom in list(compiled.spec.bodies)[body].geoms:
             geom.contype = 1
             geom.conaffinity = 1
-    return _recompiled(compiled.spec, compiled.label)
+    return _recompiled(compiled.spec, compiled.label, compiled.stated)
 
 
 def refuse_loops(compiled: CompiledModel, palm: int | None) -> None:
@@ -138,10 +160,31 @@ def _moves_below(model: Any, body: int, palm: int) -> bool:
     return moved and body == palm
 
 
-def _recompiled(spec: Any, label: str) -> CompiledModel:
+def _stated(spec: Any, text: ModelText) -> StatedJoints:
+    """Read what the joints' limits and axes are before MuJoCo compiles them; swap limits that are reversed."""
+    import mujoco
+
+    reversed_limits: dict[str, tuple[float, float]] = {}
+    still, lengths = dict(text.still), {}
+    for joint in spec.joints:
+        if joint.type != mujoco.mjtJoint.mjJNT_HINGE:
+            continue
+        unit = np.deg2rad(1.0) if spec.compiler.degree else 1.0
+        low, high = (float(x) for x in joint.range)
+        lengths[joint.name] = float(np.linalg.norm(joint.axis))
+        if low > high:
+            reversed_limits[joint.name] = (low * unit, high * unit)
+            joint.range = (high, low)
+            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        elif low == high != 0.0:
+            still[joint.name] = low * unit
+    return StatedJoints(reversed_limits, still, lengths)
+
+
+def _recompiled(spec: Any, label: str, stated: StatedJoints) -> CompiledModel:
     try:
         model = spec.compile()
-        return CompiledModel(spec, model, spec.to_xml(), label)
+        return CompiledModel(spec, model, spec.to_xml(), label, stated)
     except ValueError as error:
         raise FileError(label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
 

@@ -10,6 +10,7 @@ import numpy as np
 from clench.base.errors import HandError
 
 from .compiled import CompiledModel
+from .findings import Finding, FindingCode
 from .hand import Coupling
 from .kinematics import Skeleton, fixed_tendon
 
@@ -31,11 +32,11 @@ class Relation:
 
 @dataclass(frozen=True)
 class FoundCouplings:
-    """Hold couplings between joints, joints held at one angle [rad], and warnings."""
+    """Hold couplings between joints, joints held at one angle [rad], and what was found."""
 
     couplings: tuple[Coupling, ...]
     held: Mapping[int, float]
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 def find_couplings(compiled: CompiledModel, skeleton: Skeleton) -> FoundCouplings:
@@ -46,24 +47,31 @@ def find_couplings(compiled: CompiledModel, skeleton: Skeleton) -> FoundCoupling
     """
     held: dict[int, float] = {}
     relations = [*_equalities(compiled, skeleton, held)]
-    warnings: list[str] = []
+    findings: list[Finding] = []
     relations += _driven_tendons(compiled, skeleton, relations)
     index = skeleton.joint_of_model
     for r in relations:
         if (r.leader in index) != (r.follower in index):
             known, other = (r.leader, r.follower) if r.leader in index else (r.follower, r.leader)
-            warnings.append(
-                f"Joint '{compiled.joint_name(known)}' is coupled to '{compiled.joint_name(other)}', "
-                "which is no part of this hand; the coupling is left out."
+            names = compiled.joint_name(known), compiled.joint_name(other)
+            findings.append(
+                Finding(
+                    FindingCode.COUPLING_LEFT_OUT,
+                    f"Joint '{names[0]}' is coupled to '{names[1]}', "
+                    "which is no part of this hand; the coupling is left out.",
+                    "If both belong to the hand, name the palm that carries both (--palm, or palm in the hand file).",
+                    joints=names,
+                )
             )
     mapped = [
         Relation(index[r.leader], index[r.follower], r.ratio, r.offset, r.reason, r.breakaway)
         for r in relations
         if r.leader in index and r.follower in index
     ]
-    names = [j.name for j in skeleton.joints]
     return FoundCouplings(
-        flatten(mapped, names, compiled.label), {index[j]: q for j, q in held.items()}, tuple(warnings)
+        flatten(mapped, [j.name for j in skeleton.joints], compiled.label),
+        {index[j]: q for j, q in held.items()},
+        tuple(findings),
     )
 
 

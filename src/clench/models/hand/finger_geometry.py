@@ -78,6 +78,11 @@ def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float 
     return found
 
 
+def axis_angle(a: FloatArray, b: FloatArray) -> float:
+    """Return the angle between two unit axes, either sign [rad]."""
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), abs(a @ b)))
+
+
 def tip_motion(line: FingerLine, rates: FloatArray) -> FloatArray:
     """Return the velocity of the tip [m/s] for joint rates [rad/s], shape (n,)."""
     return np.asarray(np.einsum("j,jk->k", rates, np.cross(line.axes, line.tip - line.anchors)))

@@ -7,6 +7,7 @@ import numpy as np
 from clench.base.errors import FileError, HandError, UnknownNameError
 from clench.base.pose import FloatArray
 
+from .findings import Finding, FindingCode, quoted
 from .finger_names import names_thumb, place_names, short_names
 from .hand import Finger, Hand, Link
 from .hand_file import FingerOverride, HandFile
@@ -31,8 +32,8 @@ def own_chains(hand: Hand) -> list[tuple[int, ...]]:
     return sorted(own)
 
 
-def find_fingers(hand: Hand, overrides: HandFile) -> tuple[tuple[Finger, ...], list[str]]:
-    """Return the fingers, named where joints and links tell, thumbs by name only; and warnings.
+def find_fingers(hand: Hand, overrides: HandFile) -> tuple[tuple[Finger, ...], list[Finding]]:
+    """Return the fingers, named where joints and links tell, thumbs by name only; and what was found.
 
     Raises:
         UnknownNameError, FileError: the hand file names what does not exist.
@@ -40,11 +41,17 @@ def find_fingers(hand: Hand, overrides: HandFile) -> tuple[tuple[Finger, ...], l
     """
     found = own_chains(hand)
     chains = [chain for chain in found if _with_shape(hand, chain)]
-    warnings = [f"Joints {_quoted(hand, c)} move no geometry; they make no finger." for c in found if c not in chains]
+    findings = [_bare_chain(hand, c) for c in found if c not in chains]
     if not chains:
         raise HandError(f"{hand.name}: has no closing joint: no joint below the palm moves any geometry.")
     if len(chains) == 1:
-        warnings.append("The hand has only one finger.")
+        findings.append(
+            Finding(
+                FindingCode.ONE_FINGER,
+                "The hand has only one finger.",
+                "If there should be more, look at the joints that made none, or name the palm (--palm).",
+            )
+        )
     given = {name: o for name, o in overrides.fingers.items() if o.joints is not None}
     if given:
         named = {name: _given_chain(hand, name, o, overrides) for name, o in given.items()}
@@ -59,7 +66,16 @@ def find_fingers(hand: Hand, overrides: HandFile) -> tuple[tuple[Finger, ...], l
     )
     fingers = [_finger(hand, name, chain) for name, chain in zip(names, chains, strict=True) if name not in named]
     fingers += [_finger(hand, name, chain) for name, chain in named.items()]
-    return tuple(sorted(fingers, key=lambda f: f.joints[0])), warnings
+    return tuple(sorted(fingers, key=lambda f: f.joints[0])), findings
+
+
+def _bare_chain(hand: Hand, chain: tuple[int, ...]) -> Finding:
+    return Finding(
+        FindingCode.NO_SHAPE,
+        f"Joints {_quoted(hand, chain)} move no geometry; they make no finger.",
+        "Give the links that they move a collision or visual shape in the model, if this is a finger.",
+        joints=tuple(hand.joints[j].name for j in chain),
+    )
 
 
 def find_thumb(fingers: tuple[Finger, ...], stretch: FloatArray, closing: FloatArray) -> int | None:
@@ -167,7 +183,7 @@ def _with_shape(hand: Hand, chain: tuple[int, ...]) -> list[int]:
 
 
 def _quoted(hand: Hand, chain: tuple[int, ...]) -> str:
-    return ", ".join(f"'{hand.joints[j].name}'" for j in chain)
+    return quoted([hand.joints[j].name for j in chain])
 
 
 def _given_chain(hand: Hand, name: str, override: FingerOverride, overrides: HandFile) -> tuple[int, ...]:

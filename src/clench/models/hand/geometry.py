@@ -11,6 +11,7 @@ from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 from .compiled import CompiledModel
+from .findings import Finding, FindingCode
 
 #: Geometry in the first groups is drawn by default in MuJoCo's viewers.
 _DRAWN_GROUPS = 3
@@ -23,7 +24,7 @@ class ShapeReader:
 
     def __init__(self, compiled: CompiledModel) -> None:
         self.compiled = compiled
-        self.warnings: list[str] = []
+        self.findings: list[Finding] = []
         self._raw: dict[int, TriangleMesh] = {}
         self._hulls: dict[int, TriangleMesh] = {}
 
@@ -45,7 +46,14 @@ class ShapeReader:
         if kind in _kinds():
             return True
         body = self.compiled.body_name(int(self.compiled.model.geom_bodyid[g]))
-        self.warnings.append(f"Link '{body}' has a plane, height field or distance field; it is left out.")
+        self.findings.append(
+            Finding(
+                FindingCode.SHAPE_LEFT_OUT,
+                f"Link '{body}' has a plane, height field or distance field; it is left out.",
+                "Give the link a mesh or a simple shape if it is to touch anything there.",
+                links=(body,),
+            )
+        )
         return False
 
     def _shape(self, g: int, *, hull: bool) -> Shape:

@@ -13,6 +13,8 @@ from clench.base.errors import CommandError, UnknownNameError
 from clench.base.pose import FloatArray, rotation_about
 from clench.models.shapes import CollisionSource, Shape
 
+from .findings import Finding, Severity
+
 
 class JointRole(StrEnum):
     """Name what a joint does in a grasp (METHOD.md section 1)."""
@@ -138,7 +140,7 @@ class Hand:
         palm_center: centroid of the finger bases in the palm frame [m]; palm_normal: mean closing direction
             of the tips, unit.
         default_source: the collision source used unless a command names one.
-        warnings: sentences about what looks wrong.
+        findings: what loading found wrong or worth knowing; `clench.check_hand` looks for more.
         spec_xml: MJCF or URDF text that MuJoCo compiles, with `assets`, for simulation: the model's own numbers, or
             six digits of them where other limbs were left out or drawn geometry had to collide.
     """
@@ -155,7 +157,7 @@ class Hand:
     palm_center: FloatArray
     palm_normal: FloatArray
     default_source: CollisionSource = CollisionSource.ENGINE
-    warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     spec_xml: str = ""
     assets: Mapping[str, bytes] = field(default_factory=dict)
 
@@ -183,6 +185,11 @@ class Hand:
         from .loading import load_hand
 
         return load_hand(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about what looks wrong: the findings that are more than notes."""
+        return tuple(finding.text for finding in self.findings if finding.severity is Severity.WARNING)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

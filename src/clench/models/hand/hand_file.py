@@ -26,11 +26,12 @@ class FingerOverride:
 
 @dataclass(frozen=True)
 class JointOverride:
-    """Override a joint: role, direction, open value [rad], and whom it follows (`""`: nobody)."""
+    """Override a joint: role, direction, open value [rad], limits [rad], and whom it follows (`""`: nobody)."""
 
     role: JointRole | None = None
     direction: int | None = None
     open_value: float | None = None
+    limits: tuple[float, float] | None = None
     follows: str | None = None
     ratio: float = 1.0
     offset: float = 0.0
@@ -124,7 +125,7 @@ def _finger(table: _Table) -> FingerOverride:
 
 
 def _joint(table: _Table) -> JointOverride:
-    table.allow("role", "direction", "open", "follows", "ratio", "offset", "breakaway")
+    table.allow("role", "direction", "open", "limits", "follows", "ratio", "offset", "breakaway")
     role = table.choice("role", ["closing", "posture"])
     direction = table.number("direction")
     if direction is not None and direction not in (1.0, -1.0):
@@ -140,11 +141,21 @@ def _joint(table: _Table) -> JointOverride:
         role=None if role is None else JointRole(role),
         direction=None if direction is None else int(direction),
         open_value=table.number("open"),
+        limits=_limits(table),
         follows=follows,
         ratio=1.0 if ratio is None else ratio,
         offset=table.number("offset") or 0.0,
         breakaway=table.flag("breakaway") or False,
     )
+
+
+def _limits(table: _Table) -> tuple[float, float] | None:
+    value = table.data.get("limits")
+    if "limits" not in table.data:
+        return None
+    if not (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)) and value[0] <= value[1]):
+        raise table.error("limits", "two angles, the lower one first [rad]", value)
+    return float(value[0]), float(value[1])
 
 
 def _link(table: _Table) -> LinkOverride:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +12,9 @@ from clench.base.errors import HandError
 from clench.base.pose import FloatArray, Pose
 
 from .compiled import CompiledModel
+from .findings import Finding, FindingCode
 from .hand import Joint
-
-#: Ranges above a whole turn are placeholders, not limits [rad].
-_FULL_TURN = 2 * np.pi
-#: Hands whose joints all turn less are likely misread: 2 pi degrees [rad].
-_DEGREES_MISREAD = np.deg2rad(2 * np.pi)
-#: Efforts above this are placeholders for a finger [Nm].
-_EFFORT_PLACEHOLDER = 1e3
+from .limits import EFFORT_PLACEHOLDER, doubtful_joints, joint_limits
 
 
 @dataclass(frozen=True)
@@ -43,22 +38,28 @@ class Skeleton:
         joints: revolute joints, in link order.
         link_of_body: last link of every kept MuJoCo body.
         joint_of_model: index of a joint by MuJoCo's joint number.
-        warnings: sentences about what looks wrong.
+        findings: what looks wrong.
     """
 
     frames: tuple[Frame, ...]
     joints: tuple[Joint, ...]
     link_of_body: Mapping[int, int]
     joint_of_model: Mapping[int, int]
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
-def build_skeleton(compiled: CompiledModel, bodies: list[int], palm: int, velocities: Mapping[str, float]) -> Skeleton:
+def build_skeleton(
+    compiled: CompiledModel,
+    bodies: list[int],
+    palm: int,
+    velocities: Mapping[str, float],
+    given: Mapping[str, tuple[float, float]],
+) -> Skeleton:
     """Read links and joints of the kept bodies.
 
     Args:
         compiled: the model. bodies: kept bodies, parents first. palm: the palm's body.
-        velocities: velocity limits [rad/s] by joint name.
+        velocities: velocity limits [rad/s] by joint name. given: limits [rad] to take instead of the model's, by name.
 
     Raises:
         HandError: a finger has a joint that is not revolute.
@@ -68,15 +69,15 @@ def build_skeleton(compiled: CompiledModel, bodies: list[int], palm: int, veloci
     joints: list[Joint] = []
     link_of_body: dict[int, int] = {}
     joint_of_model: dict[int, int] = {}
-    warnings: list[str] = []
+    findings: list[Finding] = []
     efforts = _efforts(m)
     for body in bodies:
         parent = link_of_body.get(int(m.body_parentid[body]), -1) if body else -1
         T = Pose(m.body_pos[body], m.body_quat[body]).matrix
-        moving = _revolute_joints(compiled, body, palm, warnings)
+        moving = _revolute_joints(compiled, body, palm, findings)
         name = compiled.body_name(body)
         for k, j in enumerate(moving):
-            joints.append(_joint(compiled, j, efforts.get(j), velocities))
+            joints.append(_joint(compiled, j, efforts.get(j), velocities, given))
             joint_of_model[j] = len(joints) - 1
             last = k == len(moving) - 1
             link_name = name if last else f"{name}__{joints[-1].name}"
@@ -86,11 +87,11 @@ def build_skeleton(compiled: CompiledModel, bodies: list[int], palm: int, veloci
         if not moving:
             frames.append(Frame(name, parent, -1, T, float(m.body_mass[body]), body))
         link_of_body[body] = len(frames) - 1
-    warnings += _doubtful_limits(compiled, joint_of_model, efforts)
-    return Skeleton(tuple(frames), tuple(joints), link_of_body, joint_of_model, tuple(warnings))
+    findings += doubtful_joints(compiled, joint_of_model, efforts, given)
+    return Skeleton(tuple(frames), tuple(joints), link_of_body, joint_of_model, tuple(findings))
 
 
-def _revolute_joints(compiled: CompiledModel, body: int, palm: int, warnings: list[str]) -> list[int]:
+def _revolute_joints(compiled: CompiledModel, body: int, palm: int, findings: list[Finding]) -> list[int]:
     """Return a body's revolute joints; others are refused in fingers and held still upstream."""
     import mujoco
 
@@ -112,18 +113,26 @@ def _revolute_joints(compiled: CompiledModel, body: int, palm: int, warnings: li
                 "clench closes fingers made of revolute joints."
             )
         elif kind != "a free joint":
-            warnings.append(f"Joint '{compiled.joint_name(j)}' before the palm is {kind}; it is held at its reference.")
+            name = compiled.joint_name(j)
+            text = f"Joint '{name}' before the palm is {kind}; it is held at its reference."
+            findings.append(
+                Finding(FindingCode.JOINT_HELD, text, "Nothing to do: commands place the palm.", joints=(name,))
+            )
     return found
 
 
-def _joint(compiled: CompiledModel, j: int, effort: float | None, velocities: Mapping[str, float]) -> Joint:
+def _joint(
+    compiled: CompiledModel,
+    j: int,
+    effort: float | None,
+    velocities: Mapping[str, float],
+    given: Mapping[str, tuple[float, float]],
+) -> Joint:
     m = compiled.model
     name = compiled.joint_name(j)
-    lower, upper = (float(x) for x in m.jnt_range[j])
+    lower, upper = given[name] if name in given else joint_limits(compiled, j)
     reference = float(m.qpos0[m.jnt_qposadr[j]])
-    if not m.jnt_limited[j]:
-        lower, upper = -np.pi, np.pi
-    if effort is not None and effort > _EFFORT_PLACEHOLDER:
+    if effort is not None and effort > EFFORT_PLACEHOLDER:
         effort = None
     axis = np.array(m.jnt_axis[j])
     return Joint(
@@ -136,33 +145,6 @@ def _joint(compiled: CompiledModel, j: int, effort: float | None, velocities: Ma
         velocity=velocities.get(name),
         effort=effort,
     )
-
-
-def _doubtful_limits(compiled: CompiledModel, joints: Iterable[int], efforts: Mapping[int, float]) -> list[str]:
-    """Return a sentence for each kind of limit that is missing or looks like a placeholder."""
-    m = compiled.model
-    free, wide, strong = [], [], []
-    for j in joints:
-        name = f"'{compiled.joint_name(j)}'"
-        if not m.jnt_limited[j]:
-            free.append(name)
-        elif m.jnt_range[j, 1] - m.jnt_range[j, 0] > _FULL_TURN:
-            wide.append(name)
-        if efforts.get(j, 0.0) > _EFFORT_PLACEHOLDER:
-            strong.append(name)
-    found = (
-        (free, "no limits in the model; -pi to pi is taken"),
-        (wide, "may turn by more than a whole turn: the limits look like placeholders"),
-        (strong, f"effort limits above {_EFFORT_PLACEHOLDER:.0f} Nm look like placeholders; taken as none"),
-    )
-    warnings = [f"Joints {', '.join(names)}: {text}." for names, text in found if names]
-    ranges = [float(np.ptp(m.jnt_range[j])) for j in joints if m.jnt_limited[j]]
-    if ranges and max(ranges) < _DEGREES_MISREAD:
-        warnings.append(
-            "No joint may turn by more than a few degrees: the limits look like radians read as degrees "
-            '(in MJCF, <compiler angle="radian"/>).'
-        )
-    return warnings
 
 
 def _efforts(model: Any) -> dict[int, float]:

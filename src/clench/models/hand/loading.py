@@ -13,8 +13,10 @@ from clench.base.pose import FloatArray
 from clench.models.shapes import CollisionSource
 
 from .allowed import allowed_pairs, with_given_pairs
+from .checks import check_understood
 from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
 from .coupling import FoundCouplings, Relation, find_couplings, flatten
+from .findings import Finding, FindingCode, quoted
 from .finger_geometry import finger_line, tip_motion
 from .fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
 from .geometry import ShapeReader, bodies_without_collision
@@ -45,9 +47,10 @@ def load_hand(
     text = read_model(model)
     overrides = find_hand_file(text.path, hand_file)
     source = _source(collision_source, overrides)
-    compiled, palm_body, warnings = _hand_alone(text, palm or overrides.palm)
+    compiled, palm_body, findings = _hand_alone(text, palm or overrides.palm)
     bodies = hand_bodies(compiled.model, palm_body)
-    skeleton = build_skeleton(compiled, bodies, palm_body, text.velocities)
+    given = {name: joint.limits for name, joint in overrides.joints.items() if joint.limits is not None}
+    skeleton = build_skeleton(compiled, bodies, palm_body, text.velocities, given)
     found = _with_given_couplings(find_couplings(compiled, skeleton), skeleton, overrides, text.label)
     reader = ShapeReader(compiled)
     links = _links(skeleton, reader, overrides)
@@ -64,33 +67,47 @@ def load_hand(
         palm_center=np.zeros(3),
         palm_normal=np.zeros(3),
         default_source=source,
-        warnings=(*warnings, *skeleton.warnings, *found.warnings, *reader.warnings),
+        findings=(*findings, *skeleton.findings, *found.findings, *reader.findings),
         spec_xml=compiled.xml,
         assets=text.assets,
     )
     return _understood(hand, overrides, found.held)
 
 
-def _hand_alone(text: ModelText, palm: str | None) -> tuple[CompiledModel, int, list[str]]:
+def _hand_alone(text: ModelText, palm: str | None) -> tuple[CompiledModel, int, list[Finding]]:
     """Compile a model, find its palm, leave out other limbs, and give bare links something to collide with."""
     compiled = compile_model(text)
     if palm is None:
         refuse_loops(compiled, None)
     body = find_palm(compiled, palm)
     refuse_loops(compiled, body)
-    warnings: list[str] = []
+    findings: list[Finding] = []
     kept = {0, *hand_bodies(compiled.model, body)}
     if len(kept) < compiled.model.nbody and body != 0:
         dropped = compiled.model.nbody - len(kept)
         compiled = keep_bodies(compiled, kept)
         body = sorted(kept).index(body)
-        warnings.append(f"{dropped} links that are neither the hand nor between it and the root are left out.")
+        findings.append(
+            Finding(
+                FindingCode.LINKS_LEFT_OUT,
+                f"{dropped} links that are neither the hand nor between it and the root are left out.",
+                "Nothing to do, unless the hand itself is incomplete: then name its palm (--palm).",
+            )
+        )
     bare = bodies_without_collision(compiled, hand_bodies(compiled.model, body), body)
     if bare:
-        names = ", ".join(f"'{compiled.body_name(b)}'" for b in sorted(bare))
-        warnings.append(f"Links without collision geometry collide with what is drawn: {names}.")
+        names = tuple(compiled.body_name(b) for b in sorted(bare))
+        findings.append(
+            Finding(
+                FindingCode.COLLISION_FROM_VISUALS,
+                f"Links without collision geometry collide with what is drawn: {quoted(names)}.",
+                "Nothing to do if the drawn shapes are true; each counts as its convex hull "
+                '(collision_source = "raw" in the hand file takes the triangles as they are).',
+                links=names,
+            )
+        )
         compiled = collide_visuals(compiled, bare)
-    return compiled, body, warnings
+    return compiled, body, findings
 
 
 def _source(given: CollisionSource | str | None, overrides: HandFile) -> CollisionSource:
@@ -151,20 +168,21 @@ def _with_given_couplings(found: FoundCouplings, skeleton: Skeleton, overrides: 
 
 def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> Hand:
     """Return the hand with fingers, roles, thumb, fixed links and the palm's centre and normal."""
-    fingers, warnings = find_fingers(hand, overrides)
-    hand = replace(hand, fingers=fingers, warnings=(*hand.warnings, *warnings))
+    fingers, findings = find_fingers(hand, overrides)
+    hand = replace(hand, fingers=fingers, findings=(*hand.findings, *findings))
     hand = assign_roles(hand, overrides, held)
     bases, tips, stretch, closing = _directions(hand)
     thumb = find_thumb(hand.fingers, stretch, closing)
     places = row_places(bases, thumb, tips[thumb or 0])
     fingers = name_fingers(hand, thumb, places, overrides)
     hand = replace(hand, fingers=fingers, fixed_links=fixed_links(hand.links, fingers, hand.palm))
-    return replace(
+    hand = replace(
         hand,
         allowed_pairs=with_given_pairs(hand, overrides),
         palm_center=bases.mean(axis=0),
         palm_normal=_normal(hand, stretch, closing),
     )
+    return replace(hand, findings=(*hand.findings, *check_understood(hand)))
 
 
 def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

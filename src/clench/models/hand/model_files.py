@@ -27,6 +27,7 @@ class ModelText:
         assets: bytes of meshes and textures by the key that the text uses.
         is_urdf: which of the two formats the file has.
         velocities: velocity limits [rad/s] by joint name (URDF; MuJoCo drops them).
+        still: the angle [rad] of joints whose two limits are equal, by name (URDF; MuJoCo lets them turn freely).
     """
 
     name: str
@@ -36,6 +37,7 @@ class ModelText:
     assets: Mapping[str, bytes]
     is_urdf: bool
     velocities: Mapping[str, float] = field(default_factory=dict)
+    still: Mapping[str, float] = field(default_factory=dict)
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -75,12 +77,12 @@ def read_model(model: str | Path) -> ModelText:
     path, builtin = find_model(model)
     root = _parse(path)
     if root.tag == "robot":
-        from .urdf import prepare_urdf, velocity_limits
+        from .urdf import prepare_urdf, take_still_joints, velocity_limits
 
-        velocities = velocity_limits(root)
+        velocities, still = velocity_limits(root), take_still_joints(root, path)
         assets = prepare_urdf(root, path)
     elif root.tag == "mujoco":
-        velocities = {}
+        velocities, still = {}, {}
         assets = _prepare_mjcf(root, path)
     else:
         raise FileError(path, f"root element <{root.tag}>; expected <robot> (URDF) or <mujoco> (MJCF).")
@@ -93,6 +95,7 @@ def read_model(model: str | Path) -> ModelText:
         assets=assets,
         is_urdf=root.tag == "robot",
         velocities=velocities,
+        still=still,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from clench.models.shapes import CollisionSource
 
+from .findings import Finding
 from .hand import Hand
 
 
@@ -79,6 +80,7 @@ class HandReport:
     fixed_links: tuple[str, ...]
     allowed_pairs: tuple[tuple[str, str], ...]
     warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -110,11 +112,11 @@ class HandReport:
         ]
 
 
-def describe_hand(hand: Hand) -> HandReport:
+def describe_hand(hand: Hand, findings: tuple[Finding, ...] | None = None) -> HandReport:
     """Return what was understood of a hand.
 
     Args:
-        hand: as loaded.
+        hand: as loaded. findings: of a closer look; None: what loading found.
     """
     return HandReport(
         name=hand.name,
@@ -130,6 +132,7 @@ def describe_hand(hand: Hand) -> HandReport:
         fixed_links=tuple(hand.links[i].name for i in hand.fixed_links),
         allowed_pairs=tuple((hand.links[a].name, hand.links[b].name) for a, b in hand.allowed_pairs),
         warnings=hand.warnings,
+        findings=hand.findings if findings is None else findings,
     )
 
 

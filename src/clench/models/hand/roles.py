@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from clench.base.errors import FileError, HandError, UnknownNameError
-from clench.base.pose import FloatArray
 from clench.base.tolerances import CLOSING_ANGLE
 
-from .finger_geometry import bends, finger_line
+from .findings import Finding, FindingCode, Severity, in_hand_file, quoted
+from .finger_geometry import axis_angle, bends, finger_line
 from .hand import Finger, Hand, Joint, JointRole
 from .hand_file import HandFile, JointOverride
 
@@ -67,12 +67,12 @@ def assign_roles(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> 
     plans = [_plan(hand, finger, overrides, joints) for finger in hand.fingers]
     if not any(p.closing for p in plans):
         raise HandError(f"{hand.name}: has no closing joint: all joints of its fingers are posture joints.")
-    warnings = list(hand.warnings) + _decide_senses(replace(hand, joints=tuple(joints)), plans)
+    findings = [*hand.findings, *_decide_senses(replace(hand, joints=tuple(joints)), plans)]
     for plan in plans:
-        _apply(plan, joints, warnings)
+        _apply(plan, joints, findings)
     _override(hand, joints, overrides)
-    _follow(hand, joints, overrides, warnings)
-    return replace(hand, joints=tuple(joints), warnings=tuple(warnings))
+    _follow(hand, joints, overrides, findings)
+    return replace(hand, joints=tuple(joints), findings=tuple(findings))
 
 
 def nearest_inside(value: float, joint: Joint) -> float:
@@ -126,7 +126,7 @@ def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) 
     places = []
     for k in mobile:
         j = finger.joints[k]
-        angle = _axis_angle(line.axes[k], axis)
+        angle = axis_angle(line.axes[k], axis)
         override = overrides.joints.get(hand.joints[j].name, JointOverride())
         closing = angle <= CLOSING_ANGLE if override.role is None else override.role is JointRole.CLOSING
         reason = _role_reason(angle, k == mobile[-1], override.role)
@@ -142,11 +142,6 @@ def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) 
         plan.straight_reason.append(reason)
         _vote(plan, n, hand.joints[j], overrides.joints.get(hand.joints[j].name, JointOverride()))
     return plan
-
-
-def _axis_angle(a: FloatArray, b: FloatArray) -> float:
-    """Return the angle between two axes, either sign [rad]."""
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), abs(a @ b)))
 
 
 def _role_reason(angle: float, most_distal: bool, given: JointRole | None) -> str:
@@ -190,7 +185,7 @@ def _vote(plan: FingerPlan, n: int, joint: Joint, override: JointOverride) -> No
     plan.votes[j] = (1 if up > down else -1, abs(up - down), f"the {far} limit is farther from straight ({angles})")
 
 
-def _decide_senses(hand: Hand, plans: list[FingerPlan]) -> list[str]:
+def _decide_senses(hand: Hand, plans: list[FingerPlan]) -> list[Finding]:
     """Give every finger its sense: from its joints' limits, else the side on which the fingertips meet."""
     for plan in plans:
         weight = sum(
@@ -206,7 +201,8 @@ def _decide_senses(hand: Hand, plans: list[FingerPlan]) -> list[str]:
         return []
     if len(plans) == 1:
         open_plans[0].sense, open_plans[0].sense_reason = 1, "limits equally far and no other finger: assumed"
-        return [f"Finger '{plans[0].finger.name}': closing direction could not be told; set it in a hand file."]
+        text = f"Finger '{plans[0].finger.name}': closing direction could not be told; set it in a hand file."
+        return [_uncertain(hand, open_plans, text, Severity.WARNING)]
     scores = []
     for senses in itertools.product((1, -1), repeat=len(open_plans)):
         scores.append((_tip_spread(hand, plans, dict(zip(map(id, open_plans), senses, strict=True))), senses))
@@ -215,8 +211,23 @@ def _decide_senses(hand: Hand, plans: list[FingerPlan]) -> list[str]:
         plan.sense = sense
         plan.sense_reason = "limits equally far; closes to the side where the fingertips meet"
     if scores[1][0] - scores[0][0] < _UNDECIDED * scores[0][0]:
-        return ["Closing directions could hardly be told from limits or fingertips; check them, or set a hand file."]
-    return []
+        text = "Closing directions could hardly be told from limits or fingertips; check them, or set a hand file."
+        return [_uncertain(hand, open_plans, text, Severity.WARNING)]
+    names = quoted([plan.finger.name for plan in open_plans])
+    text = f"The limits of {names} are equally far from straight; these fingers close to where the fingertips meet."
+    return [_uncertain(hand, open_plans, text, Severity.NOTE)]
+
+
+def _uncertain(hand: Hand, plans: list[FingerPlan], text: str, severity: Severity) -> Finding:
+    names = tuple(hand.joints[j].name for plan in plans for j in plan.closing)
+    return Finding(
+        FindingCode.DIRECTION_UNCERTAIN,
+        text,
+        "Look at the picture (--figure). Where it is wrong, write in the hand file, "
+        f"{in_hand_file('joints', names[0], 'direction = 1')} (or -1), and so for each of the others.",
+        severity,
+        joints=names,
+    )
 
 
 def _tip_spread(hand: Hand, plans: list[FingerPlan], senses: Mapping[int, int]) -> float:
@@ -231,7 +242,7 @@ def _tip_spread(hand: Hand, plans: list[FingerPlan], senses: Mapping[int, int]) 
     return float(np.mean([np.linalg.norm(a - b) for a, b in itertools.combinations(tips, 2)]))
 
 
-def _apply(plan: FingerPlan, joints: list[Joint], warnings: list[str]) -> None:
+def _apply(plan: FingerPlan, joints: list[Joint], findings: list[Finding]) -> None:
     """Write a plan into the joints."""
     turns = set()
     for n, j in enumerate(plan.closing):
@@ -249,25 +260,35 @@ def _apply(plan: FingerPlan, joints: list[Joint], warnings: list[str]) -> None:
             open_reason=f"straight: {where}" if value == plan.straight[n] else f"limit nearest to straight: {where}",
         )
     if len(turns) > 1:
-        names = ", ".join(f"'{joints[j].name}'" for j in plan.closing)
-        warnings.append(f"Joints {names} of one finger close in opposite senses; check the limits.")
+        names = tuple(joints[j].name for j in plan.closing)
+        text = f"Joints {quoted(names)} of one finger close in opposite senses; check the limits."
+        line = in_hand_file("joints", names[-1], "direction = 1")
+        advice = f"Correct the limits, or write in the hand file, {line} (or -1)."
+        findings.append(Finding(FindingCode.DIRECTIONS_OPPOSED, text, advice, joints=names))
 
 
-def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, warnings: list[str]) -> None:
+def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, findings: list[Finding]) -> None:
     """Let followers share role and direction of their leaders, and their open values agree with them."""
     for c in hand.couplings:
         leader, follower = joints[c.leader], joints[c.follower]
         if follower.role is not leader.role and JointRole.UPSTREAM not in (leader.role, follower.role):
             if leader.role is JointRole.CLOSING:
-                warnings.append(
+                text = (
                     f"Joint '{follower.name}' follows closing joint '{leader.name}' though its axis is not parallel to "
                     "that of the finger's most distal joint."
                 )
+                line = in_hand_file("joints", follower.name, 'follows = ""')
+                advice = f"If it should not, write in the hand file, {line}."
+                names = (follower.name, leader.name)
+                findings.append(Finding(FindingCode.FOLLOWER_NOT_PARALLEL, text, advice, joints=names))
             follower = replace(follower, role=leader.role, role_reason=f"follows {leader.role} joint '{leader.name}'")
         direction = leader.direction * (1 if c.ratio > 0 else -1)
         if follower.role is JointRole.CLOSING:
             if direction != follower.direction and follower.name in overrides.joints:
-                warnings.append(f"Joint '{follower.name}' follows '{leader.name}'; its direction comes from there.")
+                text = f"Joint '{follower.name}' follows '{leader.name}'; its direction comes from there."
+                advice = f'Give the direction of "{leader.name}" in the hand file.'
+                names = (follower.name, leader.name)
+                findings.append(Finding(FindingCode.DIRECTION_IGNORED, text, advice, joints=names))
             follower = replace(follower, direction=direction, direction_reason=f"follows '{leader.name}' ({c.reason})")
         value = nearest_inside(c.ratio * leader.open_value + c.offset, follower)
         joints[c.follower] = replace(follower, open_value=value, open_reason=f"follows '{leader.name}'")

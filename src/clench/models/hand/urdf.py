@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -20,6 +21,9 @@ _COMPILER = {
     "boundmass": "1e-6",
     "boundinertia": "1e-12",
 }
+
+
+_JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
 def prepare_urdf(root: ET.Element, path: Path) -> dict[str, bytes]:
@@ -66,6 +70,47 @@ def velocity_limits(root: ET.Element) -> dict[str, float]:
     return limits
 
 
+def take_still_joints(root: ET.Element, path: Path) -> dict[str, float]:
+    """Return the angle [rad] of revolute joints whose two limits are equal, and take these limits out of the tree.
+
+    Raises:
+        FileError: a limit is no number.
+    """
+    still: dict[str, float] = {}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") != "revolute":
+            continue
+        ends = [_limit(joint, limit, key, path) for key in ("lower", "upper") if limit.get(key) is not None]
+        if len(ends) == 2 and ends[0] == ends[1]:
+            still[joint.get("name", "")] = ends[0]
+            del limit.attrib["lower"], limit.attrib["upper"]
+    return still
+
+
+def _limit(joint: ET.Element, limit: ET.Element, key: str, path: Path) -> float:
+    text = limit.get(key, "")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FileError(path, f"joint '{joint.get('name')}': {key} limit '{text}'; expected a finite number [rad].")
+    return value
+
+
+def _check_axis(joint: ET.Element, path: Path) -> None:
+    axis = joint.find("axis")
+    text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+    try:
+        numbers = [float(x) for x in text.split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)) or not any(numbers):
+        name = joint.get("name")
+        raise FileError(path, f"joint '{name}': axis '{text}'; expected a direction, three numbers that are not all 0.")
+
+
 def _check(root: ET.Element, path: Path) -> None:
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
         raise FileError(path, "is a xacro template; expected plain URDF (expand it with the xacro program first).")
@@ -80,6 +125,11 @@ def _check(root: ET.Element, path: Path) -> None:
                 known = ", ".join(sorted(str(n) for n in names))
                 what = f"no {end} link" if link is None else f"the {end} link '{link}', which does not exist"
                 raise FileError(path, f"joint '{joint.get('name')}' names {what}. Links: {known}.")
+        if joint.get("type") not in _JOINT_TYPES:
+            expected = ", ".join(_JOINT_TYPES)
+            raise FileError(path, f"joint '{joint.get('name')}' has type '{joint.get('type')}'; expected {expected}.")
+        if joint.get("type") != "fixed":
+            _check_axis(joint, path)
 
 
 def _places(named: str, path: Path) -> list[Path]:
