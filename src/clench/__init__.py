@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
     from clench.models.shapes import CollisionSource, ShapeKind
     from clench.solve.controller import solve
+    from clench.solve.pose_error import PoseErrorReport, pose_error
     from clench.solve.record import Record
+    from clench.solve.sensitivity import Sensitivity, sensitivity
     from clench.solve.solution import (
         Candidate,
         Contact,
@@ -77,7 +79,9 @@ _HOMES = {
     "JointRole": "clench.models.hand.hand",
     "ObjectError": "clench.base.errors",
     "Pose": "clench.base.pose",
+    "PoseErrorReport": "clench.solve.pose_error",
     "Record": "clench.solve.record",
+    "Sensitivity": "clench.solve.sensitivity",
     "ShapeKind": "clench.models.shapes",
     "SimulatedHand": "clench.execution.simulation",
     "SolutionStatus": "clench.solve.solution",
@@ -88,6 +92,8 @@ _HOMES = {
     "execute": "clench.execution.executing",
     "load_command": "clench.models.command_file",
     "plan_trajectory": "clench.execution.trajectory",
+    "pose_error": "clench.solve.pose_error",
+    "sensitivity": "clench.solve.sensitivity",
 }
 
 __all__ = [
@@ -124,7 +130,9 @@ __all__ = [
     "JointRole",
     "ObjectError",
     "Pose",
+    "PoseErrorReport",
     "Record",
+    "Sensitivity",
     "ShapeKind",
     "SimulatedHand",
     "SolutionStatus",
@@ -136,6 +144,8 @@ __all__ = [
     "execute",
     "load_command",
     "plan_trajectory",
+    "pose_error",
+    "sensitivity",
     "solve",
 ]
 

@@ -56,6 +56,7 @@ def solve(
     seed: int = 0,
     out: Path | None = None,
     record: Path | None = None,
+    pose_error: tuple[float, float] | None = None,
     strict: bool = False,
     json: bool = False,
 ) -> int:
@@ -74,15 +75,17 @@ def solve(
         seed: of the approach pose; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
         record: SQLite record to append the solution to.
+        pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """
     from dataclasses import replace
+    from math import radians
 
     import clench
     from clench.kernels.warming import warm_up
 
-    from .printing import print_solution
+    from .printing import print_pose_error, print_solution
     from .results import print_json, write_results
 
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
@@ -103,10 +106,16 @@ def solve(
         with clench.Record(record) as recorded:
             recorded.append(solution)
         files.append(record)
+    error = None
+    if pose_error is not None:
+        shift, turn = pose_error
+        error = clench.pose_error(the_hand, the_object, the_command, shift, radians(turn), solution=solution)
     if json:
-        print_json(solution.to_dict())
+        print_json(solution.to_dict() | ({} if error is None else {"pose_error": error.to_dict()}))
     else:
         print_solution(solution, [*the_hand.warnings, *the_object.warnings], files)
+        if error is not None:
+            print_pose_error(error)
     return exit_code(solution, strict)
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from clench.execution.report import ExecutionReport
     from clench.models.hand.report import HandReport
+    from clench.solve.pose_error import PoseErrorReport
     from clench.solve.record import RecordEntry
     from clench.solve.solution import FingerResult, GraspSolution
 
@@ -38,6 +39,24 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     _sentences(console, "violation", solution.violations())
     _sentences(console, "warning", warnings)
     print_files(files)
+
+
+def print_pose_error(error: PoseErrorReport) -> None:
+    """Print what an error of the object's pose does to angles and touching links."""
+    console = _console()
+    size = f"±{error.translation * 1e3:g} mm and ±{np.rad2deg(error.rotation):g}°"
+    table = _table(f"the object off by {size}", "joint", "stopped by", "to first order [deg]", "solved again [deg]")
+    for name, predicted, measured in zip(error.sensitivity.joints, error.predicted, error.measured, strict=True):
+        stopped = error.sensitivity.stopped_by.get(name, "")
+        table.add_row(*map(_plain, (name, stopped, _degrees(predicted), _degrees(measured))))
+    console.print(table)
+    for text, links in (("still touch", error.kept), ("touch as well", error.gained)):
+        if links:
+            listed = ", ".join(f"{link} {share:.0%}" for link, share in links.items())
+            console.print(f"{text}, of {len(error.corners)} corners: {_plain(listed)}")
+    statuses = ", ".join(f"{status} {count}" for status, count in error.statuses.items())
+    console.print(f"answers at the corners: {statuses}")
+    _sentences(console, "no number", list(dict.fromkeys(error.sensitivity.reasons.values())))
 
 
 def print_hand(report: HandReport) -> None:
@@ -152,3 +171,7 @@ def _plain(text: Any) -> str:
 
 def _millimetres(length: float) -> str:
     return f"{length * 1e3:.3f}"
+
+
+def _degrees(angle: float) -> str:
+    return f"±{np.rad2deg(angle):.2f}" if np.isfinite(angle) else "no number"
