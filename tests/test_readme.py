@@ -11,6 +11,9 @@ import pytest
 
 import clench
 from clench.apps.cli.commands import COMMANDS
+from clench.grasp import criterion_registry
+from clench.grasp.calibration import preset_names
+from clench.grasp.criterion_registry import criterion_names, find_criterion
 from clench.models.command_file import KEYS, command_from_dict
 from clench.models.hand.hand_file import read_hand_file
 from handmade import make_solution
@@ -77,6 +80,33 @@ def test_every_key_of_a_solution_is_documented() -> None:
     documented = set(re.findall(r"`(\w+)", page("solution-format.md")))
     for keys in (document, finger, finger["candidates"][0], contact):
         assert set(keys) <= documented
+
+
+def test_every_criterion_and_preset_is_documented() -> None:
+    text = page("calibration.md")
+    for name in criterion_names():
+        c = find_criterion(name, "test")
+        row = rf"^\| `{name}` \| .+ \| {c.unit} \| {'more' if c.larger_is_better else 'less'} \| {c.scale:g} \|$"
+        assert re.search(row, text, re.MULTILINE), name
+    assert set(preset_names()) <= set(re.findall(r"`(\w+)`", text))
+
+
+def test_the_calibration_file_shown_is_read(tmp_path: Path) -> None:
+    (text,) = re.findall(r"```toml\n(.*?)```", page("calibration.md"), re.DOTALL)
+    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
+    calibration = clench.load_calibration(tmp_path / "c.toml")
+    assert calibration.weights
+    assert calibration.limits
+
+
+def test_the_criterion_shown_is_scored(monkeypatch: pytest.MonkeyPatch) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", page("calibration.md"), re.DOTALL)
+    monkeypatch.setattr(criterion_registry, "_registry", dict(criterion_registry._registry))
+    names: dict[str, Any] = {}
+    exec(compile(code, "calibration.md", "exec"), names)
+    solution = clench.solve(clench.Hand.load("robonaut2"), clench.GraspObject.load("mug"), names["command"])
+    assert all("symmetric" in c.scores for f in solution.fingers.values() for c in f.candidates)
+    assert list(solution.choice["criteria"]) == ["symmetric"]
 
 
 def test_the_hand_file_shown_is_read(tmp_path: Path) -> None:

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from clench.execution.simulation import SimulatedHand
     from clench.execution.trajectory import Trajectory, plan_trajectory
     from clench.grasp.approach import approach_poses
-    from clench.grasp.criteria import Criterion
+    from clench.grasp.calibration import Calibration, load_calibration
+    from clench.grasp.criteria import Criterion, HandCriterion
+    from clench.grasp.criterion_registry import register_criterion
     from clench.grasp.self_check import check_hand
     from clench.models.command import ClosingOrder, GraspCommand
     from clench.models.command_file import load_command
@@ -49,6 +51,7 @@ _HOMES = {
     "Actuator": "clench.execution.executing",
     "Body": "clench.models.objects.grasp_object",
     "BodyRole": "clench.models.objects.grasp_object",
+    "Calibration": "clench.grasp.calibration",
     "Candidate": "clench.solve.solution",
     "ClenchError": "clench.base.errors",
     "ClosingOrder": "clench.models.command",
@@ -71,6 +74,7 @@ _HOMES = {
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspSolution": "clench.solve.solution",
     "Hand": "clench.models.hand.hand",
+    "HandCriterion": "clench.grasp.criteria",
     "HandDriver": "clench.execution.driver",
     "HandError": "clench.base.errors",
     "HandState": "clench.execution.driver",
@@ -90,9 +94,11 @@ _HOMES = {
     "approach_poses": "clench.grasp.approach",
     "check_hand": "clench.grasp.self_check",
     "execute": "clench.execution.executing",
+    "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
     "plan_trajectory": "clench.execution.trajectory",
     "pose_error": "clench.solve.pose_error",
+    "register_criterion": "clench.grasp.criterion_registry",
     "sensitivity": "clench.solve.sensitivity",
 }
 
@@ -100,6 +106,7 @@ __all__ = [
     "Actuator",
     "Body",
     "BodyRole",
+    "Calibration",
     "Candidate",
     "ClenchError",
     "ClosingOrder",
@@ -122,6 +129,7 @@ __all__ = [
     "GraspObject",
     "GraspSolution",
     "Hand",
+    "HandCriterion",
     "HandDriver",
     "HandError",
     "HandState",
@@ -142,9 +150,11 @@ __all__ = [
     "approach_poses",
     "check_hand",
     "execute",
+    "load_calibration",
     "load_command",
     "plan_trajectory",
     "pose_error",
+    "register_criterion",
     "sensitivity",
     "solve",
 ]

@@ -108,6 +108,14 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["execute", "absent.json"], "clench: error: absent.json: no such file."),
         (["record", "absent.db"], "clench: error: absent.db: no such record."),
         (["solve", "--hand", "robonaut2", "--object", "absent.obj"], "clench: error: "),
+        (
+            ["solve", "--hand", "robonaut2", "--object", "ball", "--criteria", "stedy"],
+            "clench: error: Preset 'stedy' is not in clench; a file is named with its ending. Did you mean 'steady'?",
+        ),
+        (
+            ["solve", "--hand", "robonaut2", "--object", "ball", "--criteria", "absent.toml"],
+            "clench: error: absent.toml: no such calibration file; presets, by name alone: balanced, gentle, quick",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -215,6 +223,53 @@ def test_solve_with_a_command_file(solver: FakeSolver, tmp_path: Path) -> None:
     assert main([*SOLVE, "--command", str(file), "--planes", "2"]) == 0
     assert [c.planes for c in solver.commands] == [7, 2]
     assert solver.commands[0].hand_pose == clench.Pose([0, 0, 1])
+
+
+CHOICE = {
+    "calibration": "quick",
+    "criteria": {
+        "range_of_motion": {"weight": 1.0, "scale": 2.0, "limit": 3.0, "unit": "rad", "better": "less", "source": "x"}
+    },
+    "unused": ["next_step_time"],
+    "text": "The chosen sets lead.",
+    "total": -0.3,
+    "hand_scores": {},
+    "combinations_tried": 0,
+    "runner_up": None,
+    "fingers": {
+        "index": {
+            "text": "the full width leads plane 1 by [0.1].",
+            "runner_up": 0,
+            "lead": 0.1,
+            "totals": [-0.4, -0.9, -0.3],
+            "pareto": [2],
+            "closed_again": True,
+        }
+    },
+}
+
+
+def test_solve_explains_its_choice(
+    solver: FakeSolver, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    solver.answer = make_solution(choice=CHOICE)
+    assert main([*SOLVE, "--explain", "--criteria", "quick"]) == 0
+    assert solver.commands[0].criteria == "quick"
+    lines = [" ".join(line.replace("│", " ").split()) for line in capsys.readouterr().out.splitlines()]
+    assert "range_of_motion rad less 1 2 3" in lines
+    assert "*P full 0 0.3 -0.3000 touch" in lines
+    assert "2 plane 1 0 0.3 -0.4000 limit" in lines
+    assert "x plane 2 0 0.3 -0.9000 touch" in lines
+    assert "index: the full width leads plane 1 by [0.1]." in lines
+    assert "said nothing about any set: next_step_time" in lines
+    assert "The chosen sets lead." in lines
+    assert any("closed again" in line for line in lines)
+
+
+def test_a_solution_without_a_choice_says_so(solver: FakeSolver, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SOLVE, "--explain"]) == 0
+    assert "does not say how its sets were chosen" in capsys.readouterr().out
 
 
 def test_solve_writes_files_and_record(

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from clench.base.errors import CommandError, FileError
-from clench.execution.trajectory import DEFAULT_SPEED, Trajectory, plan_trajectory
-from clench.models.hand.hand import Coupling, Hand, Joint, JointRole
+from clench.execution.trajectory import Trajectory, plan_trajectory
+from clench.models.hand.hand import DEFAULT_SPEED, Coupling, Hand, Joint, JointRole
 from clench.solve.solution import GraspSolution
 
 

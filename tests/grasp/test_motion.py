@@ -7,7 +7,7 @@ import pytest
 from small_chain import CLOSING, POSTURE, chain
 
 from clench.base.pose import Pose
-from clench.grasp.motion import alternatives, asked_fingers, decompose, open_posture, palm_pose
+from clench.grasp.motion import alternatives, asked_fingers, decompose, next_postures, open_posture, palm_pose
 from clench.models.command import GraspCommand
 
 
@@ -63,6 +63,26 @@ def test_alternatives_stay_inside_limits_and_none_comes_twice():
     hand = chain([POSTURE, CLOSING], lower=-0.1, upper=0.5)
     found = alternatives(hand, hand.fingers[0], np.zeros(2), command(yaw_grid=(0.0, 0.6, 0.5, 0.9)))
     np.testing.assert_allclose(found, [[0, 0], [0.5, 0]])
+
+
+def test_opposition_varies_the_first_posture_joint_of_a_thumb_alone():
+    asked = command(opposition_grid=(0.3, -0.3), yaw_grid=(0.1,))
+    thumb = chain([POSTURE, POSTURE, CLOSING], names=("thumb",))
+    found = alternatives(thumb, thumb.fingers[0], np.zeros(3), asked)
+    np.testing.assert_allclose(found, [[o, y, 0.0] for o in (0.0, 0.3, -0.3) for y in (0.0, 0.1)])
+    finger = chain([POSTURE, POSTURE, CLOSING])
+    np.testing.assert_allclose(alternatives(finger, finger.fingers[0], np.zeros(3), asked), [[0, 0, 0], [0, 0.1, 0]])
+    one = chain([POSTURE, CLOSING], names=("thumb",))
+    found = alternatives(one, one.fingers[0], np.zeros(2), asked)
+    np.testing.assert_allclose(sorted(q[0] for q in found), [-0.3, -0.2, 0.0, 0.1, 0.3, 0.4])
+
+
+def test_next_steps_leave_joints_alone_that_they_do_not_name_and_carry_followers():
+    hand = chain([POSTURE, CLOSING, CLOSING, CLOSING], couplings=[(1, 2, 0.5)])
+    steps = next_postures(hand, command(next_steps=({"j1": 0.4, "j2": 0.9}, {"j3": 0.1}, {})))
+    np.testing.assert_array_equal(steps[0], [np.nan, 0.4, 0.2, np.nan])
+    np.testing.assert_array_equal(steps[1], [np.nan, np.nan, np.nan, 0.1])
+    assert np.isnan(steps[2]).all()
 
 
 def test_without_a_posture_joint_before_the_closing_ones_there_is_no_yaw():

@@ -40,7 +40,9 @@ def test_a_full_file_is_read_and_written_back(tmp_path):
         "check_sets": True,
         "measure": False,
         "collision_source": "raw",
+        "opposition_grid": [0.0, 0.2],
         "criteria": {"range_of_motion": 1, "limit_distance": 0.5},
+        "next_steps": [{"index_yaw": 0.1}, {}],
         "seed": 7,
     }
     assert set(document) == set(KEYS)
@@ -66,6 +68,14 @@ def test_a_calibration_file_is_looked_for_beside_the_command(tmp_path):
     path = tmp_path / "c.json"
     path.write_text(json.dumps({"hand_pose": POSE, "criteria": "weights.toml"}))
     assert load_command(path).criteria == tmp_path / "weights.toml"
+
+
+def test_a_name_without_an_ending_is_a_preset(tmp_path):
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps({"hand_pose": POSE, "criteria": "steady"}))
+    command = load_command(path)
+    assert command.criteria == "steady"
+    assert command_to_dict(command)["criteria"] == "steady"
 
 
 @pytest.mark.parametrize(
@@ -103,6 +113,11 @@ def test_a_calibration_file_is_looked_for_beside_the_command(tmp_path):
         ("collision_source", "mesh", "collision_source: expected one of engine, raw, visual"),
         ("criteria", {"range_of_motion": "high"}, "criteria.range_of_motion: expected a weight, got 'high'"),
         ("criteria", 4, "criteria: expected an object"),
+        ("criteria", "", "criteria: expected a name"),
+        ("next_steps", {"index_yaw": 0.1}, "next_steps: expected a list of postures"),
+        ("next_steps", [0.1], "next_steps[0]: expected an object"),
+        ("next_steps", [{}, {"index_yaw": None}], "next_steps[1].index_yaw: expected a number in rad"),
+        ("opposition_grid", [], "opposition_grid: expected a list of at least one number"),
         ("seed", "one", "seed: expected a whole number"),
         ("plane", 3, "plane: unknown key; did you mean 'planes'?"),
     ],
@@ -207,6 +222,9 @@ def test_check_accepts_what_the_hand_has():
         ({"yaw_grid": ()}, CommandError, "yaw_grid: expected a list"),
         ({"open_variants": (np.inf,)}, CommandError, "open_variants[0]: expected a number"),
         ({"order": "sideways"}, CommandError, "order: expected one of"),
+        ({"next_steps": ({"indx_yaw": 0.1},)}, UnknownNameError, "Joint 'indx_yaw' is not in hand 'small'."),
+        ({"next_steps": ({}, {"index_yaw": 0.31})}, CommandError, "next_steps[1].index_yaw: 0.31 rad is outside"),
+        ({"opposition_grid": (np.nan,)}, CommandError, "opposition_grid[0]: expected a number"),
         ({"criteria": {"range_of_motion": None}}, CommandError, "criteria.range_of_motion: expected a weight"),
     ],
 )
@@ -214,6 +232,10 @@ def test_check_refuses_what_the_hand_has_not(change, error, words):
     with pytest.raises(error) as caught:
         check_command(small_hand(), replace(GraspCommand(Pose()), **change))
     assert str(caught.value).startswith(words), str(caught.value)
+
+
+def test_a_step_may_name_followers_which_a_whole_posture_has():
+    check_command(small_hand(), GraspCommand(Pose(), next_steps=({"index_proximal": 0.2, "index_distal": 0.2},)))
 
 
 def test_a_limit_itself_is_inside_and_numpy_numbers_are_numbers():

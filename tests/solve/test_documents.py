@@ -66,6 +66,12 @@ def test_round_trip_keeps_every_bit(number: float, vector: list[float], text: st
     assert again == solution
 
 
+def test_the_choice_comes_back(tmp_path: Path) -> None:
+    choice = {"text": "x", "fingers": {"index": {"totals": [0.5, -1.0], "pareto": [1], "runner_up": None}}}
+    make_solution(choice=choice).save(tmp_path / "s.json")
+    assert GraspSolution.load(tmp_path / "s.json").choice == choice
+
+
 def test_numpy_values_become_plain_ones() -> None:
     solution = make_solution(
         seed=np.int64(3),

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.models.hand.hand import Hand
+from clench.models.hand.hand import DEFAULT_SPEED, Hand
 
 from .driver import DriverLimits, HandState, JointPath, RefusedCommandError
 from .joint_map import MappedJoint
-from .trajectory import DEFAULT_SPEED
 
 #: Files, and conversions to other units, round: what limits may be passed by, as a fraction of their range [-].
 ROUNDING = 1e-6

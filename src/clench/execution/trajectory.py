@@ -14,12 +14,10 @@ from clench.base.errors import CommandError, FileError
 from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
 from clench.models.command import ClosingOrder
-from clench.models.hand.hand import Hand, JointRole
+from clench.models.hand.hand import DEFAULT_SPEED, Hand, JointRole
 from clench.solve.solution import GraspSolution
 
 SCHEMA = "clench.trajectory/1"
-#: Speed of joints whose model gives no limit [rad/s].
-DEFAULT_SPEED = 2.0
 #: Way-points per stage; speed rises from zero and falls to zero within each.
 STAGE_STEPS = 8
 #: Joints that move less than this stand still [rad].

@@ -1,23 +1,167 @@
-"""Choose the best set of each finger (METHOD.md section 6)."""
+"""Choose the best set of every finger, and of all of them together (METHOD.md section 6)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from .calibration import Calibration
 from .candidates import FingerCandidate
-from .criteria import weigh
+from .combinations import Combination, best_combination
+from .criteria import Criterion, HandCriterion, Setting
+from .criterion_registry import checked_value, find_criterion, score_sets
+
+#: What puts one set before another, whatever their scores, strongest first; as `tier` lists them.
+TIERS = (
+    "may be taken",
+    "passes through nothing on any plane",
+    "touches the object",
+    "is inside the limits of the calibration",
+    "has a value for every criterion",
+)
+
+#: Sets whose angles [rad] agree to so many decimals are the same for the choice, and sums that do are equal.
+_SAME_DIGITS = 9
 
 
-def choose(candidates: Sequence[FingerCandidate], weights: Mapping[str, float]) -> int:
-    """Return the index of the best candidate.
+@dataclass(frozen=True, eq=False)
+class FingerChoice:
+    """Hold how the sets of one finger compare.
 
-    A set that is known to be infeasible is never chosen before one that is not; one that passes through nothing on
-    any plane goes before one that does; one that touches goes before one that does not. The weighted scores decide
-    among the rest; ties go to the full width, then to the first.
+    Args:
+        tiers: per set, what it fulfils of `TIERS`. totals: per set, the weighted sum of its scores [-].
+        order: indices of the sets, best first. equals: of those that fulfil as much as the best, and whose joint
+            angles differ, best first: the scores decide among them. chosen: index.
     """
 
-    def rank(i: int) -> tuple[bool, bool, bool, float, bool, int]:
-        c = candidates[i]
-        return c.feasible is not False, c.clear, bool(c.holding), weigh(c.scores, weights), c.plane is None, -i
+    tiers: tuple[tuple[bool, ...], ...]
+    totals: tuple[float, ...]
+    order: tuple[int, ...]
+    equals: tuple[int, ...]
+    chosen: int
 
-    return max(range(len(candidates)), key=rank)
+
+@dataclass(frozen=True, eq=False)
+class HandChoice:
+    """Hold the choice over all fingers.
+
+    Args:
+        fingers: one per finger. calibration: what counted. used, unused: names of its criteria that did, and of those
+            that said nothing about any set. hand_scores: values of the hand's criteria for the chosen sets.
+        runner_up: the second best combination, as indices, with its total and hand scores; None when there is none.
+        total: weighted sum over the chosen sets [-]. tried: how many combinations were compared; 0 when no criterion
+            is about the whole hand, and every finger has its own best.
+    """
+
+    fingers: tuple[FingerChoice, ...]
+    calibration: Calibration
+    used: tuple[str, ...]
+    unused: tuple[str, ...]
+    hand_scores: Mapping[str, float]
+    runner_up: Combination | None
+    total: float
+    tried: int
+
+    @property
+    def chosen(self) -> list[int]:
+        """Index of the chosen set of every finger."""
+        return [finger.chosen for finger in self.fingers]
+
+
+def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration, setting: Setting) -> HandChoice:
+    """Return the best set of every finger; the sets' scores are filled on the way.
+
+    A set that is known to be infeasible is never chosen before one that is not, and so on down `TIERS`. The weighted
+    scores decide among the rest; ties go to the full width, then to the first. Where no criterion is about the whole
+    hand, the best of every finger is the best of all; else see `best_combination`.
+
+    Args:
+        groups: sets of every finger. calibration: what counts. setting: what they are judged in.
+    """
+    criteria = {name: find_criterion(name, calibration.name) for name in calibration.criteria}
+    of_finger = [name for name, c in criteria.items() if isinstance(c, Criterion)]
+    for group in groups:
+        score_sets(group, of_finger, setting)
+    fingers = [_compare(group, of_finger, calibration) for group in groups]
+    of_hand = {name: c for name, c in criteria.items() if isinstance(c, HandCriterion)}
+    judge = _HandJudge(groups, fingers, of_hand, calibration, setting)
+    known = {name for group in groups for c in group for name in c.scores}
+    if of_hand:
+        best, second, tried = best_combination([finger.equals for finger in fingers], judge)
+        known |= set(best.scores)
+        fingers = [replace(finger, chosen=i) for finger, i in zip(fingers, best.sets, strict=True)]
+    else:
+        best, second, tried = judge(tuple(finger.chosen for finger in fingers)), _next_best(fingers, judge), 0
+    return HandChoice(
+        tuple(fingers),
+        calibration,
+        tuple(name for name in criteria if name in known),
+        tuple(name for name in criteria if name not in known),
+        best.scores,
+        second,
+        best.total,
+        tried,
+    )
+
+
+def _compare(group: Sequence[FingerCandidate], names: Sequence[str], calibration: Calibration) -> FingerChoice:
+    """Rank the sets of one finger by what they fulfil, then by their weighted scores."""
+    said = [name for name in names if any(name in c.scores for c in group)]
+    tiers = tuple(_tier(c, said, calibration) for c in group)
+    totals = tuple(sum(calibration.worth(n, c.scores[n]) for n in said if n in c.scores) for c in group)
+    # Rounded, so that sets that are equal but for rounding come in the order of the alternatives.
+    rank = [(tiers[i], round(totals[i], _SAME_DIGITS), c.plane is None, -i) for i, c in enumerate(group)]
+    order = sorted(range(len(group)), key=rank.__getitem__, reverse=True)
+    best = [i for i in order if tiers[i] == tiers[order[0]]]
+    different = {group[i].q.round(_SAME_DIGITS).tobytes(): i for i in reversed(best)}
+    return FingerChoice(tiers, totals, tuple(order), tuple(i for i in best if i in different.values()), order[0])
+
+
+def _tier(c: FingerCandidate, said: Sequence[str], calibration: Calibration) -> tuple[bool, ...]:
+    """Say what a set fulfils of `TIERS`."""
+    return (
+        c.feasible is not False,
+        c.clear,
+        bool(c.holding),
+        all(calibration.allows(name, c.scores.get(name)) for name in said),
+        all(name in c.scores for name in said),
+    )
+
+
+def _next_best(fingers: Sequence[FingerChoice], judge: _HandJudge) -> Combination | None:
+    """Return the second best combination of sums: it differs in the finger whose best leads its second by least."""
+    rivals = [(f.totals[f.equals[0]] - f.totals[f.equals[1]], k) for k, f in enumerate(fingers) if len(f.equals) > 1]
+    if not rivals:
+        return None
+    _, k = min(rivals)
+    return judge(tuple(f.equals[1] if n == k else f.chosen for n, f in enumerate(fingers)))
+
+
+class _HandJudge:
+    """Judge combinations of sets: the sums of their fingers, and the criteria that are about the whole hand."""
+
+    def __init__(
+        self,
+        groups: Sequence[Sequence[FingerCandidate]],
+        fingers: Sequence[FingerChoice],
+        criteria: Mapping[str, HandCriterion],
+        calibration: Calibration,
+        setting: Setting,
+    ) -> None:
+        self._groups, self._fingers, self._criteria = groups, fingers, criteria
+        self._calibration, self._setting = calibration, setting
+
+    def __call__(self, sets: tuple[int, ...]) -> Combination:
+        """Return a combination with its scores and total."""
+        total = float(np.sum([f.totals[i] for f, i in zip(self._fingers, sets, strict=True)]))
+        chosen = [group[i] for group, i in zip(self._groups, sets, strict=True)]
+        scores = {}
+        for name, criterion in self._criteria.items():
+            value = criterion.score_hand(chosen, self._setting)
+            if value is not None:
+                scores[name] = checked_value(criterion, value)
+                total += self._calibration.worth(name, scores[name])
+        allowed = all(self._calibration.allows(name, scores.get(name)) for name in scores)
+        return Combination(sets, scores, allowed, total)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,23 +39,42 @@ def asked_fingers(hand: Hand, command: GraspCommand) -> tuple[Finger, ...]:
 def alternatives(hand: Hand, finger: Finger, q: FloatArray, command: GraspCommand) -> list[FloatArray]:
     """Return the open postures to try for a finger, the commanded one first, each inside the limits, shape (J,).
 
-    The yaw grid offsets the finger's last posture joint before its closing joints; the open-value variants close the
-    finger's free joints by an offset before it starts.
+    The yaw grid offsets the finger's last posture joint before its closing joints, the opposition grid the first one
+    of a thumb; the open-value variants close the finger's free joints by an offset before it starts.
     """
     postures = [q]
-    yaw = _yaw_joint(hand, finger)
-    for turn in _with_zero(command.yaw_grid if yaw is not None else ()):
-        for curl in _with_zero(command.open_variants):
-            variant = q.copy()
-            if yaw is not None:
-                _shift(hand, variant, yaw, turn)
-            for j in finger.joints:
-                if hand.joints[j].role is JointRole.CLOSING:
-                    _shift(hand, variant, j, curl * hand.joints[j].direction)
-            variant = hand.coupled(variant)
-            if not any(np.array_equal(variant, p) for p in postures):
-                postures.append(variant)
+    first, last = _posture_joints(hand, finger)
+    turns = _with_zero(command.yaw_grid if last is not None else ())
+    oppositions = _with_zero(command.opposition_grid if first is not None and finger.is_thumb else ())
+    for opposition, turn, curl in itertools.product(oppositions, turns, _with_zero(command.open_variants)):
+        variant = q.copy()
+        if first is not None:
+            _shift(hand, variant, first, opposition)
+        if last is not None:
+            _shift(hand, variant, last, turn)
+        for j in finger.joints:
+            if hand.joints[j].role is JointRole.CLOSING:
+                _shift(hand, variant, j, curl * hand.joints[j].direction)
+        variant = hand.coupled(variant)
+        if not any(np.array_equal(variant, p) for p in postures):
+            postures.append(variant)
     return postures
+
+
+def next_postures(hand: Hand, command: GraspCommand) -> tuple[FloatArray, ...]:
+    """Return the postures of the next steps of the work, NaN for joints that a step leaves alone, shape (J,) each."""
+    postures = []
+    for step in command.next_steps:
+        q = np.full(len(hand.joints), np.nan)
+        for name, angle in step.items():
+            q[hand.joint_index(name)] = angle
+        for c in hand.couplings:
+            # A leader that is left alone leaves its followers alone.
+            q[c.follower] = np.clip(
+                c.ratio * q[c.leader] + c.offset, hand.joints[c.follower].lower, hand.joints[c.follower].upper
+            )
+        postures.append(q)
+    return tuple(postures)
 
 
 def decompose(hand: Hand, q: FloatArray) -> dict[str, dict[str, float]]:
@@ -68,17 +88,14 @@ def _with_zero(offsets: Sequence[float]) -> list[float]:
     return [0.0, *(o for o in offsets if o != 0.0)]
 
 
-def _yaw_joint(hand: Hand, finger: Finger) -> int | None:
-    before = None
-    for j in finger.joints:
-        if hand.joints[j].role is JointRole.CLOSING:
-            break
-        if hand.joints[j].role is JointRole.POSTURE:
-            before = j
+def _posture_joints(hand: Hand, finger: Finger) -> tuple[int | None, int | None]:
+    """Return the first and the last posture joint before a finger's closing joints; None where one may not move."""
+    before = list(itertools.takewhile(lambda j: hand.joints[j].role is not JointRole.CLOSING, finger.joints))
+    before = [j for j in before if hand.joints[j].role is JointRole.POSTURE]
     # A joint that another finger follows would move that finger too.
-    shared = any(c.leader == before and c.follower not in finger.joints for c in hand.couplings)
-    follows = any(c.follower == before for c in hand.couplings)
-    return None if shared or follows else before
+    tied = {c.leader for c in hand.couplings if c.follower not in finger.joints} | {c.follower for c in hand.couplings}
+    first, last = (before[0], before[-1]) if before else (None, None)
+    return (None if first in tied else first), (None if last in tied else last)
 
 
 def _shift(hand: Hand, q: FloatArray, joint: int, offset: float) -> None:

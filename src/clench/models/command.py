@@ -38,7 +38,9 @@ class GraspCommand:
         check_sets: measure the penetration of every alternative set, which costs more than the solve.
         measure: measure the penetration of the chosen set over the whole width, which costs as much as the solve.
         collision_source: geometry of the hand; None is the hand's default.
-        criteria: weights by criterion name; None is the default calibration. A path names a calibration file.
+        opposition_grid: offsets [rad] added to the thumb's first posture joint as alternatives.
+        criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.
+        next_steps: postures [rad] by joint name that the hand goes to after the grasp, for the criteria about them.
         seed: recorded with the result; nothing random depends on it.
     """
 
@@ -53,10 +55,12 @@ class GraspCommand:
     full_width: bool = True
     yaw_grid: tuple[float, ...] = (0.0,)
     open_variants: tuple[float, ...] = (0.0,)
+    opposition_grid: tuple[float, ...] = (0.0,)
     check_sets: bool = False
     measure: bool = True
     collision_source: CollisionSource | None = None
-    criteria: Mapping[str, float] | Path | None = None
+    criteria: Mapping[str, float] | Path | str | None = None
+    next_steps: tuple[Mapping[str, float], ...] = ()
     seed: int | None = None
 
     @classmethod

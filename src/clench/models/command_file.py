@@ -28,7 +28,8 @@ LIMIT_TOLERANCE: Final = 1e-9
 
 KEYS: Final = (
     *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "planes", "full_width"),
-    *("yaw_grid", "open_variants", "check_sets", "measure", "collision_source", "criteria", "seed"),
+    *("yaw_grid", "open_variants", "opposition_grid", "check_sets", "measure", "collision_source", "criteria"),
+    *("next_steps", "seed"),
 )
 
 
@@ -80,7 +81,7 @@ def command_to_dict(command: GraspCommand) -> dict[str, Any]:
         elif isinstance(value, Mapping):
             value = dict(value)
         elif isinstance(value, tuple):
-            value = list(value)
+            value = [dict(v) if isinstance(v, Mapping) else v for v in value]
         elif isinstance(value, (Path, StrEnum)):
             value = str(value)
         document[key] = value
@@ -105,6 +106,9 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     _count(command.planes, "planes")
     _numbers(command.yaw_grid, "yaw_grid", "offsets in rad")
     _numbers(command.open_variants, "open_variants", "offsets in rad")
+    _numbers(command.opposition_grid, "opposition_grid", "offsets in rad")
+    for i, step in enumerate(_steps(command.next_steps, "next_steps")):
+        _check_step(hand, step, f"next_steps[{i}]")
     if command.collision_source is not None:
         _choice(command.collision_source, CollisionSource, "collision_source")
     if isinstance(command.criteria, Mapping):
@@ -161,10 +165,12 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "full_width": _flag,
         "yaw_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
         "open_variants": lambda v, key: _numbers(v, key, "offsets in rad"),
+        "opposition_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
         "check_sets": _flag,
         "measure": _flag,
         "collision_source": lambda v, key: _choice(v, CollisionSource, key),
         "criteria": lambda v, key: _criteria(v, key, folder),
+        "next_steps": _steps,
         "seed": _whole,
     }
     # null stands for "not given" where the default is None.
@@ -246,9 +252,26 @@ def _choice(value: Any, choices: type[Choice], key: str) -> Choice:
     return choices(value)
 
 
-def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | Path:
+def _check_step(hand: Hand, step: Mapping[str, float], key: str) -> None:
+    """Check that a hand has the joints of a step, and can take its angles; followers obey their leaders anyway."""
+    followers = {coupling.follower for coupling in hand.couplings}
+    for name, angle in step.items():
+        joint = hand.joint_index(name)
+        if joint not in followers:
+            check_angle(hand, joint, angle, f"{key}.{name}")
+
+
+def _steps(value: Any, key: str) -> tuple[dict[str, float], ...]:
+    if not isinstance(value, (list, tuple)):
+        raise CommandError(f"{key}: expected a list of postures, got {_shown(value)}.")
+    return tuple(_weights(step, f"{key}[{i}]", "a number in rad") for i, step in enumerate(value))
+
+
+def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | Path | str:
     if isinstance(value, str):
-        path = Path(_text(value, key)).expanduser()
+        if not set(_text(value, key)) & set("./\\~"):
+            return value  # the name of a preset, not a file
+        path = Path(value).expanduser()
         return path if folder is None else folder / path
     return _weights(value, key, "a weight")
 

@@ -50,7 +50,7 @@ class Answer:
         fingers: candidates of each finger that closes. chosen: index of the chosen one of each.
         final: posture of the hand, shape (J,) [rad].
         at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the
-            end; None when not measured. certificate: what is promised.
+            end; None when not measured. certificate: what is promised. choice: why these sets, see `explain_choice`.
     """
 
     fingers: Sequence[Sequence[FingerCandidate]]
@@ -59,6 +59,7 @@ class Answer:
     at_start: Sequence[LinkDepth]
     at_end: Sequence[LinkDepth] | None
     certificate: Certificate
+    choice: Mapping[str, Any]
 
     @property
     def best(self) -> list[FingerCandidate]:
@@ -100,6 +101,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         max_penetration=None if answer.at_end is None else max((d.depth for d in answer.at_end), default=0.0),
         fingers=results,
         contacts=tuple(c for r in results.values() if r.candidates for c in r.candidates[r.chosen].contacts),
+        choice=answer.choice,
         timing=dict(timing),
         joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
     )

@@ -5,22 +5,24 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clench.base.errors import CommandError, HandError, ObjectError
 from clench.base.pose import FloatArray, Pose, invert
 from clench.grasp.blocking import start_overlaps
-from clench.grasp.calibration import weights_of
+from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, read_candidates
 from clench.grasp.choice import choose
 from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
-from clench.grasp.criteria import Setting, score_all
+from clench.grasp.criteria import Setting
+from clench.grasp.criterion_registry import score_sets
 from clench.grasp.depths import hand_depths
 from clench.grasp.exact import hand_bodies, pack_exact
+from clench.grasp.explaining import explain_choice
 from clench.grasp.feasibility import judge_sets
-from clench.grasp.motion import alternatives, asked_fingers, open_posture, palm_pose
+from clench.grasp.motion import alternatives, asked_fingers, next_postures, open_posture, palm_pose
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
 from clench.grasp.scene import PackedObject, pack_object
 from clench.grasp.sequence import close_in_sequence
@@ -80,7 +82,8 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     """
     clock = _Clock()
     problem = make_problem(hand, obj, command)
-    weights = weights_of(command.criteria)
+    calibration = calibration_of(command.criteria)
+    setting = make_setting(problem, calibration)
     clock.lap("read")
     plan, exact = _planned(problem)
     clock.lap("plan")
@@ -89,19 +92,21 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     overlaps = start_overlaps(hand, plan, closed, problem.packed, problem.T_palm_object, problem.source)
     candidates = read_candidates(hand, plan, problem.packed, closed, overlaps)
     judged = judge_sets(hand, candidates, problem.packed, problem.T_palm_object, problem.source, command.check_sets)
-    setting = Setting(hand, problem.start)
-    scored = [replace(c, scores=score_all(c, setting)) for c in judged]
-    fingers = group_by_finger(plan, scored)
-    chosen = [choose(group, weights) for group in fingers]
+    clock.lap("sets")
+    fingers = group_by_finger(plan, judged)
+    choice = choose(fingers, calibration, setting)
+    chosen, explained = choice.chosen, explain_choice(choice, fingers)
     clock.lap("choose")
     best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
     bodies = hand_bodies(hand, problem.source)
     again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, command.rounds, bodies)
     for k, (old, new) in enumerate(zip(best, again, strict=True)):
         if new is not old:
-            best[k] = fingers[k][chosen[k]] = replace(new, scores=score_all(new, setting), clear=old.clear)
+            best[k] = fingers[k][chosen[k]] = replace(new, clear=old.clear)
+            score_sets([best[k]], choice.used, setting)
+            explained["fingers"][new.plan.finger.name]["closed_again"] = True
     clock.lap("sequence")
-    answer = judge_answer(problem, fingers, chosen, best, exact)
+    answer = judge_answer(problem, fingers, chosen, best, exact, explained)
     clock.lap("judge")
     solution = assemble(answer, problem, clock.stages())
     if record is not None:
@@ -118,6 +123,27 @@ def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem
     source = CollisionSource(command.collision_source or hand.default_source)
     T_world_object = command.object_pose if command.object_pose is not None else obj.pose
     return Problem(hand, obj, command, start, source, palm_pose(hand, command, start), T_world_object, pack_object(obj))
+
+
+def make_setting(problem: Problem, calibration: Calibration) -> Setting:
+    """Return what the criteria judge sets in.
+
+    Raises:
+        UnknownNameError: the calibration weighs a joint that the hand does not have.
+    """
+    hand = problem.hand
+    weights = np.ones(len(hand.joints))
+    for name, weight in calibration.joints.items():
+        weights[hand.joint_index(name)] = weight
+    return Setting(
+        hand,
+        problem.start,
+        problem.packed,
+        problem.T_palm_object,
+        problem.source,
+        next_postures(hand, problem.command),
+        weights if calibration.joints else None,
+    )
 
 
 def plan_hand(problem: Problem) -> HandPlan:
@@ -141,6 +167,7 @@ def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
         command.full_width,
         tuple(command.yaw_grid),
         tuple(command.open_variants),
+        tuple(command.opposition_grid),
         problem.source,
     )
     kept = _plans.get(key)
@@ -202,6 +229,7 @@ def judge_answer(
     chosen: list[int],
     best: list[FingerCandidate],
     exact: ExactArrays,
+    explained: dict[str, Any],
 ) -> Answer:
     """Combine the best sets, and measure what overlaps at the start and at the end, over the whole width."""
     hand = problem.hand
@@ -214,7 +242,7 @@ def judge_answer(
     at_end = at_start if certificate.holds else None
     if at_end is None and problem.command.measure:
         at_end = hand_depths(hand, final, problem.packed, problem.T_palm_object, problem.source)
-    return Answer(fingers, chosen, final, at_start, at_end, certificate)
+    return Answer(fingers, chosen, final, at_start, at_end, certificate, explained)
 
 
 class _Clock:

@@ -97,6 +97,7 @@ class _SolutionForm(msgspec.Struct):
     object_collision_source: str = "raw"
     joint_limits: _Map = {}
     certificate: dict[str, Any] | None = None
+    choice: dict[str, Any] | None = None
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -129,6 +130,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "quality": _plain(s.quality),
         "squeeze": _plain(s.squeeze),
         "pregrasp": None if s.pregrasp is None else _numbers(s.pregrasp),
+        "choice": _plain(s.choice),
         "timing": _numbers(s.timing),
     }
 
@@ -182,6 +184,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         quality=form.quality,
         squeeze=form.squeeze,
         pregrasp=None if form.pregrasp is None else angles(form.pregrasp, "pregrasp"),
+        choice=form.choice,
         timing=angles(form.timing, "timing"),
         joint_limits={
             name: _convert(v, tuple[float, float], source, f"joint_limits.{name}")

@@ -142,6 +142,7 @@ class GraspSolution:
         joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
         certified, certificate: whether METHOD.md section 5 is promised, and ``"text"`` with what, or why not;
             ``"deviation"`` of what is swept as polyhedra [m].
+        choice: why these sets: what counted, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the whole width and all links [m], None when not computed.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
@@ -170,6 +171,7 @@ class GraspSolution:
     quality: Mapping[str, Any] | None = None
     squeeze: Mapping[str, Any] | None = None
     pregrasp: Mapping[str, float] | None = None
+    choice: Mapping[str, Any] | None = None
     timing: Mapping[str, float] = field(default_factory=dict)
     joint_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 

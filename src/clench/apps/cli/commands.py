@@ -53,10 +53,12 @@ def solve(
     collision_source: Source | None = None,
     planes: int | None = None,
     order: Order | None = None,
+    criteria: str | None = None,
     seed: int = 0,
     out: Path | None = None,
     record: Path | None = None,
     pose_error: tuple[float, float] | None = None,
+    explain: bool = False,
     strict: bool = False,
     json: bool = False,
 ) -> int:
@@ -72,10 +74,12 @@ def solve(
         collision_source: geometry of the hand to solve for.
         planes: curl planes per finger.
         order: in which the joints close.
+        criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
         seed: of the approach pose; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
         record: SQLite record to append the solution to.
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
+        explain: print the alternative sets with their scores, and why the chosen ones won.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """
@@ -85,7 +89,7 @@ def solve(
     import clench
     from clench.kernels.warming import warm_up
 
-    from .printing import print_pose_error, print_solution
+    from .printing import print_choice, print_pose_error, print_solution
     from .results import print_json, write_results
 
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
@@ -98,6 +102,8 @@ def solve(
         the_command = replace(the_command, planes=planes)
     if order is not None:
         the_command = replace(the_command, order=clench.ClosingOrder(order))
+    if criteria is not None:
+        the_command = replace(the_command, criteria=criteria)
     warm_up()
     solution = clench.solve(the_hand, the_object, the_command)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
@@ -116,6 +122,8 @@ def solve(
         print_solution(solution, [*the_hand.warnings, *the_object.warnings], files)
         if error is not None:
             print_pose_error(error)
+        if explain:
+            print_choice(solution)
     return exit_code(solution, strict)
 
 

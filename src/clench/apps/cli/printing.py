@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from clench.models.hand.report import HandReport
     from clench.solve.pose_error import PoseErrorReport
     from clench.solve.record import RecordEntry
-    from clench.solve.solution import FingerResult, GraspSolution
+    from clench.solve.solution import Candidate, FingerResult, GraspSolution
 
 
 def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequence[Path]) -> None:
@@ -112,6 +112,26 @@ def print_report(report: ExecutionReport) -> None:
     _sentences(console, "note", report.notes)
 
 
+def print_choice(solution: GraspSolution) -> None:
+    """Print what counted, the sets of every finger, and the sentences; nothing where the solution does not say."""
+    out, choice = _console(), solution.choice
+    if choice is None:
+        out.print("The solution does not say how its sets were chosen.")
+        return
+    out.print(_criteria_table(choice))
+    if choice["unused"]:
+        out.print(f"said nothing about any set: {_plain(', '.join(choice['unused']))}")
+    for name, finger in solution.fingers.items():
+        if name in choice["fingers"]:
+            out.print(_finger_table(finger, choice))
+            out.print(_plain(f"{name}: {choice['fingers'][name]['text']}"))
+            if choice["fingers"][name]["closed_again"]:
+                out.print(_plain(f"{name} met another finger and was closed again; its sum is that of before."))
+    for name, value in choice["hand_scores"].items():
+        out.print(_plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
+    out.print(f"[bold]{_plain(choice['text'])}[/bold]")
+
+
 def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
     """Print a list of recorded solves."""
     console = _console()
@@ -140,6 +160,37 @@ def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tup
     plane = "full width" if chosen.plane is None else f"plane {chosen.plane + 1}"
     angles = " ".join(f"{np.rad2deg(a):.1f}" for a in chosen.joint_angles.values())
     return name, finger.status.value, plane, ", ".join(links) or finger.reason, angles
+
+
+def _criteria_table(choice: Mapping[str, Any]) -> Table:
+    result = _table(
+        f"criteria ({choice['calibration']})", "criterion", "unit", "better", "weight", "counts as 1", "limit"
+    )
+    for name, c in choice["criteria"].items():
+        limit = "" if c["limit"] is None else f"{c['limit']:g}"
+        result.add_row(*map(_plain, (name, c["unit"], c["better"], f"{c['weight']:g}", f"{c['scale']:g}", limit)))
+    return result
+
+
+def _finger_table(finger: FingerResult, choice: Mapping[str, Any]) -> Table:
+    """List a finger's sets: the scores that counted, the weighted sum, and how each ended."""
+    said = choice["fingers"][finger.name]
+    names = [n for n in choice["criteria"] if any(n in c.scores for c in finger.candidates)]
+    title = f"{finger.name} (* chosen, 2 runner-up, P on the Pareto front, x may not be taken)"
+    result = _table(title, "", "set", "posture", *(n.replace("_", " ") for n in names), "sum", "status")
+    for i, candidate in enumerate(finger.candidates):
+        mark = "*" if i == finger.chosen else "2" if i == said["runner_up"] else ""
+        mark += "P" if i in said["pareto"] else ""
+        mark += "x" if candidate.feasible is False else ""
+        where = "full" if candidate.plane is None else f"plane {candidate.plane + 1}"
+        scores = [_score(candidate, name) for name in names]
+        row = (mark, where, str(candidate.posture), *scores, f"{said['totals'][i]:.4f}", candidate.status.value)
+        result.add_row(*map(_plain, row))
+    return result
+
+
+def _score(candidate: Candidate, name: str) -> str:
+    return f"{candidate.scores[name]:.4g}" if name in candidate.scores else ""
 
 
 def _console() -> Console:

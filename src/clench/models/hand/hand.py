@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from clench.base.pose import FloatArray, rotation_about
 from clench.models.shapes import CollisionSource, Shape
 
 from .findings import Finding, Severity
+
+#: Speed of joints whose model gives no limit [rad/s].
+DEFAULT_SPEED: Final = 2.0
 
 
 class JointRole(StrEnum):

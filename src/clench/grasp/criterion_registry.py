@@ -1,0 +1,140 @@
+"""The criteria that exist: ours, those that users register, and those of installed packages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Final
+
+from clench.base.errors import CommandError, UnknownNameError
+
+from .candidates import FingerCandidate
+from .criteria import Criterion, HandCriterion, Setting
+from .finger_criteria import (
+    LimitDistance,
+    NextStepDistance,
+    NextStepTime,
+    PadIndentation,
+    RangeOfMotion,
+    TouchingLinks,
+)
+
+#: Installed packages name their criteria under this group of entry points: `name = "module:Class"`.
+ENTRY_POINTS: Final = "clench.criteria"
+#: Scored for every set, whatever the weights: they cost next to nothing, and readers of a solution expect them.
+ALWAYS: Final = ("range_of_motion", "touching_links", "limit_distance")
+
+_MEMBERS: Final = ("name", "unit", "source", "scale", "larger_is_better")
+_registry: dict[str, Criterion | HandCriterion] = {
+    c.name: c
+    for c in (
+        RangeOfMotion(),
+        TouchingLinks(),
+        LimitDistance(),
+        NextStepTime(),
+        NextStepDistance(),
+        PadIndentation(),
+    )
+}
+
+
+def register_criterion(criterion: Criterion | HandCriterion) -> None:
+    """Add a criterion, or replace the one of the same name.
+
+    Raises:
+        CommandError: it lacks a member of `Criterion` or `HandCriterion`, or its scale is not above 0.
+    """
+    what = type(criterion).__name__
+    missing = [name for name in _MEMBERS if not hasattr(criterion, name)]
+    if not isinstance(criterion, Criterion | HandCriterion):
+        missing = missing or ["score (or score_hand)"]
+    if missing:
+        raise CommandError(f"criterion {what}: has no {', '.join(missing)}; see clench.Criterion.")
+    if not (math.isfinite(criterion.scale) and criterion.scale > 0.0):
+        raise CommandError(f"criterion {what}: scale: expected a number above 0, got {criterion.scale!r}.")
+    _registry[criterion.name] = criterion
+
+
+def criterion_names() -> tuple[str, ...]:
+    """Return the names of all criteria, those of installed packages included."""
+    _load_installed()
+    return tuple(_registry)
+
+
+def find_criterion(name: str, source: str) -> Criterion | HandCriterion:
+    """Return a criterion by name; installed packages are looked at only for names that are not known yet.
+
+    Raises:
+        UnknownNameError: there is none; `source` says where it was named.
+    """
+    if name not in _registry:
+        _load_installed()
+    if name not in _registry:
+        raise UnknownNameError("criterion", name, source, _registry)
+    return _registry[name]
+
+
+@cache
+def _load_installed() -> None:
+    """Register the criteria of installed packages.
+
+    Raises:
+        CommandError: one that cannot be loaded.
+    """
+    from importlib.metadata import entry_points
+
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            criterion = point.load()()
+        except Exception as error:  # whatever a package of somebody else raises
+            raise CommandError(
+                f"criterion '{point.name}' of package '{point.value}' cannot be loaded: {error}."
+            ) from None
+        register_criterion(criterion)
+
+
+def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: Setting) -> None:
+    """Fill the scores of sets: those always given, and those named; a criterion that says nothing gives none.
+
+    Raises:
+        CommandError: a criterion gave a value that is not a finite number.
+    """
+    wanted = dict.fromkeys([*ALWAYS, *names])
+    criteria = [c for c in map(_registry.__getitem__, wanted) if isinstance(c, Criterion)]
+    for candidate in candidates:
+        for criterion in criteria:
+            value = criterion.score(candidate, setting)
+            if value is not None:
+                candidate.scores[criterion.name] = checked_value(criterion, value)
+
+
+def checked_value(criterion: Criterion | HandCriterion, value: float) -> float:
+    """Return what a criterion gave as a plain number.
+
+    Raises:
+        CommandError: it is not a finite number.
+    """
+    number = float(value)
+    if not math.isfinite(number):
+        raise CommandError(f"criterion '{criterion.name}': gave {value!r}; expected a finite number or None.")
+    return number
+
+
+def check_numbers(values: Mapping[str, float], source: str, least: float, above: bool) -> dict[str, float]:
+    """Return numbers by criterion whose names exist and which are finite and not too small.
+
+    Args:
+        values: by criterion. source: names them in messages. least: smallest allowed. above: it is not allowed itself.
+
+    Raises:
+        UnknownNameError: no such criterion. CommandError: a number that is too small or not finite.
+    """
+    for name, value in values.items():
+        find_criterion(name, source)
+        if not math.isfinite(value) or value < least or (above and value == least):
+            expected = (
+                "a finite number" if math.isinf(least) else f"a number {'above' if above else 'of at least'} {least:g}"
+            )
+            raise CommandError(f"{source}.{name}: expected {expected}, got {value!r}.")
+    return {name: float(value) for name, value in values.items()}

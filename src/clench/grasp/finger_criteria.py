@@ -1,0 +1,124 @@
+"""The criteria of one finger's set (METHOD.md section 6)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from clench.models.hand.hand import DEFAULT_SPEED
+
+from .candidates import FingerCandidate
+from .criteria import Setting, own_angles
+
+
+class RangeOfMotion:
+    """Sum |Δq| from the start over the finger's own joints, weighted per joint: least motion is best."""
+
+    name: ClassVar[str] = "range_of_motion"
+    unit: ClassVar[str] = "rad"
+    source: ClassVar[str] = "US 9,067,319 B2: least range of motion"
+    scale: ClassVar[float] = 1.0
+    larger_is_better: ClassVar[bool] = False
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float:
+        """Return Σ |Δq| [rad]."""
+        moved = np.abs(own_angles(candidate, candidate.q - setting.start))
+        if setting.joint_weights is not None:
+            moved = moved * own_angles(candidate, setting.joint_weights)
+        return float(moved.sum())
+
+
+class TouchingLinks:
+    """Count the links that touch the object at the end: more links share the load."""
+
+    name: ClassVar[str] = "touching_links"
+    unit: ClassVar[str] = "links"
+    source: ClassVar[str] = "METHOD.md section 6"
+    scale: ClassVar[float] = 1.0
+    larger_is_better: ClassVar[bool] = True
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float:
+        """Return the number of touching links."""
+        return float(len({t.link for t in candidate.holding}))
+
+
+class LimitDistance:
+    """Measure how far the closing joints stay from their limits, as a fraction of their range, the nearest one."""
+
+    name: ClassVar[str] = "limit_distance"
+    unit: ClassVar[str] = "fraction of the range"
+    source: ClassVar[str] = "METHOD.md section 6"
+    scale: ClassVar[float] = 0.5
+    larger_is_better: ClassVar[bool] = True
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float:
+        """Return the least distance to a limit in the closing direction, 0 to 1."""
+        least = 1.0
+        for p in candidate.plan.joints:
+            joint = setting.hand.joints[p.joint]
+            limit = joint.upper if joint.direction > 0 else joint.lower
+            span = joint.upper - joint.lower
+            if span > 0.0:
+                least = min(least, abs(limit - candidate.q[p.joint]) / span)
+        return float(least)
+
+
+class NextStepTime:
+    """Time from the set to the next steps of the work at the joints' velocity limits: the finger's slowest joint."""
+
+    name: ClassVar[str] = "next_step_time"
+    unit: ClassVar[str] = "s"
+    source: ClassVar[str] = "US 9,067,319 B2: most efficient motion towards the next step of the work"
+    scale: ClassVar[float] = 0.5
+    larger_is_better: ClassVar[bool] = False
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float | None:
+        """Return Σ over the steps of max |Δq| / velocity [s]; None without next steps."""
+        joints = candidate.plan.finger.joints
+        speeds = np.array([setting.hand.joints[j].velocity or DEFAULT_SPEED for j in joints])
+        moves = _moves(candidate, setting)
+        return None if moves is None else float((moves / speeds).max(axis=1, initial=0.0).sum())
+
+
+class NextStepDistance:
+    """Motion from the set to the next steps of the work, over the finger's own joints."""
+
+    name: ClassVar[str] = "next_step_distance"
+    unit: ClassVar[str] = "rad"
+    source: ClassVar[str] = "US 9,067,319 B2: most efficient motion towards the next step of the work"
+    scale: ClassVar[float] = 1.0
+    larger_is_better: ClassVar[bool] = False
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float | None:
+        """Return Σ |Δq| over steps and joints [rad]; None without next steps."""
+        moves = _moves(candidate, setting)
+        return None if moves is None else float(moves.sum())
+
+
+def _moves(candidate: FingerCandidate, setting: Setting) -> np.ndarray | None:
+    """Return |Δq| of the finger's joints in every step, shape (S, joints) [rad]; joints not named stay."""
+    if not setting.steps:
+        return None
+    at = own_angles(candidate, candidate.q)
+    moves = []
+    for step in setting.steps:
+        named = own_angles(candidate, step)
+        then = np.where(np.isnan(named), at, named)
+        moves.append(np.abs(then - at))
+        at = then
+    return np.array(moves)
+
+
+class PadIndentation:
+    """Measure how deep the finger's pads are pressed in, where that was measured: hard parts come first without."""
+
+    name: ClassVar[str] = "pad_indentation"
+    unit: ClassVar[str] = "m"
+    source: ClassVar[str] = "METHOD.md section 5: pad allowance"
+    scale: ClassVar[float] = 1e-3
+    larger_is_better: ClassVar[bool] = False
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float | None:
+        """Return the depth along path and at the end [m]; None when not measured (`check_sets`)."""
+        return candidate.penetration
