@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
 LAYERS = ["base", "kernels", "models", "grasp", "solve", "execution", "apps"]
-HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "tyro", "rich", "PIL", "rclpy", "viser"}
+HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_FILE_LINES = 400

@@ -151,7 +151,7 @@ def test_tendons_are_kept(tmp_path) -> None:
     toml = '[tendons]\njoints = ["a", "b"]\nmoment_arms = [[0.01, 0.0], [0.0, -0.02]]\nt_min = 1.0\nt_max = 50.0\n'
     tendons = read_hand_file(written(tmp_path, toml, "over.toml")).tendons
     assert tendons is not None
-    assert (tendons.moment_arms[1], tendons.t_min, tendons.t_max) == ((0.0, -0.02), 1.0, 50.0)
+    assert (tendons.moment_arms[1], tendons.t_min, tendons.t_max) == ((0.0, -0.02), (1.0, 1.0), (50.0, 50.0))
 
 
 def test_a_contradicting_hand_file_is_refused(tmp_path) -> None:

@@ -15,6 +15,7 @@ from clench.base.pose import FloatArray, rotation_about
 from clench.models.shapes import CollisionSource, Shape
 
 from .findings import Finding, Severity
+from .tendons import TendonMap
 
 #: Speed of joints whose model gives no limit [rad/s].
 DEFAULT_SPEED: Final = 2.0
@@ -43,6 +44,7 @@ class Joint:
         reference: the angle [rad] at which `Link.T_parent_link` holds.
         velocity: limit [rad/s], or None when the model gives none.
         effort: limit [Nm], or None when the model gives none.
+        stiffness: gain of its position servo [Nm/rad], or None when the model has none.
         role, role_reason: what it does in a grasp, and why that was concluded.
         direction: +1 when its angle grows while the finger closes, else -1.
         direction_reason: why.
@@ -57,6 +59,7 @@ class Joint:
     reference: float = 0.0
     velocity: float | None = None
     effort: float | None = None
+    stiffness: float | None = None
     role: JointRole = JointRole.POSTURE
     role_reason: str = ""
     direction: int = 1
@@ -144,6 +147,7 @@ class Hand:
         palm_center: centroid of the finger bases in the palm frame [m]; palm_normal: mean closing direction
             of the tips, unit.
         default_source: the collision source used unless a command names one.
+        tendons: of the hand file, or else of the model; None when joints are driven by themselves.
         findings: what loading found wrong or worth knowing; `clench.check_hand` looks for more.
         spec_xml: MJCF or URDF text that MuJoCo compiles, with `assets`, for simulation: the model's own numbers, or
             six digits of them where other limbs were left out or drawn geometry had to collide.
@@ -161,6 +165,7 @@ class Hand:
     palm_center: FloatArray
     palm_normal: FloatArray
     default_source: CollisionSource = CollisionSource.ENGINE
+    tendons: TendonMap | None = None
     findings: tuple[Finding, ...] = ()
     spec_xml: str = ""
     assets: Mapping[str, bytes] = field(default_factory=dict)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clench.base.errors import FileError
+from clench.base.errors import FileError, HandError
 from clench.models.shapes import CollisionSource
 
 from .hand import JointRole
+from .tendons import TendonMap
 
 
 @dataclass(frozen=True)
@@ -44,16 +45,6 @@ class LinkOverride:
 
     pad_indentation: float = 0.0
     friction: float | None = None
-
-
-@dataclass(frozen=True)
-class TendonMap:
-    """State tendon tensions: torques of `joints` are `moment_arms` [m], one row a joint, times tensions [N]."""
-
-    joints: tuple[str, ...]
-    moment_arms: tuple[tuple[float, ...], ...]
-    t_min: float = 0.0
-    t_max: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -164,6 +155,8 @@ def _link(table: _Table) -> LinkOverride:
     for key, value in values.items():
         if value is not None and value < 0.0:
             raise table.error(key, "a number of at least 0", value)
+    if values["friction"] == 0.0:
+        raise table.error("friction", "a number above 0", 0.0)
     return LinkOverride(values["pad_indentation"] or 0.0, values["friction"])
 
 
@@ -188,9 +181,22 @@ def _tendons(top: _Table) -> TendonMap | None:
     ok = isinstance(rows, list) and len(rows) == len(joints) > 0 and width > 0
     if not ok or not all(isinstance(r, list) and len(r) == width and all(_is_number(x) for x in r) for r in rows or []):
         raise table.error("moment_arms", f"{len(joints)} rows (one a joint) of equally many numbers [m]", rows)
-    low, high = table.number("t_min") or 0.0, table.number("t_max")
+    low, high = (_tensions(table, key, missing, width) for key, missing in (("t_min", 0.0), ("t_max", math.inf)))
     arms = tuple(tuple(float(x) for x in row) for row in rows or [])
-    return TendonMap(joints, arms, low, math.inf if high is None else high)
+    try:
+        return TendonMap(joints, arms, low, high)
+    except HandError as error:
+        raise FileError(top.path, str(error)) from None
+
+
+def _tensions(table: _Table, key: str, missing: float, count: int) -> tuple[float, ...]:
+    """Return one number for every tendon: those of a list, or the same for all."""
+    value = table.data.get(key, missing)
+    if isinstance(value, list) and len(value) == count and all(_is_number(v) for v in value):
+        return tuple(float(v) for v in value)
+    if key in table.data and not _is_number(value):
+        raise table.error(key, f"a finite number, or a list of {count} (one a tendon) [N]", value)
+    return (float(value),) * count
 
 
 @dataclass(frozen=True)

@@ -144,6 +144,7 @@ def _joint(
         reference=reference,
         velocity=velocities.get(name),
         effort=effort,
+        stiffness=_stiffness(m, j),
     )
 
 
@@ -173,14 +174,33 @@ def _efforts(model: Any) -> dict[int, float]:
 
 def _actuator_force(model: Any, a: int) -> float:
     """Return the largest force of an actuator, infinite when the model gives no limit."""
+    return float(np.abs(actuator_forces(model, a)).max())
+
+
+def actuator_forces(model: Any, a: int) -> tuple[float, float]:
+    """Return the least and the largest force of an actuator, infinite when the model gives no limit."""
     import mujoco
 
     if model.actuator_forcelimited[a]:
-        return float(np.abs(model.actuator_forcerange[a]).max())
+        low, high = model.actuator_forcerange[a]
+        return float(low), float(high)
     motor = model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_NONE
     if motor and model.actuator_ctrllimited[a]:
-        return float(np.abs(model.actuator_ctrlrange[a]).max() * abs(model.actuator_gainprm[a, 0]))
-    return float("inf")
+        low, high = sorted(model.actuator_ctrlrange[a] * model.actuator_gainprm[a, 0])
+        return float(low), float(high)
+    return -float("inf"), float("inf")
+
+
+def _stiffness(model: Any, joint: int) -> float | None:
+    """Return the gain of a joint's position servo [Nm/rad], None when it has none."""
+    import mujoco
+
+    for a in range(model.nu):
+        if model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT and int(model.actuator_trnid[a, 0]) == joint:
+            gain, bias = float(model.actuator_gainprm[a, 0]), float(model.actuator_biasprm[a, 1])
+            if model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE and gain > 0.0 and bias == -gain:
+                return gain * float(model.actuator_gear[a, 0]) ** 2
+    return None
 
 
 def fixed_tendon(model: Any, tendon: int) -> list[tuple[int, float]]:

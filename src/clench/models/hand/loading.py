@@ -26,6 +26,7 @@ from .kinematics import Skeleton, build_skeleton
 from .model_files import ModelText, read_model
 from .palm import find_palm, hand_bodies
 from .roles import assign_roles
+from .tendons import TendonMap, model_tendons
 
 #: Tips whose mean closing direction is shorter oppose each other: the palm faces along the fingers [-].
 _OPPOSED = 0.4
@@ -67,6 +68,7 @@ def load_hand(
         palm_center=np.zeros(3),
         palm_normal=np.zeros(3),
         default_source=source,
+        tendons=_tendons(compiled, skeleton, overrides),
         findings=(*findings, *skeleton.findings, *found.findings, *reader.findings),
         spec_xml=compiled.xml,
         assets=text.assets,
@@ -141,6 +143,17 @@ def _links(skeleton: Skeleton, reader: ShapeReader, overrides: HandFile) -> tupl
             )
         )
     return tuple(links)
+
+
+def _tendons(compiled: CompiledModel, skeleton: Skeleton, overrides: HandFile) -> TendonMap | None:
+    """Return the tendons of the hand file, or else those of the model."""
+    names = [j.name for j in skeleton.joints]
+    if overrides.tendons is None:
+        return model_tendons(compiled.model, {j: names[k] for j, k in skeleton.joint_of_model.items()})
+    for name in overrides.tendons.joints:
+        if name not in names:
+            raise UnknownNameError("joint", name, f"the model (tendons.joints in {overrides.path})", names)
+    return overrides.tendons
 
 
 def _with_given_couplings(found: FoundCouplings, skeleton: Skeleton, overrides: HandFile, label: str) -> FoundCouplings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -35,6 +36,7 @@ class Body:
         role: graspable or obstacle.
         pieces: convex pieces that approximate it for simulation, in the object's frame; empty when not known.
         closed: every mesh is watertight with consistent outward winding, so one-sided contact tests are exact.
+        friction: sliding friction of its surface [-], or None when not known.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Body:
     role: BodyRole = BodyRole.GRASPABLE
     pieces: tuple[TriangleMesh, ...] = ()
     closed: bool = True
+    friction: float | None = None
 
     def moved(self, pose: Pose) -> Body:
         """Return the body with all of its geometry mapped by a pose."""
@@ -160,6 +163,16 @@ class GraspObject:
     def posed(self, pose: Pose) -> GraspObject:
         """Return the object at another `T_world_object`."""
         return replace(self, pose=pose)
+
+    def with_friction(self, friction: float) -> GraspObject:
+        """Return the object with a sliding friction [-] of all its surfaces.
+
+        Raises:
+            ObjectError: not a finite number above 0.
+        """
+        if not (math.isfinite(friction) and friction > 0.0):
+            raise ObjectError(f"{self.name}: friction: expected a finite number above 0, got {friction!r}.")
+        return replace(self, bodies=tuple(replace(body, friction=float(friction)) for body in self.bodies))
 
     def with_body(self, body: Body) -> GraspObject:
         """Return the object with one body more, e.g. an obstacle; see `table` for one."""

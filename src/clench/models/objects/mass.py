@@ -1,0 +1,74 @@
+"""Where the mass of an object is: its centre, its volume, and how far its surface is from the centre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.mesh import TriangleMesh
+
+from .grasp_object import Body, BodyRole, GraspObject
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Hold what a uniform density says about an object; obstacles are left out.
+
+    Args:
+        center: centre of mass in the object's frame [m], shape (3,).
+        volume: [m³].
+        length: largest distance of its surface from the centre of mass [m], the length scale of grasp wrenches.
+        exact: every body is closed; the convex hull stands in for those that are not.
+    """
+
+    center: FloatArray
+    volume: float
+    length: float
+    exact: bool
+
+
+def mass_properties(obj: GraspObject) -> MassProperties:
+    """Return centre of mass, volume and length scale of an object of uniform density."""
+    return _of_bodies(tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE))
+
+
+@lru_cache(maxsize=64)
+def _of_bodies(bodies: tuple[Body, ...]) -> MassProperties:
+    solids = [_solid(shape.to_mesh(), body.closed) for body in bodies for shape in body.shapes]
+    volumes = np.array([volume for _, volume, _ in solids])
+    centers = np.array([center for center, _, _ in solids])
+    weights = volumes if volumes.sum() > 0.0 else np.ones(len(volumes))
+    center = weights @ centers / weights.sum()
+    vertices = np.vstack([vertices for _, _, vertices in solids])
+    length = float(np.linalg.norm(vertices - center, axis=1).max())
+    return MassProperties(center, float(volumes.sum()), length, all(body.closed for body in bodies))
+
+
+def _solid(mesh: TriangleMesh, closed: bool) -> tuple[FloatArray, float, FloatArray]:
+    """Return centroid, volume and used vertices of a mesh; of its convex hull where it does not close."""
+    vertices = mesh.vertices[np.unique(mesh.triangles)]
+    middle = vertices.mean(axis=0)
+    if closed:
+        a, b, c = (mesh.vertices[mesh.triangles[:, k]] - middle for k in range(3))
+        volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+        if volumes.sum() > 0.0:
+            moment = (volumes[:, None] * (a + b + c) / 4.0).sum(axis=0)
+            return middle + moment / volumes.sum(), float(volumes.sum()), vertices
+    return (*_hull_solid(vertices, middle), vertices)
+
+
+def _hull_solid(vertices: FloatArray, middle: FloatArray) -> tuple[FloatArray, float]:
+    """Return centroid and volume of a convex hull; of flat vertices their mean, and no volume."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(vertices)
+    except QhullError:
+        return middle, 0.0
+    a, b, c = (vertices[hull.simplices[:, k]] - middle for k in range(3))
+    volumes = np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6.0
+    moment = (volumes[:, None] * (a + b + c) / 4.0).sum(axis=0)
+    return middle + moment / volumes.sum(), float(volumes.sum())
