@@ -30,7 +30,7 @@ def test_the_documented_keys_are_there(solution: GraspSolution) -> None:
         "joint_angles certified collision_source max_penetration fingers contacts quality squeeze pregrasp timing"
     )
     assert set(documented.split()) <= set(document)
-    assert set(document["fingers"]["index"]) == {"status", "reason", "chosen", "candidates"}
+    assert set(document["fingers"]["index"]) == {"status", "reason", "cause", "chosen", "candidates"}
     candidate = "plane offset order joint_angles feasible penetration scores contacts"
     assert set(candidate.split()) <= set(document["fingers"]["index"]["candidates"][0])
     contact = "finger link stops_joint plane offset kind passed position normal gap curve_angle link_angle"

@@ -16,6 +16,7 @@ from clench.grasp.motion import asked_fingers, decompose
 from clench.grasp.scene import hash_hand
 from clench.grasp.surface import nearest_body
 
+from .causes import finger_cause, no_closing_joint
 from .certificate import Certificate
 from .solution import (
     Candidate,
@@ -76,7 +77,8 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
     for finger in asked_fingers(hand, command):
         if finger.name not in results:
             text = f"{finger.name} has no closing joint."
-            results[finger.name] = FingerResult(finger.name, FingerStatus.NO_MOTION, text, 0, ())
+            cause = no_closing_joint(finger.name)
+            results[finger.name] = FingerResult(finger.name, FingerStatus.NO_MOTION, text, 0, (), cause)
     status, reason = _status(answer, results, problem)
     names = hand.joint_names
     return GraspSolution(
@@ -120,7 +122,8 @@ def _finger(answer: Answer, k: int, problem: Problem) -> FingerResult:
     candidates = tuple(_candidate(c, problem) for c in answer.fingers[k])
     best = candidates[answer.chosen[k]]
     name = answer.fingers[k][0].plan.finger.name
-    return FingerResult(name, best.status, best.reason, answer.chosen[k], candidates)
+    cause = finger_cause(answer.best[k], problem)
+    return FingerResult(name, best.status, best.reason, answer.chosen[k], candidates, cause)
 
 
 def _candidate(c: FingerCandidate, problem: Problem) -> Candidate:
@@ -198,15 +201,28 @@ def _status(
     touching = [r.name for r in results.values() if r.status is FingerStatus.TOUCH]
     if not touching:
         text = "No finger touches: " + " ".join(r.reason for r in results.values())
-        return SolutionStatus.NO_CONTACT, {"code": "no_contact", "text": text}
+        return SolutionStatus.NO_CONTACT, {"code": "no_contact", "text": text, **_causes(results)}
     listed = ", ".join(touching)
     if len(touching) == len(results):
         return SolutionStatus.GRASP, {"code": "all_touch", "text": f"Every finger touches: {listed}."}
     pair = _opposition(answer)
     if pair:
         text = f"{pair[0]} and {pair[1]} oppose each other; touching: {listed}."
-        return SolutionStatus.GRASP, {"code": "opposed", "text": text}
-    return SolutionStatus.PARTIAL, {"code": "some_touch", "text": f"Only some fingers touch: {listed}."}
+        return SolutionStatus.GRASP, {"code": "opposed", "text": text, **_causes(results)}
+    text = f"Only some fingers touch: {listed}."
+    return SolutionStatus.PARTIAL, {"code": "some_touch", "text": text, **_causes(results)}
+
+
+def _causes(results: Mapping[str, FingerResult]) -> dict[str, Any]:
+    """Return why fingers do not touch, by name; and which of them ends nearest to the object, and how far."""
+    causes = {name: r.cause for name, r in results.items() if r.cause is not None}
+    found: dict[str, Any] = {"fingers": {name: cause["code"] for name, cause in causes.items()}}
+    away = {name: cause["distance"] for name, cause in causes.items() if cause.get("distance") is not None}
+    if away:
+        nearest = min(away, key=lambda name: away[name])
+        link = causes[nearest]["nearest_link"]
+        found["nearest"] = {"finger": nearest, "link": link, "distance": away[nearest]}
+    return found
 
 
 def _overlap_reason(found: LinkDepth, problem: Problem) -> dict[str, Any]:

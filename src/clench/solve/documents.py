@@ -68,6 +68,7 @@ class _FingerForm(msgspec.Struct):
     reason: str
     chosen: int
     candidates: list[Any]
+    cause: dict[str, Any] | None = None
 
 
 class _SolutionForm(msgspec.Struct):
@@ -258,6 +259,7 @@ def _finger_to_dict(f: FingerResult) -> dict[str, Any]:
     return {
         "status": f.status.value,
         "reason": f.reason,
+        "cause": _plain(f.cause),
         "chosen": int(f.chosen),
         "candidates": [_candidate_to_dict(c) for c in f.candidates],
     }
@@ -291,7 +293,7 @@ def _read_finger(name: str, data: Any, source: str) -> FingerResult:
         last = len(form.candidates) - 1
         raise FileError(source, f"{key}.chosen: expected the index of a candidate, 0 to {last}, got {form.chosen}.")
     candidates = [_read_candidate(c, source, f"{key}.candidates[{i}]") for i, c in enumerate(form.candidates)]
-    return FingerResult(name, form.status, form.reason, form.chosen, tuple(candidates))
+    return FingerResult(name, form.status, form.reason, form.chosen, tuple(candidates), form.cause)
 
 
 def _read_candidate(data: Any, source: str, key: str) -> Candidate:

@@ -121,13 +121,20 @@ class Candidate:
 
 @dataclass(frozen=True)
 class FingerResult:
-    """Hold a finger's alternatives and the chosen one."""
+    """Hold a finger's alternatives and the chosen one.
+
+    Args:
+        name: of the finger. status, reason: how it ended. chosen: index of the chosen candidate.
+        cause: why it does not touch: ``"code"`` (see `clench.solve.causes.CauseCode`), ``"text"`` and numbers;
+            None when it touches.
+    """
 
     name: str
     status: FingerStatus
     reason: str
     chosen: int
     candidates: tuple[Candidate, ...]
+    cause: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,9 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     for name, finger in solution.fingers.items():
         table.add_row(*map(_plain, _finger_row(name, finger, solution)))
     console.print(table)
+    for name, finger in solution.fingers.items():
+        if finger.cause is not None:
+            console.print(f"{_plain(name)} ({finger.cause['code']}): {_plain(finger.cause['text'])}", soft_wrap=True)
     if solution.max_penetration is not None:
         console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm")
     if solution.certificate is not None:

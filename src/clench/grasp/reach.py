@@ -1,0 +1,148 @@
+"""How far a posed finger is from an object, and whether closing could bring it there at all."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.shapes import CollisionSource
+
+from .depths import link_meshes
+from .exact import hand_bodies
+from .plan import FingerPlan, last_closing_joint
+from .scene import TESSELLATION_DEVIATION, PackedObject, shape_elements
+
+if TYPE_CHECKING:
+    from clench.kernels.bodies import BodyArrays
+
+_KEPT_PLANS: Final = 256
+#: Rooms by identity of the plan; each entry holds its plan, so that the identity stays its own.
+_kept: OrderedDict[tuple[int, CollisionSource], tuple[FingerPlan, _Room]] = OrderedDict()
+
+
+def graspable_body(obj: GraspObject, packed: PackedObject) -> BodyArrays:
+    """Return what is to be grasped of an object as one body, in the object's frame; obstacles are left out."""
+    if all(role is BodyRole.GRASPABLE for role in packed.body_roles):
+        return packed.bodies
+    return _without_obstacles(obj.bodies, CollisionSource(obj.collision_source))
+
+
+@lru_cache(maxsize=8)
+def _without_obstacles(bodies: tuple[Body, ...], source: CollisionSource) -> BodyArrays:
+    from clench.kernels.bodies import join_elements, pack_bodies
+
+    shapes = [shape for body in bodies if body.role is BodyRole.GRASPABLE for shape in body.shapes]
+    return pack_bodies([join_elements([shape_elements(shape, source) for shape in shapes])])
+
+
+def nearest_link(
+    hand: Hand,
+    q: FloatArray,
+    links: Sequence[int],
+    source: CollisionSource,
+    target: BodyArrays,
+    T_palm_target: FloatArray,
+) -> tuple[float, int]:
+    """Return the smallest gap between some links and a body [m], and the link that has it; infinite and -1 for none.
+
+    Exact but for cylinders and ellipsoids, which count as the polyhedra that are swept (METHOD.md section 5).
+
+    Args:
+        hand: the hand. q: angles of all its joints [rad], shape (J,). links: indices of those that count.
+        source: their geometry. target: see `graspable_body`. T_palm_target: where it is, shape (4, 4).
+    """
+    from clench.kernels.nearness import smallest_gap
+
+    poses = np.ascontiguousarray(hand.link_poses(q)[:, :3])
+    wanted = np.array(links, dtype=np.int64)
+    gap, link = smallest_gap(
+        hand_bodies(hand, source).links, wanted, poses, target, np.ascontiguousarray(T_palm_target[:3])
+    )
+    return max(gap, 0.0), link
+
+
+def beyond_reach(
+    hand: Hand, plan: FingerPlan, source: CollisionSource, target: BodyArrays, T_palm_target: FloatArray
+) -> tuple[float, float]:
+    """Return how much farther a body is than any point of the finger can get, negative if nearer, and that reach [m].
+
+    Both are measured from the anchor of the first closing joint; the reach is that of the finger stretched out.
+    """
+    from clench.kernels.bodies import Elements, pack_bodies
+    from clench.kernels.nearness import smallest_gap
+
+    room = _room(hand, plan, source)
+    pivot = pack_bodies([Elements(room.pivot[None], np.zeros((1, 3), dtype=np.int32), np.zeros(1))])
+    gap, _ = smallest_gap(
+        pivot,
+        np.zeros(1, dtype=np.int64),
+        np.ascontiguousarray(np.eye(4)[None, :3]),
+        target,
+        np.ascontiguousarray(T_palm_target[:3]),
+    )
+    return gap - room.reach, room.reach
+
+
+def beside(
+    hand: Hand, plan: FingerPlan, source: CollisionSource, target: BodyArrays, T_palm_target: FloatArray
+) -> float:
+    """Return how far a body lies to the side of everything that closing moves [m], at least 0.
+
+    Closing joints that are parallel move their links in planes; a finger with several families of planes gives 0.
+    """
+    room = _room(hand, plan, source)
+    if len(plan.families) > 1 or target.root[0] < 0:
+        return 0.0
+    across = plan.families[0].T_palm_family[:3, 1]
+    places = target.vertices @ (T_palm_target[:3, :3].T @ across) + T_palm_target[:3, 3] @ across
+    corners = places[target.elements]
+    low, high = (corners.min(axis=1) - target.radius).min(), (corners.max(axis=1) + target.radius).max()
+    return float(max(low - room.high, room.low - high, 0.0))
+
+
+class _Room(NamedTuple):
+    """Hold what bounds all places that closing takes a finger to, in the palm frame.
+
+    Args:
+        pivot: anchor of the first closing joint [m], shape (3,). reach: no point gets farther from it [m].
+        low, high: of all moved points along y of the first family [m].
+    """
+
+    pivot: FloatArray
+    reach: float
+    low: float
+    high: float
+
+
+def _room(hand: Hand, plan: FingerPlan, source: CollisionSource) -> _Room:
+    """Return a finger's room, found once per plan; round shapes are inscribed here, and given their deviation back."""
+    kept = _kept.get((id(plan), source))
+    if kept is not None and kept[0] is plan:
+        return kept[1]
+    own = [p.joint for p in plan.joints]
+    moved = last_closing_joint(hand, plan.finger, own)
+    poses = hand.link_poses(plan.posture)
+    mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
+    anchors = np.array([(poses[mover[j]] @ np.append(hand.joints[j].anchor, 1.0))[:3] for j in own])
+    arms = np.cumsum([0.0, *np.linalg.norm(np.diff(anchors, axis=0), axis=1)])
+    reach, low, high = 0.0, np.inf, -np.inf
+    for mesh in link_meshes(hand, source):
+        if mesh.link in moved:
+            k = own.index(moved[mesh.link])
+            points = mesh.tree.vertices @ poses[mesh.link][:3, :3].T + poses[mesh.link][:3, 3]
+            reach = max(reach, arms[k] + float(np.linalg.norm(points - anchors[k], axis=1).max()))
+            along = points @ plan.families[0].T_palm_family[:3, 1]
+            low, high = min(low, float(along.min())), max(high, float(along.max()))
+    spare = TESSELLATION_DEVIATION
+    room = _Room(anchors[0], reach + spare, low - spare, high + spare)
+    _kept[id(plan), source] = (plan, room)
+    while len(_kept) > _KEPT_PLANS:
+        _kept.popitem(last=False)
+    return room
