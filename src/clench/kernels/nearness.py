@@ -12,13 +12,13 @@ from .sweeping import body_gap, make_sweep_work
 
 @kernel
 def smallest_gap(
-    links: BodyArrays, wanted: Ints, poses: Floats, obj: BodyArrays, T_palm_object: Floats
+    links: BodyArrays, wanted: Ints, poses: Floats, target: BodyArrays, T_palm_object: Floats
 ) -> tuple[float, int]:
     """Return the smallest gap between some bodies and the first one of another set, and which body has it.
 
     Args:
         links: the bodies. wanted: numbers of those that count, (W,). poses: of every body, (B, 3, 4).
-        obj: the other set. T_palm_object: its pose, (3, 4).
+        target: the other set. T_palm_object: its pose, (3, 4).
 
     Returns:
         the gap [m] and the body's number; infinite and -1 when there is nothing to measure. Bodies that cross each
@@ -29,7 +29,7 @@ def smallest_gap(
     best, nearest = np.inf, -1
     for m in wanted:
         work.moving[:] = poses[m]
-        gap = body_gap(links, m, obj, 0, best, work)
+        gap = body_gap(links, m, target, 0, best, work)
         if gap < best:
             best, nearest = gap, m
     return best, nearest

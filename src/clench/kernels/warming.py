@@ -33,6 +33,7 @@ from .layout import (
     SectionArrays,
     Work,
 )
+from .nearness import smallest_gap
 from .overlap import find_overlaps
 from .sweeping import SweepWork
 from .touching import describe_hit, settle_hit
@@ -48,6 +49,7 @@ HERE: tuple[Any, ...] = (
     describe_hit,
     find_overlaps,
     penetration,
+    smallest_gap,
 )
 THERE: tuple[Any, ...] = (advance, close_items)
 
@@ -108,6 +110,7 @@ def sample_values() -> dict[str, Any]:
         "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f3 i2 i1 i1 i1")),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 i1")),
     }
+    values |= {"links": values["exact"].links, "target": values["exact"].object}
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values |= dict.fromkeys(("tree", "link", "obj"), tree)
     values |= dict.fromkeys(("closed", "link_closed", "obj_closed"), True)
@@ -115,7 +118,8 @@ def sample_values() -> dict[str, Any]:
     kinds = {
         "f1": ("turns", "rates", "crossings", "point"),
         "f2": ("T_palm_object", "T_palm_family", "T_obj_link", "T_link_obj"),
-        "i1": ("overlaps", "hit"),
+        "i1": ("overlaps", "hit", "wanted"),
+        "f3": ("poses",),
         "s1": ("stack",),
         "b1": ("link_owners", "obj_owners"),
     }
