@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -87,7 +88,7 @@ class FingerCandidate:
         """Place of the plane along y of the first family [m]; None for the full width."""
         return None if self.plane is None else float(self.plan.families[0].offsets[self.plane])
 
-    @property
+    @cached_property
     def holding(self) -> tuple[Touch, ...]:
         """Contacts with a graspable body that are still touching."""
         return tuple(t for t in self.touches if t.graspable and not t.passed)
@@ -97,62 +98,93 @@ def read_candidates(
     hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, overlaps: Sequence[LinkDepth | None]
 ) -> list[FingerCandidate]:
     """Return one candidate per item, in item order; `overlaps` as `start_overlaps` gives them, per entry."""
-    return [_candidate(hand, plan, packed, closed, overlaps, i) for i in range(len(plan.items.entry))]
+    entries = plan.items.entry.tolist()
+    blocked = np.array([overlaps[entry] is not None for entry in entries])
+    contacts = np.where(blocked, 0, closed.answer.contacts)
+    touches = _read_touches(hand, plan, packed, closed, contacts)
+    candidates = []
+    for i, entry in enumerate(entries):
+        finger = plan.plans[entry]
+        first, last = plan.arrays.entry_group[entry : entry + 2]
+        travel = np.zeros(last - first) if blocked[i] else closed.answer.travel[i, first:last].copy()
+        candidates.append(
+            FingerCandidate(
+                item=i,
+                plan=finger,
+                posture=plan.posture[entry],
+                plane=None if plan.whole[i] else int(plan.items.low[i]),
+                travel=travel,
+                q=finger.angles(hand, travel),
+                touches=tuple(touches[i]),
+                overlap=overlaps[entry],
+                exact=bool(plan.whole[i] and not closed.answer.skipped[i]),
+            )
+        )
+    return candidates
 
 
-def _candidate(
+def _read_touches(
+    hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, contacts: np.ndarray
+) -> list[list[Touch]]:
+    """Return the touches of every item, in stage order; `contacts` says how many each has."""
+    from clench.kernels.layout import HIT_FAMILY, HIT_PLANE, HIT_SOURCE
+
+    answer = closed.answer
+    item, slot = np.nonzero(np.arange(answer.hit.shape[1]) < contacts[:, None])
+    hits, points = answer.hit[item, slot], answer.point[item, slot]
+    poses = answer.pose[item, hits[:, HIT_FAMILY]]
+    offsets = plan.arrays.plane_offset[hits[:, HIT_PLANE]]
+    across = np.stack([points[:, 0], offsets, points[:, 1]], axis=1)
+    positions = (poses[:, :, :3] @ across[:, :, None])[:, :, 0] + poses[:, :, 3]
+    facets = packed.tree.normals[np.maximum(hits[:, HIT_SOURCE], 0)] if len(packed.tree.normals) else positions
+    normals = facets @ closed.T_palm_object[:3, :3].T
+    touches: list[list[Touch]] = [[] for _ in contacts]
+    for i, n, hit, point, position, normal, offset in zip(
+        item.tolist(), slot.tolist(), hits.tolist(), points.tolist(), positions, normals, offsets.tolist(), strict=True
+    ):
+        if hit[HIT_PLANE] < 0:
+            touches[i].append(_exact_touch(hand, plan, packed, closed, i, n))
+            continue
+        if hit[HIT_SOURCE] < 0:
+            facet = surface_normal(packed, hit[HIT_SOURCE], closed.T_palm_object, position)
+            normal = closed.T_palm_object[:3, :3] @ facet
+        touches[i].append(_plane_touch(hand, plan, packed, closed, i, hit, point, position, normal, offset))
+    return touches
+
+
+def _plane_touch(
     hand: Hand,
     plan: HandPlan,
     packed: PackedObject,
     closed: ClosedHand,
-    overlaps: Sequence[LinkDepth | None],
     i: int,
-) -> FingerCandidate:
-    entry = int(plan.items.entry[i])
-    finger = plan.plans[entry]
-    first, last = plan.arrays.entry_group[entry : entry + 2]
-    overlap = overlaps[entry]
-    travel = np.zeros(last - first) if overlap else closed.answer.travel[i, first:last].copy()
-    contacts = 0 if overlap else closed.answer.contacts[i]
-    return FingerCandidate(
-        item=i,
-        plan=finger,
-        posture=plan.posture[entry],
-        plane=None if plan.whole[i] else int(plan.items.low[i]),
-        travel=travel,
-        q=finger.angles(hand, travel),
-        touches=tuple(_touch(hand, plan, packed, closed, i, n, travel) for n in range(contacts)),
-        overlap=overlap,
-        exact=plan.whole[i] and not closed.answer.skipped[i],
-    )
-
-
-def _touch(
-    hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int, travel: FloatArray
+    hit: list[int],
+    point: list[float],
+    position: FloatArray,
+    normal: FloatArray,
+    offset: float,
 ) -> Touch:
-    answer, arrays = closed.answer, plan.arrays
-    if answer.hit[i, n, 0] < 0:
-        return _exact_touch(hand, plan, packed, closed, i, n)
-    plane, outline, kind, source, group, family, _, _ = answer.hit[i, n].tolist()
-    x, z, nx, nz, cx, cz, gap = answer.point[i, n].tolist()
-    entry = int(plan.items.entry[i])
-    pose = answer.pose[i, family]
-    offset = float(arrays.plane_offset[plane])
-    position = pose[:, :3] @ (x, offset, z) + pose[:, 3]
+    """Return a touch on a plane, of numbers that are read already."""
+    plane, outline, kind, source, group, family, _, _ = hit
+    _, _, nx, nz, cx, cz, gap = point
+    arrays, entry = plan.arrays, int(plan.items.entry[i])
+    finger = plan.plans[entry]
+    first, last = arrays.entry_group[entry : entry + 2]
     link = int(arrays.outlines.link[outline])
-    own_group, own_family = group - int(arrays.entry_group[entry]), family - int(arrays.entry_family[entry])
     body = int(packed.tree.body[source]) if source >= 0 else int(packed.rounds.body[-1 - source])
+    travel = closed.answer.travel[i, first:last]
+    own_family = family - int(arrays.entry_family[entry])
     return Touch(
         link=link,
-        joint=plan.plans[entry].leaders[own_group],
+        joint=finger.leaders[group - int(first)],
         body=body,
         graspable=packed.body_roles[body] is BodyRole.GRASPABLE,
         plane=plane - int(arrays.family_plane[family]),
         offset=offset,
         kind=kind,
         position=position,
-        normal=closed.T_palm_object[:3, :3] @ surface_normal(packed, source, closed.T_palm_object, position),
-        gap=max(gap, _carried(hand, plan.plans[entry], link, own_family, travel, position)),
+        normal=normal,
+        gap=max(gap, _carried(hand, finger, link, own_family, travel, position)),
         curve_angle=math.atan2(cx, -cz),
         link_angle=math.atan2(nx, -nz) if kind == 0 else None,
     )
@@ -189,6 +221,8 @@ def _carried(hand: Hand, plan: FingerPlan, link: int, family: int, travel: Float
 
     Their planes are not those of the touch, so its outline does not tell; the distance is an upper bound of the gap.
     """
+    if family == len(plan.families) - 1:
+        return 0.0
     later = {p.group for p in plan.joints if p.family > family and travel[p.group] > 0.0}
     if not later:
         return 0.0

@@ -10,8 +10,8 @@ import numpy as np
 from .calibration import Calibration
 from .candidates import FingerCandidate
 from .combinations import Combination, best_combination
-from .criteria import Criterion, HandCriterion, Setting
-from .criterion_registry import checked_value, find_criterion, score_sets
+from .criteria import HandCriterion, Setting
+from .criterion_registry import checked_value, find_criterion, is_of_finger, is_of_hand, score_sets
 
 #: What puts one set before another, whatever their scores, strongest first; as `tier` lists them.
 TIERS = (
@@ -22,7 +22,8 @@ TIERS = (
     "has a value for every criterion",
 )
 
-#: Sets whose angles [rad] agree to so many decimals are the same for the choice, and sums that do are equal.
+#: Sets whose angles differ by less are the same for the choice [rad]; sums are rounded to as many digits.
+SAME_ANGLE = 1e-9
 _SAME_DIGITS = 9
 
 
@@ -81,11 +82,11 @@ def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration
         groups: sets of every finger. calibration: what counts. setting: what they are judged in.
     """
     criteria = {name: find_criterion(name, calibration.name) for name in calibration.criteria}
-    of_finger = [name for name, c in criteria.items() if isinstance(c, Criterion)]
+    of_finger = [name for name, c in criteria.items() if is_of_finger(c)]
     for group in groups:
         score_sets(group, of_finger, setting)
     fingers = [_compare(group, of_finger, calibration) for group in groups]
-    of_hand = {name: c for name, c in criteria.items() if isinstance(c, HandCriterion)}
+    of_hand = {name: c for name, c in criteria.items() if is_of_hand(c)}
     judge = _HandJudge(groups, fingers, of_hand, calibration, setting)
     known = {name for group in groups for c in group for name in c.scores}
     if of_hand:
@@ -110,7 +111,8 @@ def _compare(group: Sequence[FingerCandidate], names: Sequence[str], calibration
     """Rank the sets of one finger by what they fulfil, then by their weighted scores."""
     said = [name for name in names if any(name in c.scores for c in group)]
     tiers = tuple(_tier(c, said, calibration) for c in group)
-    totals = tuple(sum(calibration.worth(n, c.scores[n]) for n in said if n in c.scores) for c in group)
+    worth = {name: calibration.worth(name, 1.0) for name in said}
+    totals = tuple(sum(w * c.scores[n] for n, w in worth.items() if n in c.scores) for c in group)
     # Rounded, so that sets that are equal but for rounding come in the order of the alternatives.
     rank = [(tiers[i], round(totals[i], _SAME_DIGITS), c.plane is None, -i) for i, c in enumerate(group)]
     order = sorted(range(len(group)), key=rank.__getitem__, reverse=True)

@@ -51,6 +51,9 @@ def _fits(mesh: LinkMesh, T_object_link: FloatArray, packed: PackedObject) -> bo
     """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
     if len(mesh.points) != 1 or not len(packed.full_tree.low):
         return True
+    first = T_object_link[:3, :3] @ mesh.points[0] + T_object_link[:3, 3]
+    if not (np.all(first >= packed.full_tree.low[0]) and np.all(first <= packed.full_tree.high[0])):
+        return False  # most links end here, by one of their corners
     placed = mesh.tree.vertices @ T_object_link[:3, :3].T + T_object_link[:3, 3]
     low, high = packed.full_tree.low[0], packed.full_tree.high[0]
     return bool(np.all(placed >= low) and np.all(placed <= high))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from typing import Final
+from typing import Final, TypeGuard
 
 from clench.base.errors import CommandError, UnknownNameError
 
@@ -94,6 +94,16 @@ def _load_installed() -> None:
         register_criterion(criterion)
 
 
+def is_of_hand(criterion: Criterion | HandCriterion) -> TypeGuard[HandCriterion]:
+    """Say whether a criterion judges all fingers together; asking the protocol takes a hundred times as long."""
+    return hasattr(criterion, "score_hand")
+
+
+def is_of_finger(criterion: Criterion | HandCriterion) -> TypeGuard[Criterion]:
+    """Say whether a criterion judges the sets of one finger."""
+    return not is_of_hand(criterion)
+
+
 def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: Setting) -> None:
     """Fill the scores of sets: those always given, and those named; a criterion that says nothing gives none.
 
@@ -101,7 +111,7 @@ def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], sett
         CommandError: a criterion gave a value that is not a finite number.
     """
     wanted = dict.fromkeys([*ALWAYS, *names])
-    criteria = [c for c in map(_registry.__getitem__, wanted) if isinstance(c, Criterion)]
+    criteria = [c for c in map(_registry.__getitem__, wanted) if is_of_finger(c)]
     for candidate in candidates:
         for criterion in criteria:
             value = criterion.score(candidate, setting)

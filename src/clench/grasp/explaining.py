@@ -11,7 +11,7 @@ from clench.base.pose import FloatArray
 
 from .calibration import Calibration
 from .candidates import FingerCandidate
-from .choice import TIERS, FingerChoice, HandChoice
+from .choice import SAME_ANGLE, TIERS, FingerChoice, HandChoice
 from .criterion_registry import find_criterion
 
 Groups = Sequence[Sequence[FingerCandidate]]
@@ -93,8 +93,10 @@ def _finger(finger: FingerChoice, group: Sequence[FingerCandidate], choice: Hand
 def _runner_up(finger: FingerChoice, group: Sequence[FingerCandidate]) -> int | None:
     """Return the best set besides the chosen one, of those that fulfil as much, else of those whose angles differ."""
     q = group[finger.chosen].q
-    lesser = [i for i in finger.order if i not in finger.equals and not np.allclose(group[i].q, q, rtol=0.0, atol=1e-9)]
-    return next((i for i in (*finger.equals, *lesser) if i != finger.chosen), None)
+    for i in (*finger.equals, *finger.order):
+        if i != finger.chosen and np.abs(group[i].q - q).max(initial=0.0) > SAME_ANGLE:
+            return i
+    return None
 
 
 def _finger_front(finger: FingerChoice, group: Sequence[FingerCandidate], choice: HandChoice) -> list[int]:
@@ -103,12 +105,11 @@ def _finger_front(finger: FingerChoice, group: Sequence[FingerCandidate], choice
     names = [name for name in choice.used if name in group[equals[0]].scores]
     if not names:
         return equals
-    rows = [[_signed(name, group[i].scores[name]) for name in names] for i in equals]
-    return [equals[k] for k in pareto_front(np.array(rows))]
-
-
-def _signed(name: str, value: float) -> float:
-    return value if find_criterion(name, "choice").larger_is_better else -value
+    if len(equals) == 1:
+        return equals
+    rows = np.array([[group[i].scores[name] for name in names] for i in equals])
+    signs = [1.0 if find_criterion(name, "choice").larger_is_better else -1.0 for name in names]
+    return [equals[k] for k in pareto_front(rows * signs)]
 
 
 def _finger_text(finger: FingerChoice, group: Sequence[FingerCandidate], choice: HandChoice, second: int | None) -> str:

@@ -91,38 +91,6 @@ def carried_links(hand: Hand) -> NDArray[np.bool_]:
     return carried
 
 
-def poses_at(hand: Hand, postures: FloatArray) -> FloatArray:
-    """Return `T_palm_link` of every link at several postures, shape (S, L, 4, 4); see `Hand.link_poses`."""
-    motions = _joint_motions(hand, postures)
-    poses = np.empty((len(postures), len(hand.links), 4, 4))
-    for i, link in enumerate(hand.links):
-        local = link.T_parent_link if link.joint < 0 else link.T_parent_link @ motions[:, link.joint]
-        poses[:, i] = poses[:, link.parent] @ local if link.parent >= 0 else local
-    palm = poses[:, hand.palm]
-    back = np.zeros((len(postures), 1, 4, 4))
-    back[:, 0, :3, :3] = palm[:, :3, :3].transpose(0, 2, 1)
-    back[:, 0, :3, 3] = -np.einsum("sji,sj->si", palm[:, :3, :3], palm[:, :3, 3])
-    back[:, 0, 3, 3] = 1.0
-    placed: FloatArray = back @ poses
-    return placed
-
-
-def _joint_motions(hand: Hand, postures: FloatArray) -> FloatArray:
-    """Return the motion of every joint at several postures in the frame of its link, shape (S, J, 4, 4)."""
-    axes = np.array([j.axis for j in hand.joints]).reshape(-1, 3)
-    anchors = np.array([j.anchor for j in hand.joints]).reshape(-1, 3)
-    angles = postures - np.array([j.reference for j in hand.joints])
-    cross = np.zeros((len(axes), 3, 3))
-    cross[:, [2, 0, 1], [1, 2, 0]] = axes
-    cross[:, [1, 2, 0], [2, 0, 1]] = -axes
-    turned = np.sin(angles)[..., None, None] * cross + (1.0 - np.cos(angles))[..., None, None] * (cross @ cross)
-    motions = np.zeros((*postures.shape, 4, 4))
-    motions[..., :3, :3] = np.eye(3) + turned
-    motions[..., :3, 3] = -np.einsum("sjab,jb->sja", turned, anchors)
-    motions[..., 3, 3] = 1.0
-    return motions
-
-
 def stage_touches(
     bodies: HandBodies,
     packed: PackedObject,

@@ -39,6 +39,7 @@ _KINDS = (
     ContactKind.EDGE,
     ContactKind.FACE,
 )
+_Places = dict[int, tuple[FloatArray, FloatArray]]
 #: Contacts of thumb and finger oppose each other when their normals do: the cosine is below this [-].
 _OPPOSED = 0.0
 
@@ -73,7 +74,8 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
     from clench import __version__
 
     hand, command, packed = problem.hand, problem.command, problem.packed
-    results = {c.plan.finger.name: _finger(answer, k, problem) for k, c in enumerate(answer.best)}
+    placed = _placed(answer, problem)
+    results = {c.plan.finger.name: _finger(answer, k, problem, placed) for k, c in enumerate(answer.best)}
     for finger in asked_fingers(hand, command):
         if finger.name not in results:
             text = f"{finger.name} has no closing joint."
@@ -118,15 +120,24 @@ def _opened(answer: Answer, problem: Problem) -> FloatArray:
     return q
 
 
-def _finger(answer: Answer, k: int, problem: Problem) -> FingerResult:
-    candidates = tuple(_candidate(c, problem) for c in answer.fingers[k])
+def _placed(answer: Answer, problem: Problem) -> _Places:
+    """Return position and normal of every touch in the world, by the touch's identity."""
+    touches = [t for group in answer.fingers for c in group for t in c.touches]
+    T = problem.T_world_palm
+    positions = T.apply(np.array([t.position for t in touches]).reshape(-1, 3))
+    normals = np.array([t.normal for t in touches]).reshape(-1, 3) @ T.rotation.T
+    return {id(t): (p, n) for t, p, n in zip(touches, positions, normals, strict=True)}
+
+
+def _finger(answer: Answer, k: int, problem: Problem, placed: _Places) -> FingerResult:
+    candidates = tuple(_candidate(c, problem, placed) for c in answer.fingers[k])
     best = candidates[answer.chosen[k]]
     name = answer.fingers[k][0].plan.finger.name
     cause = finger_cause(answer.best[k], problem)
     return FingerResult(name, best.status, best.reason, answer.chosen[k], candidates, cause)
 
 
-def _candidate(c: FingerCandidate, problem: Problem) -> Candidate:
+def _candidate(c: FingerCandidate, problem: Problem, placed: _Places) -> Candidate:
     hand = problem.hand
     status, reason = _finger_status(c, problem)
     return Candidate(
@@ -140,12 +151,12 @@ def _candidate(c: FingerCandidate, problem: Problem) -> Candidate:
         feasible=c.feasible,
         penetration=c.penetration,
         scores=dict(c.scores),
-        contacts=tuple(_contact(c, t, problem) for t in c.touches if t.body >= 0),
+        contacts=tuple(_contact(c, t, problem, placed) for t in c.touches if t.body >= 0),
     )
 
 
-def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
-    T = problem.T_world_palm
+def _contact(c: FingerCandidate, t: Touch, problem: Problem, placed: _Places) -> Contact:
+    position, normal = placed[id(t)]
     return Contact(
         finger=c.plan.finger.name,
         link=problem.hand.links[t.link].name,
@@ -155,8 +166,8 @@ def _contact(c: FingerCandidate, t: Touch, problem: Problem) -> Contact:
         offset=t.offset,
         kind=_KINDS[t.kind],
         passed=t.passed,
-        position=T.apply(t.position),
-        normal=T.rotation @ t.normal,
+        position=position,
+        normal=normal,
         gap=t.gap,
         curve_angle=t.curve_angle,
         link_angle=t.link_angle,

@@ -14,8 +14,9 @@ from clench.base.pose import FloatArray, invert
 from clench.base.tolerances import TOUCH_FRACTION
 from clench.grasp.exact import HandBodies, hand_bodies, swept_deviation
 from clench.grasp.scene import PackedObject, hash_hand, pack_object
-from clench.grasp.stages import Stage, StageTouch, carried_links, closing_stages, poses_at, stage_touches
+from clench.grasp.stages import Stage, StageTouch, carried_links, closing_stages, stage_touches
 from clench.models.command_file import LIMIT_TOLERANCE
+from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource

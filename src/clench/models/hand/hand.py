@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from clench.base.errors import CommandError, UnknownNameError
-from clench.base.pose import FloatArray, rotation_about
+from clench.base.pose import FloatArray
 from clench.models.shapes import CollisionSource, Shape
 
 from .findings import Finding, Severity
+from .forward import JointArrays, joint_arrays, poses_at
 from .tendons import TendonMap
 
 #: Speed of joints whose model gives no limit [rad/s].
@@ -200,6 +202,11 @@ class Hand:
         """Sentences about what looks wrong: the findings that are more than notes."""
         return tuple(finding.text for finding in self.findings if finding.severity is Severity.WARNING)
 
+    @cached_property
+    def joint_arrays(self) -> JointArrays:
+        """The joints as arrays, for forward kinematics."""
+        return joint_arrays(self)
+
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of all joints, in model order."""
@@ -265,22 +272,5 @@ class Hand:
         q = np.asarray(q, dtype=np.float64)
         if q.shape != (len(self.joints),):
             raise CommandError(f"posture: expected {len(self.joints)} angles, got shape {q.shape}.")
-        poses = np.empty((len(self.links), 4, 4))
-        for i, link in enumerate(self.links):
-            local = link.T_parent_link
-            if link.joint >= 0:
-                local = local @ self.joint_motion(link.joint, float(q[link.joint]))
-            poses[i] = poses[link.parent] @ local if link.parent >= 0 else local
-        rotation = poses[self.palm][:3, :3].T
-        T_palm_root = np.eye(4)
-        T_palm_root[:3, :3] = rotation
-        T_palm_root[:3, 3] = -rotation @ poses[self.palm][:3, 3]
-        return T_palm_root @ poses
-
-    def joint_motion(self, joint: int, angle: float) -> FloatArray:
-        """Return the motion of a joint in the frame of the link it moves, shape (4, 4)."""
-        j = self.joints[joint]
-        m = np.eye(4)
-        m[:3, :3] = rotation_about(j.axis, angle - j.reference)
-        m[:3, 3] = j.anchor - m[:3, :3] @ j.anchor
-        return m
+        placed: FloatArray = poses_at(self, q[None])[0]
+        return placed
