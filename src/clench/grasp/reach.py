@@ -141,7 +141,7 @@ def _room(hand: Hand, plan: FingerPlan, source: CollisionSource) -> _Room:
             along = points @ plan.families[0].T_palm_family[:3, 1]
             low, high = min(low, float(along.min())), max(high, float(along.max()))
     spare = TESSELLATION_DEVIATION
-    room = _Room(anchors[0], reach + spare, low - spare, high + spare)
+    room = _Room(anchors[0], float(reach) + spare, low - spare, high + spare)
     _kept[id(plan), source] = (plan, room)
     while len(_kept) > _KEPT_PLANS:
         _kept.popitem(last=False)

@@ -181,10 +181,11 @@ class Hand:
         palm: str | None = None,
         collision_source: CollisionSource | str | None = None,
     ) -> Hand:
-        """Read a hand by built-in name or from a `.urdf` / `.xml` / `.mjcf` file.
+        """Read a hand by name or from a `.urdf` / `.xml` / `.mjcf` file.
 
         Args:
-            model: a built-in name (``"robonaut2"``) or a path.
+            model: a built-in name (``"robonaut2"``), a path, or a name that mujoco_menagerie or robot_descriptions
+                knows (``"shadow_hand/right_hand"``; these packages come with ``clench[hands]``).
             hand_file: TOML overrides; by default `<model>.hand.toml` beside the model when it exists.
             palm: the palm link's name, to pick a hand inside a whole robot.
             collision_source: which geometry is meant unless a command says otherwise.

@@ -12,7 +12,7 @@ from clench.base.errors import HandError
 from clench.base.pose import FloatArray, Pose
 
 from .compiled import CompiledModel
-from .findings import Finding, FindingCode
+from .findings import Finding, FindingCode, Severity
 from .hand import Joint
 from .limits import EFFORT_PLACEHOLDER, doubtful_joints, joint_limits
 
@@ -116,7 +116,13 @@ def _revolute_joints(compiled: CompiledModel, body: int, palm: int, findings: li
             name = compiled.joint_name(j)
             text = f"Joint '{name}' before the palm is {kind}; it is held at its reference."
             findings.append(
-                Finding(FindingCode.JOINT_HELD, text, "Nothing to do: commands place the palm.", joints=(name,))
+                Finding(
+                    FindingCode.JOINT_HELD,
+                    text,
+                    "Nothing to do: commands place the palm.",
+                    Severity.NOTE,
+                    joints=(name,),
+                )
             )
     return found
 

@@ -16,7 +16,7 @@ from .allowed import allowed_pairs, with_given_pairs
 from .checks import check_understood
 from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
 from .coupling import FoundCouplings, Relation, find_couplings, flatten
-from .findings import Finding, FindingCode, quoted
+from .findings import Finding, FindingCode, Severity, quoted
 from .finger_geometry import finger_line, tip_motion
 from .fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
 from .geometry import ShapeReader, bodies_without_collision
@@ -92,8 +92,9 @@ def _hand_alone(text: ModelText, palm: str | None) -> tuple[CompiledModel, int, 
         findings.append(
             Finding(
                 FindingCode.LINKS_LEFT_OUT,
-                f"{dropped} links that are neither the hand nor between it and the root are left out.",
+                f"Left out, being neither the hand nor between it and the root: {dropped} of {dropped + len(kept)} links.",
                 "Nothing to do, unless the hand itself is incomplete: then name its palm (--palm).",
+                Severity.NOTE,
             )
         )
     bare = bodies_without_collision(compiled, hand_bodies(compiled.model, body), body)

@@ -10,6 +10,7 @@ from pathlib import Path
 from clench.base.errors import FileError, UnknownNameError
 
 from .mesh_files import MeshStore
+from .named import find_named, how_to_get_more, known_names
 
 _BUILTIN = Path(__file__).parent / "builtin"
 _SUFFIXES = (".urdf", ".xml", ".mjcf")
@@ -49,7 +50,8 @@ def find_model(model: str | Path) -> tuple[Path, bool]:
     """Return the model's file, and whether it is a built-in one.
 
     Raises:
-        UnknownNameError: neither a built-in name nor a path. FileError: no such file, or another kind of file.
+        UnknownNameError: neither a name nor a path. FileError: no such file, or another kind of file.
+        HandError: a name whose files cannot be had, see `find_named`.
     """
     path = Path(model)
     if path.is_file():
@@ -60,9 +62,14 @@ def find_model(model: str | Path) -> tuple[Path, bool]:
         raise FileError(model, f"is a folder; expected a hand model file ({', '.join(_SUFFIXES)}).")
     if isinstance(model, str) and model in builtin_names():
         return _BUILTIN / f"{model}.xml", True
+    if isinstance(model, str) and path.suffix.lower() not in _SUFFIXES:
+        named = find_named(model)
+        if named is not None:
+            return named, False
     if path.suffix.lower() in _SUFFIXES or len(path.parts) > 1:
-        raise FileError(model, f"no such file; expected a hand model ({', '.join(_SUFFIXES)}) or a built-in name.")
-    raise UnknownNameError("hand", str(model), "the built-in hands, and no such file exists", builtin_names())
+        raise FileError(model, f"no such file; expected a hand model ({', '.join(_SUFFIXES)}) or the name of a hand.")
+    owner = f"the built-in hands, and no such file exists{how_to_get_more()}"
+    raise UnknownNameError("hand", str(model), owner, (*builtin_names(), *known_names()))
 
 
 def read_model(model: str | Path) -> ModelText:
