@@ -13,9 +13,15 @@ if TYPE_CHECKING:
     from clench.base.pose import Pose
     from clench.execution.driven_hand import DrivenHand
     from clench.execution.driver import DriverError, DriverLimits, HandDriver, HandState, JointPath
+    from clench.execution.drivers.orca import OrcaDriver
+    from clench.execution.drivers.ros2 import Ros2Driver
     from clench.execution.executing import Actuator, execute
+    from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
+    from clench.execution.formats.grasp_posture import GraspPosture
+    from clench.execution.formats.mcap_log import write_log
     from clench.execution.history import ExecutionHistory
     from clench.execution.joint_map import JointMap
+    from clench.execution.ready_signal import ReadySignal
     from clench.execution.report import ExecutionReport
     from clench.execution.simulation import SimulatedHand
     from clench.execution.trajectory import Trajectory, plan_trajectory
@@ -71,7 +77,9 @@ _HOMES = {
     "FingerResult": "clench.solve.solution",
     "FingerStatus": "clench.solve.solution",
     "GraspCommand": "clench.models.command",
+    "GraspFormat": "clench.execution.formats.exchange",
     "GraspObject": "clench.models.objects.grasp_object",
+    "GraspPosture": "clench.execution.formats.grasp_posture",
     "GraspSolution": "clench.solve.solution",
     "Hand": "clench.models.hand.hand",
     "HandCriterion": "clench.grasp.criteria",
@@ -82,9 +90,12 @@ _HOMES = {
     "JointPath": "clench.execution.driver",
     "JointRole": "clench.models.hand.hand",
     "ObjectError": "clench.base.errors",
+    "OrcaDriver": "clench.execution.drivers.orca",
     "Pose": "clench.base.pose",
     "PoseErrorReport": "clench.solve.pose_error",
+    "ReadySignal": "clench.execution.ready_signal",
     "Record": "clench.solve.record",
+    "Ros2Driver": "clench.execution.drivers.ros2",
     "Sensitivity": "clench.solve.sensitivity",
     "ShapeKind": "clench.models.shapes",
     "SimulatedHand": "clench.execution.simulation",
@@ -94,12 +105,15 @@ _HOMES = {
     "approach_poses": "clench.grasp.approach",
     "check_hand": "clench.grasp.self_check",
     "execute": "clench.execution.executing",
+    "export_grasps": "clench.execution.formats.exchange",
+    "import_grasps": "clench.execution.formats.exchange",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
     "plan_trajectory": "clench.execution.trajectory",
     "pose_error": "clench.solve.pose_error",
     "register_criterion": "clench.grasp.criterion_registry",
     "sensitivity": "clench.solve.sensitivity",
+    "write_log": "clench.execution.formats.mcap_log",
 }
 
 __all__ = [
@@ -126,7 +140,9 @@ __all__ = [
     "FingerResult",
     "FingerStatus",
     "GraspCommand",
+    "GraspFormat",
     "GraspObject",
+    "GraspPosture",
     "GraspSolution",
     "Hand",
     "HandCriterion",
@@ -137,9 +153,12 @@ __all__ = [
     "JointPath",
     "JointRole",
     "ObjectError",
+    "OrcaDriver",
     "Pose",
     "PoseErrorReport",
+    "ReadySignal",
     "Record",
+    "Ros2Driver",
     "Sensitivity",
     "ShapeKind",
     "SimulatedHand",
@@ -150,6 +169,8 @@ __all__ = [
     "approach_poses",
     "check_hand",
     "execute",
+    "export_grasps",
+    "import_grasps",
     "load_calibration",
     "load_command",
     "plan_trajectory",
@@ -157,6 +178,7 @@ __all__ = [
     "register_criterion",
     "sensitivity",
     "solve",
+    "write_log",
 ]
 
 

@@ -12,7 +12,7 @@ from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Coupling, Finger, Hand, Joint, JointRole, Link
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-from clench.solve.solution import FingerResult, FingerStatus, GraspSolution
+from clench.solve.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
 from handmade import make_candidate, make_contact, make_solution
 
 BALL_RADIUS, BALL_HEIGHT = 0.02, 0.05
@@ -126,7 +126,7 @@ def pinch(pincer: Hand, ball: GraspObject) -> GraspSolution:
     angles = {"thumb": {"thumb": thumb}, "index": {"index": index, "index_tip": index}}
     contacts = {n: make_contact(finger=n, link=links[n], position=PALM_POSE.apply(p)) for n, p in points.items()}
     return make_solution(
-        status="grasp",
+        status=SolutionStatus.GRASP,
         geometry_hash=f"{hash_hand(pincer, CollisionSource.ENGINE)}+{hash_bodies(ball.bodies, CollisionSource.RAW)}",
         hand_pose=PALM_POSE,
         object_pose=PALM_POSE @ Pose([0.0, 0.0, BALL_HEIGHT]),

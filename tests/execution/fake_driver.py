@@ -61,7 +61,8 @@ class FakeDriver:
         since = time.monotonic() - self.begun if self.commands else 0.0
         changes = self.fault(since)
         positions = {**self.where(), **changes.get("positions", {})}  # type: ignore[dict-item]
-        return HandState({k: v for k, v in positions.items() if v is not None}, float(changes.get("age", 0.0)))
+        age = float(changes.get("age", 0.0))  # type: ignore[arg-type]
+        return HandState({k: v for k, v in positions.items() if v is not None}, dict.fromkeys(self.joints, age))
 
     def command(self, path: JointPath) -> None:
         if not self.connected:

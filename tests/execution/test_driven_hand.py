@@ -92,7 +92,10 @@ def test_a_slower_controller_gets_a_slower_path(pincer: Hand, solution: GraspSol
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [
-        (lambda t: {"age": t} if t > 0.2 else {}, r"The state of the hand is stale: 0\.\d+ s old; at most 0\.15 s"),
+        (
+            lambda t: {"age": t} if t > 0.2 else {},
+            r"state of joint 'thumb' is stale: 0\.\d+ s old; at most 0\.15 s",
+        ),
         (lambda t: {"positions": {"index": np.nan}} if t > 0.2 else {}, r"Joint 'index' is said to be at nan rad\."),
         (lambda t: {"positions": {"index": None}} if t > 0.2 else {}, r"says nothing of joint 'index'\."),
         (lambda t: {"positions": {"thumb": 0.0}}, r"Joint 'thumb' does not follow: it is at 0 rad and was told to be"),
@@ -253,11 +256,11 @@ def test_what_passes_keeps_every_limit(steps: list[tuple[float, float, float]], 
 
 
 def test_states_are_checked() -> None:
-    CHECK.state(HandState({"a": 0.0, "b": 1.0, "other": np.nan}, 0.1), {"a": 0.1, "b": 0.0})
+    CHECK.state(HandState({"a": 0.0, "b": 1.0, "other": np.nan}, {"other": 9.0}), {"a": 0.1, "b": 0.0})
     with pytest.raises(RefusedCommandError, match="stale"):
-        CHECK.state(HandState({"a": 0.0, "b": 0.0}, np.nan))
+        CHECK.state(HandState({"a": 0.0, "b": 0.0}, {"b": np.nan}))
     with pytest.raises(RefusedCommandError, match="'b' does not follow: it is at 20 deg and was told to be at 0 deg"):
-        CHECK.state(HandState({"a": 0.0, "b": 20.0}, 0.0), {"a": 0.0, "b": 0.0})
+        CHECK.state(HandState({"a": 0.0, "b": 20.0}), {"a": 0.0, "b": 0.0})
 
 
 @given(st.lists(st.floats(-2, 2), min_size=2, max_size=8), st.floats(0.1, 5))
@@ -269,6 +272,13 @@ def test_slowing_down_keeps_the_path_and_the_limit(angles: list[float], speed: f
     assert (np.abs(np.diff(positions[:, 0])) / np.diff(slower) <= speed * (1 + 1e-9)).all()
     ratio = slower[1:] / times[1:]
     np.testing.assert_allclose(ratio, ratio[0])
+
+
+def test_way_points_that_are_next_to_each_other_are_one() -> None:
+    times = np.array([0.0, 1e-9, 0.5, 0.5 + 1e-12, 0.7, 1.0 - 1e-9, 1.0])
+    plan = TimedPlan(("a",), times, np.arange(7.0)[:, None]).thinned()
+    assert plan.times.tolist() == [0.0, 0.5, 0.7, 1.0]
+    assert plan.positions[:, 0].tolist() == [0.0, 2.0, 4.0, 6.0]
 
 
 @given(st.floats(0, 2), st.floats(0.05, 1))

@@ -16,7 +16,9 @@ from .joint_map import MappedJoint
 #: Files, and conversions to other units, round: what limits may be passed by, as a fraction of their range [-].
 ROUNDING = 1e-6
 #: A joint may be found outside its limits by this much, and is only led back inside [rad].
-MEASURED_OUTSIDE = 0.1
+MEASURED_OUTSIDE = 0.3
+#: Times of a command rise by at least this [s]: messages count nanoseconds, and controllers refuse equal times.
+SHORTEST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -76,11 +78,12 @@ class CommandCheck:
         Raises:
             RefusedCommandError: it is not; the message says in what.
         """
-        if not state.age <= self.max_age:
-            raise RefusedCommandError(
-                f"The state of the hand is stale: {state.age:.2f} s old; at most {self.max_age:g} s is accepted."
-            )
         for name, limits in self.limits.items():
+            age = state.age([name])
+            if not age <= self.max_age:
+                raise RefusedCommandError(
+                    f"The state of joint '{name}' is stale: {age:.2f} s old; at most {self.max_age:g} s is accepted."
+                )
             if name not in state.positions:
                 raise RefusedCommandError(f"The state of the hand says nothing of joint '{name}'.")
             value = state.positions[name]
@@ -135,7 +138,7 @@ class CommandCheck:
             raise RefusedCommandError(f"A path of shape {path.positions.shape} does not fit its times and joints.")
         if not (np.isfinite(path.positions).all() and np.isfinite(path.times).all()):
             raise RefusedCommandError("A command holds a number that is not finite.")
-        if path.times[0] <= 0.0 or (np.diff(path.times) <= 0.0).any():
+        if (np.diff(path.times, prepend=0.0) < SHORTEST).any():
             raise RefusedCommandError("The times of a command do not rise from now on.")
 
 

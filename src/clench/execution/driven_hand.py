@@ -138,7 +138,7 @@ class DrivenHand:
             times=np.concatenate([before[:-1], before[-1] + after]),
             positions=np.vstack([way[:-1], angles]) * scale + offset,
         )
-        return plan, float(np.abs(angles[0] - found).max(initial=0.0))
+        return plan.thinned(), float(np.abs(angles[0] - found).max(initial=0.0))
 
     def _report(
         self, followed: Followed, mapped: Mapping[str, MappedJoint], computed: FloatArray, way: float

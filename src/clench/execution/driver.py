@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -27,11 +27,16 @@ class HandState:
     """Hold what a controller said last, in its own names and units.
 
     Args:
-        positions: of its joints. age: how long ago they were measured, as far as known here [s].
+        positions: of its joints. ages: how long ago each was measured, as far as known here [s]; joints that are left
+            out were measured now.
     """
 
     positions: Mapping[str, float]
-    age: float
+    ages: Mapping[str, float] = field(default_factory=dict)
+
+    def age(self, names: Iterable[str]) -> float:
+        """Return how long ago the oldest of some joints was measured [s]."""
+        return max((self.ages.get(name, 0.0) for name in names), default=0.0)
 
 
 @dataclass(frozen=True, eq=False)

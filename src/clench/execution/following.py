@@ -42,6 +42,15 @@ class TimedPlan:
     times: FloatArray
     positions: FloatArray
 
+    def thinned(self) -> TimedPlan:
+        """Return the plan without way-points that are next to the one before; the first and the last stay."""
+        kept = [0]
+        for k in range(1, len(self.times) - 1):
+            if self.times[k] - self.times[kept[-1]] > CLOSEST and self.times[-1] - self.times[k] > CLOSEST:
+                kept.append(k)
+        kept.append(len(self.times) - 1)
+        return TimedPlan(self.joints, self.times[kept], self.positions[kept])
+
     @property
     def duration(self) -> float:
         """Time from the first way-point to the last [s]."""
@@ -113,6 +122,9 @@ class Follower:
         except DriverError as error:
             found.trouble = str(error)
             found.stopped = self._stop(found)
+        except Exception as error:  # drivers are others' code: whatever they raise, the hand is stopped
+            found.trouble = f"The driver failed ({type(error).__name__}: {error})."
+            found.stopped = self._stop(found)
         except BaseException:
             self._stop(found, wait=0.0)
             raise
@@ -123,7 +135,7 @@ class Follower:
         moment, told = 0.0, 0.0
         while True:
             state, expected = self.driver.read(), plan.at(moment)
-            self.check.state(state, plan.at(moment - state.age))
+            self.check.state(state, plan.at(moment - state.age(plan.joints)))
             found.sample(latest - begun, expected, state)
             if self.stopping.is_set():
                 raise DriverError("Stopped on request.")
@@ -159,13 +171,13 @@ class Follower:
             while time.monotonic() < until:
                 time.sleep(2.0 * PERIOD)
                 state = self.driver.read()
-                fresh = state.age <= 2.0 * PERIOD
+                fresh = state.age(self.check.limits) <= 2.0 * PERIOD
                 if fresh and before is not None and self._still(before, state):
                     if found.times:
                         found.sample(found.times[-1] + wait - (until - time.monotonic()), found.commanded[-1], state)
                     return True
                 before = state if fresh else None
-        except DriverError:
+        except Exception:  # as above
             return False
         return False
 

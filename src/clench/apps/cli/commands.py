@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 from clench.base.errors import CommandError, FileError
 
+from .exchange import export, import_
+from .execute import execute
+
 if TYPE_CHECKING:
     from clench.base.pose import Pose
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
 Source = Literal["engine", "raw", "visual"]
@@ -90,7 +92,7 @@ def solve(
     from clench.kernels.warming import warm_up
 
     from .printing import print_choice, print_pose_error, print_solution
-    from .results import print_json, write_results
+    from .results import exit_code, print_json, write_results
 
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
@@ -160,57 +162,6 @@ def hand(
     return 0
 
 
-def execute(
-    solution: Path,
-    /,
-    *,
-    actuator: Literal["simulated"] = "simulated",
-    hand: str | None = None,
-    object: str | None = None,
-    hand_file: Path | None = None,
-    palm: str | None = None,
-    scale: float = 1.0,
-    speed: float = 1.0,
-    force: bool = False,
-    out: Path | None = None,
-    strict: bool = False,
-    json: bool = False,
-) -> int:
-    """Carry out a solution and report what was reached.
-
-    Args:
-        solution: file written by `clench solve --out` or `GraspSolution.save`.
-        actuator: what moves the hand.
-        hand: model of the hand; the one that the solution names by default.
-        object: model of the object; the one that the solution names by default.
-        hand_file: TOML file that was used to load the hand.
-        palm: palm link that was used to load the hand.
-        scale: that was used to load the object.
-        speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry out a solution that has violations, too.
-        out: file for the report (JSON).
-        strict: exit with 1 unless the solution's status is grasp.
-        json: print the report as one JSON document on standard output.
-    """
-    import clench
-
-    from .printing import print_report
-    from .results import print_json
-
-    the_solution = clench.GraspSolution.load(solution)
-    the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
-    the_object = clench.GraspObject.load(_named(object, the_solution.object_model, solution, "object"), scale=scale)
-    moved = clench.SimulatedHand(the_hand, the_object, show_progress=not json)
-    report = clench.execute(the_solution, moved, speed=speed, force=force)
-    if out is not None:
-        report.save(out)
-    if json:
-        print_json(report.to_dict())
-    else:
-        print_report(report)
-    return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
-
-
 def record(
     path: Path,
     /,
@@ -274,15 +225,11 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "solve": solve,
     "hand": hand,
     "execute": execute,
+    "export": export,
+    "import": import_,
     "record": record,
     "bench": bench,
 }
-
-
-def exit_code(solution: GraspSolution, strict: bool) -> int:
-    """Return 0 for a grasp, or a partial one unless strict, else 1."""
-    good = ("grasp",) if strict else ("grasp", "partial")
-    return 0 if solution.status.value in good else 1
 
 
 def first_approach(hand: Hand, obj: GraspObject, seed: int) -> Pose:
@@ -302,10 +249,3 @@ def first_approach(hand: Hand, obj: GraspObject, seed: int) -> Pose:
 def loadable(model: str) -> str:
     """Return a model's name, or the whole path when it is a file, so that it loads from anywhere."""
     return str(Path(model).resolve()) if Path(model).is_file() else model
-
-
-def _named(given: str | None, recorded: str, solution: Path, what: str) -> str:
-    name = given or recorded
-    if not name:
-        raise FileError(solution, f"{what}_model: the solution does not name it; give --{what}.")
-    return name

@@ -12,8 +12,8 @@ from clench.base.pose import Pose
 from clench.models.command import GraspCommand
 from clench.solve.solution import FingerStatus, GraspSolution, SolutionStatus
 
-from .commands import exit_code, loadable
-from .results import make_folder, print_json, write_results
+from .commands import loadable
+from .results import exit_code, make_folder, print_json, write_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable

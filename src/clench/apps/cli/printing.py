@@ -96,7 +96,8 @@ def print_hand(report: HandReport) -> None:
 def print_report(report: ExecutionReport) -> None:
     """Print what an actuator reached."""
     console = _console()
-    verdict = "[bold green]reached[/bold green]" if report.success else "[bold red]not reached[/bold red]"
+    good, bad = ("reached", "not reached") if report.joints else ("done", "failed")
+    verdict = f"[bold green]{good}[/bold green]" if report.success else f"[bold red]{bad}[/bold red]"
     console.print(f"{verdict}: {_plain(report.reason)}")
     if report.joints:
         table = _table(f"joints ({report.actuator} hand)", "joint", "computed [deg]", "reached [deg]", "error [deg]")

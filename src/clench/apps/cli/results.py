@@ -52,3 +52,9 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(folder, f"cannot be made a folder ({error.strerror or error}).") from None
+
+
+def exit_code(solution: GraspSolution, strict: bool) -> int:
+    """Return 0 for a grasp, or a partial one unless strict, else 1."""
+    good = ("grasp",) if strict else ("grasp", "partial")
+    return 0 if solution.status.value in good else 1

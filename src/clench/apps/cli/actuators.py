@@ -1,0 +1,80 @@
+"""What `clench execute` moves: the actuator that was asked for, from its options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from clench.base.errors import CommandError
+
+if TYPE_CHECKING:
+    from clench.execution.driver import HandDriver
+    from clench.execution.executing import Actuator
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+
+ActuatorName = Literal["simulated", "ros2", "orca", "orca-mock", "signal"]
+Interface = Literal["auto", "rclpy", "cyclonedds"]
+
+
+@dataclass(frozen=True)
+class ActuatorOptions:
+    """Hold the options of `clench execute` that tell how a hand is reached; None is the actuator's own default."""
+
+    controller: str | None
+    joint_states: str | None
+    interface: Interface | None
+    joint_map: Path | None
+    config: Path | None
+    timeout: float
+    to: str | None
+    record: Path | None
+
+
+#: Which options mean something to which actuator; any other that is given is refused.
+_TAKEN: dict[str, tuple[str, ...]] = {
+    "simulated": (),
+    "ros2": ("controller", "joint_states", "interface", "joint_map"),
+    "orca": ("joint_map", "config"),
+    "orca-mock": ("joint_map", "config"),
+    "signal": ("to", "record"),
+}
+
+
+def make_actuator(
+    name: ActuatorName, hand: Hand, obj: GraspObject, options: ActuatorOptions, show_progress: bool
+) -> Actuator:
+    """Return the actuator that was asked for.
+
+    Raises:
+        CommandError: an option that it does not take, or one that it needs is missing.
+    """
+    import clench
+
+    for option in sorted({option for taken in _TAKEN.values() for option in taken} - set(_TAKEN[name])):
+        if getattr(options, option) is not None:
+            raise CommandError(f"--{option.replace('_', '-')} means nothing to --actuator {name}.")
+    if not options.timeout > 0.0:
+        raise CommandError(f"--timeout: expected seconds above 0, got {options.timeout:g}.")
+    if name == "simulated":
+        return clench.SimulatedHand(hand, obj, show_progress=show_progress)
+    if name == "signal":
+        if options.to is None or options.record is None:
+            raise CommandError("--actuator signal needs --to (file:PATH, tcp:HOST:PORT, …) and --record DB.")
+        return clench.ReadySignal(hand, options.record, options.to, obj=obj, timeout=options.timeout)
+    joint_map = None if options.joint_map is None else clench.JointMap.load(options.joint_map)
+    driver = _driver(name, options)
+    return clench.DrivenHand(hand, driver, joint_map=joint_map, obj=obj, connect_timeout=options.timeout)
+
+
+def _driver(name: ActuatorName, options: ActuatorOptions) -> HandDriver:
+    import clench
+
+    if name == "ros2":
+        return clench.Ros2Driver(
+            options.controller or "hand_controller",
+            joint_states=options.joint_states or "/joint_states",
+            interface=options.interface or "auto",
+        )
+    return clench.OrcaDriver(options.config, mock=name == "orca-mock")

@@ -1,0 +1,97 @@
+"""`clench execute`: carry a solution out, on a simulated hand or on another controller."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from clench.base.errors import FileError
+
+from .actuators import ActuatorName, ActuatorOptions, Interface, make_actuator
+from .interrupts import stopped_by_signals
+
+
+def execute(
+    solution: Path,
+    /,
+    *,
+    actuator: ActuatorName = "simulated",
+    hand: str | None = None,
+    object: str | None = None,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    scale: float = 1.0,
+    speed: float = 1.0,
+    force: bool = False,
+    controller: str | None = None,
+    joint_states: str | None = None,
+    interface: Interface | None = None,
+    joint_map: Path | None = None,
+    config: Path | None = None,
+    timeout: float = 5.0,
+    to: str | None = None,
+    record: Path | None = None,
+    log: Path | None = None,
+    out: Path | None = None,
+    strict: bool = False,
+    json: bool = False,
+) -> int:
+    """Carry out a solution and report what was reached.
+
+    Args:
+        solution: file written by `clench solve --out` or `GraspSolution.save`.
+        actuator: what moves the hand.
+        hand: model of the hand; the one that the solution names by default.
+        object: model of the object; the one that the solution names by default.
+        hand_file: TOML file that was used to load the hand.
+        palm: palm link that was used to load the hand.
+        scale: that was used to load the object.
+        speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
+        force: carry out a solution that has violations, too.
+        controller: ros2: name of the joint_trajectory_controller (hand_controller).
+        joint_states: ros2: topic of the joint states (/joint_states).
+        interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
+        joint_map: ros2, orca: TOML file with the controller's joint names, units, offsets and limits.
+        config: orca: the hand's config.yaml.
+        timeout: seconds to look for the controller.
+        to: signal: file:PATH, tcp:HOST:PORT, unix:PATH or topic:NAME.
+        record: signal: record (SQLite file) that the solution is appended to.
+        log: file for what was told and measured on the way (MCAP).
+        out: file for the report (JSON).
+        strict: exit with 1 unless the solution's status is grasp.
+        json: print the report as one JSON document on standard output.
+    """
+    import clench
+
+    from .printing import print_report
+    from .results import exit_code, print_json
+
+    for file in (out, log):
+        if file is not None and not file.parent.is_dir():
+            raise FileError(file, f"cannot be written (no folder '{file.parent}').")
+    the_solution = clench.GraspSolution.load(solution)
+    the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
+    the_object = clench.GraspObject.load(
+        _named(object, the_solution.object_model, solution, "object"),
+        scale=scale,
+        collision_source=the_solution.object_collision_source,
+    )
+    options = ActuatorOptions(controller, joint_states, interface, joint_map, config, timeout, to, record)
+    moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
+    with stopped_by_signals():
+        report = clench.execute(the_solution, moved, speed=speed, force=force)
+    if out is not None:
+        report.save(out)
+    if log is not None and report.history is not None:
+        clench.write_log(log, report, the_solution)
+    if json:
+        print_json(report.to_dict())
+    else:
+        print_report(report)
+    return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
+
+
+def _named(given: str | None, recorded: str, solution: Path, what: str) -> str:
+    name = given or recorded
+    if not name:
+        raise FileError(solution, f"{what}_model: the solution does not name it; give --{what}.")
+    return name

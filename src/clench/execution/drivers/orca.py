@@ -1,0 +1,117 @@
+"""The ORCA hand through its makers' `orca-core`: an example of a third-party hand that is told one target at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from clench.base.errors import CommandError, FileError
+from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
+
+
+class OrcaDriver:
+    """Move an ORCA hand; it speaks degrees, by the names of its `config.yaml`, so a joint map is needed.
+
+    Args:
+        config: the hand's `config.yaml`; None: the one that orca-core has for the newest hand.
+        mock: move motors in memory, without hardware.
+        version: of the hand, e.g. ``"v1"``, when `config` is not given.
+
+    Raises:
+        CommandError: orca-core is not installed. FileError: the configuration cannot be used.
+    """
+
+    def __init__(self, config: str | Path | None = None, *, mock: bool = False, version: str | None = None) -> None:
+        if importlib.util.find_spec("orca_core") is None:
+            raise CommandError("orca-core is not installed; pip install 'clench[drivers]'.")
+        if config is not None and not Path(config).is_file():
+            raise FileError(config, "no such file.")
+        import orca_core
+
+        kind = orca_core.MockOrcaHand if mock else orca_core.OrcaHand
+        self.name = "orca (mock)" if mock else "orca"
+        try:
+            with _quiet():
+                self._hand: Any = kind(
+                    config_path=None if config is None else str(Path(config).resolve()), model_version=version
+                )
+        except (ValueError, KeyError, OSError) as error:
+            raise FileError(config or f"orca-core's model {version or ''}".strip(), f"{error}") from None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints in the hand's configuration."""
+        return tuple(self._hand.config.joint_ids)
+
+    @property
+    def limits(self) -> DriverLimits:
+        """Ranges of motion in the hand's configuration [deg]; orca-core would clamp to them without a word."""
+        ranges = self._hand.config.joint_roms_dict
+        return DriverLimits({name: (float(low), float(high)) for name, (low, high) in ranges.items()})
+
+    def connect(self, timeout: float) -> None:
+        """Open the line and switch the motors on, without moving.
+
+        Raises:
+            DriverError: no hand answers, or it is not calibrated, which would move every joint to its ends.
+        """
+        with _trouble():
+            there, message = self._hand.connect(interactive=False)
+            if not there:
+                raise DriverError(f"The ORCA hand does not answer: {message}.")
+            if not self._hand.calibrated:
+                raise DriverError("The ORCA hand is not calibrated; calibrate it with orca-core, with nothing in it.")
+            self._hand.init_joints(move_to_neutral=False)
+
+    def read(self) -> HandState:
+        """Read every joint [deg].
+
+        Raises:
+            DriverError: the motors do not answer.
+        """
+        with _trouble():
+            positions = self._hand.get_joint_position().as_dict()
+            # Without an answer orca-core repeats what it read before.
+            if not self._hand.last_read_ok:
+                raise DriverError("The motors of the ORCA hand do not answer.")
+        return HandState({name: math.nan if angle is None else float(angle) for name, angle in positions.items()})
+
+    def command(self, path: JointPath) -> None:
+        """Send the targets for the moment at which the next path is due."""
+        with _trouble():
+            self._hand.set_joint_positions(path.at(path.period))
+
+    def stop(self) -> None:
+        """Hold where the joints are."""
+        with _trouble():
+            if self._hand.is_connected():
+                self._hand.set_joint_positions(self._hand.get_joint_position())
+
+    def disconnect(self) -> None:
+        """Switch the motors off and close the line."""
+        with _trouble():
+            self._hand.disconnect()
+
+
+@contextlib.contextmanager
+def _trouble() -> Iterator[None]:
+    """Turn whatever the hand's own program raises into one sentence."""
+    try:
+        with _quiet():
+            yield
+    except DriverError:
+        raise
+    except Exception as error:
+        raise DriverError(f"The ORCA hand failed ({type(error).__name__}: {error}).") from None
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep orca-core's own printing, of which standard output is full, to itself: failures are raised or returned."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield

@@ -1,0 +1,279 @@
+"""ROS 2: a joint_trajectory_controller by its topics, through `rclpy` or, without a ROS installation, `cyclonedds`.
+
+Out: `/<controller>/joint_trajectory` (trajectory_msgs/JointTrajectory), in: `/joint_states` (sensor_msgs/JointState).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Protocol
+
+from clench.base.errors import CommandError, UnknownNameError
+from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
+
+#: In this time a hand that was told to stop is back where it was measured [s].
+STOP_TIME: Final = 0.1
+#: State that is older is not where the hand is stopped [s]: it may be far from it by then.
+STOP_AGE: Final = 0.3
+#: How often a connection is looked at while it comes up [s].
+LOOK: Final = 0.02
+
+
+class RosInterface(StrEnum):
+    """Name what ROS 2 is spoken through."""
+
+    AUTO = "auto"
+    """rclpy where it is installed, else cyclonedds"""
+    RCLPY = "rclpy"
+    """the client library of a ROS installation"""
+    CYCLONEDDS = "cyclonedds"
+    """DDS alone, without a ROS installation"""
+
+
+@dataclass(frozen=True)
+class JointStates:
+    """Hold one message of joint states.
+
+    Args:
+        positions: by joint, in rad. stamp: the sender's time [ns], 0 when it gave none.
+    """
+
+    positions: Mapping[str, float]
+    stamp: int
+
+
+class RosLink(Protocol):
+    """Reach two topics; every method returns at once but `flush`."""
+
+    name: str
+
+    def listeners(self) -> int:
+        """Return how many controllers listen to the trajectory topic."""
+
+    def states(self) -> list[JointStates]:
+        """Return the messages that have come since the last call, oldest first."""
+
+    def publish(self, joints: Sequence[str], times: Sequence[float], positions: Sequence[Sequence[float]]) -> None:
+        """Send a trajectory that starts when it arrives; times [s], positions [rad] of every point."""
+
+    def flush(self, timeout: float) -> None:
+        """Wait until what was sent has been received, at most so long [s]."""
+
+    def trajectory_topics(self) -> list[str]:
+        """Return the topics on which somebody listens for trajectories."""
+
+    def close(self) -> None:
+        """Leave the network."""
+
+
+class Ros2Driver:
+    """Move a hand by a joint_trajectory_controller of ROS 2.
+
+    Domain, discovery range and middleware are those of the environment (ROS_DOMAIN_ID,
+    ROS_AUTOMATIC_DISCOVERY_RANGE, RMW_IMPLEMENTATION; CYCLONEDDS_URI for `cyclonedds`).
+
+    Args:
+        controller: name of the controller. joint_states: topic of the states.
+        interface: what ROS 2 is spoken through, see `RosInterface`.
+        domain: number of the ROS domain; None: that of the environment, else 0.
+
+    Raises:
+        CommandError: malformed name or domain. UnknownNameError: no such interface.
+    """
+
+    limits = DriverLimits()
+
+    def __init__(
+        self,
+        controller: str = "hand_controller",
+        *,
+        joint_states: str = "/joint_states",
+        interface: RosInterface | str = RosInterface.AUTO,
+        domain: int | None = None,
+    ) -> None:
+        if interface not in list(RosInterface):
+            raise UnknownNameError("interface", str(interface), "ROS 2", [i.value for i in RosInterface])
+        self.interface = RosInterface(interface)
+        self.topic = topic_name(controller, "controller") + "/joint_trajectory"
+        self.state_topic = topic_name(joint_states, "joint_states")
+        self.domain = ros_domain(domain)
+        self._link: RosLink | None = None
+        self._through = ""
+        self._lock = threading.Lock()
+        self._positions: dict[str, float] = {}
+        self._received: dict[str, float] = {}
+        self._stamps: dict[str, int] = {}
+        self._sent: tuple[float, JointPath] | None = None
+
+    @property
+    def name(self) -> str:
+        """`ros2`, and what it is spoken through."""
+        return f"ros2 ({self._through})" if self._through else "ros2"
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints whose states came in."""
+        return tuple(self._positions)
+
+    def connect(self, timeout: float) -> None:
+        """Wait for a controller that listens and for a first state, at most so long [s].
+
+        Raises:
+            CommandError: neither rclpy nor cyclonedds is installed, or not the one that was asked for.
+            DriverError: no controller listens, or no state comes.
+        """
+        self.disconnect()
+        self._link = open_link(self.interface, self.topic, self.state_topic, self.domain)
+        self._through = self._link.name
+        until = time.monotonic() + timeout
+        while time.monotonic() < until:
+            self._receive()
+            if self._link.listeners() and self._positions:
+                return
+            time.sleep(LOOK)
+        raise DriverError(self._silence(timeout))
+
+    def read(self) -> HandState:
+        """Return the newest position of every joint; a state that repeats its stamp counts as the old one."""
+        self._receive()
+        now = time.monotonic()
+        with self._lock:
+            return HandState(dict(self._positions), {name: now - at for name, at in self._received.items()})
+
+    def command(self, path: JointPath) -> None:
+        """Send the path; it replaces what the controller is doing.
+
+        Raises:
+            DriverError: nobody listens any more.
+        """
+        link = self._connected()
+        if not link.listeners():
+            raise DriverError(f"Nobody listens on '{self.topic}' any more.")
+        link.publish(path.joints, path.times.tolist(), path.positions.tolist())
+        self._sent = (time.monotonic(), path)
+
+    def stop(self) -> None:
+        """Tell the controller to hold where the joints were measured last, or were told to be by now.
+
+        Raises:
+            DriverError: not connected.
+        """
+        if self._sent is None:
+            return
+        link, (sent, path) = self._connected(), self._sent
+        state, told = self.read(), path.at(time.monotonic() - sent)
+        fresh = state.age(path.joints) <= STOP_AGE
+        link.publish(
+            path.joints,
+            [STOP_TIME],
+            [[state.positions.get(name, told[name]) if fresh else told[name] for name in path.joints]],
+        )
+        link.flush(STOP_TIME)
+
+    def disconnect(self) -> None:
+        """Leave the network and forget what was read."""
+        link, self._link = self._link, None
+        if link is not None:
+            link.close()
+        self._sent = None
+        with self._lock:
+            self._positions.clear()
+            self._received.clear()
+            self._stamps.clear()
+
+    def _connected(self) -> RosLink:
+        if self._link is None:
+            raise DriverError("ROS 2 is not connected.")
+        return self._link
+
+    def _receive(self) -> None:
+        messages, now = self._connected().states(), time.monotonic()
+        with self._lock:
+            for message in messages:
+                for name, position in message.positions.items():
+                    self._positions[name] = position
+                    if message.stamp == 0 or self._stamps.get(name) != message.stamp:
+                        self._received[name] = now
+                    self._stamps[name] = message.stamp
+
+    def _silence(self, timeout: float) -> str:
+        link = self._connected()
+        where = f"(waited {timeout:g} s, domain {self.domain}, {link.name})"
+        if link.listeners():
+            return f"'{self.state_topic}' is silent {where}: no joint state came."
+        others = link.trajectory_topics()
+        heard = f" Trajectories are listened for on: {', '.join(others)}." if others else ""
+        return f"No controller listens on '{self.topic}' {where}.{heard}"
+
+
+def open_link(interface: RosInterface, topic: str, state_topic: str, domain: int) -> RosLink:
+    """Join the network through what is installed.
+
+    Raises:
+        CommandError: neither rclpy nor cyclonedds is installed, or not the one that was asked for.
+    """
+    if installed_interface(interface) is RosInterface.RCLPY:
+        from .rclpy_link import RclpyLink
+
+        return RclpyLink(topic, state_topic, domain)
+    from .cyclone_link import CycloneLink
+
+    return CycloneLink(topic, state_topic, domain)
+
+
+def installed_interface(interface: RosInterface) -> RosInterface:
+    """Return what ROS 2 is spoken through: what was asked for, else rclpy before cyclonedds.
+
+    Raises:
+        CommandError: neither is installed, or not the one that was asked for.
+    """
+    found = [name for name in (RosInterface.RCLPY, RosInterface.CYCLONEDDS) if importlib.util.find_spec(name)]
+    if interface is not RosInterface.AUTO and interface not in found:
+        raise CommandError(f"{interface} is not installed; {_ADVICE[interface]}.")
+    if not found:
+        raise CommandError(f"No ROS 2 found: neither rclpy nor cyclonedds is installed; {_ADVICE[interface]}.")
+    return found[0] if interface is RosInterface.AUTO else interface
+
+
+_ADVICE: Final = {
+    RosInterface.AUTO: "source a ROS installation, or: pip install 'clench[ros2]'",
+    RosInterface.RCLPY: "source a ROS installation, or: pip install 'clench[ros2]'",
+    RosInterface.CYCLONEDDS: "pip install cyclonedds",
+}
+
+
+def topic_name(text: str, key: str) -> str:
+    """Return an absolute topic name.
+
+    Raises:
+        CommandError: empty, or with characters that no topic has.
+    """
+    name = "/" + text.strip("/")
+    if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", name):
+        raise CommandError(f"{key}: expected a ROS name such as 'hand_controller', got '{text}'.")
+    return name
+
+
+def ros_domain(given: int | None) -> int:
+    """Return the number of the ROS domain: what was given, else that of the environment, else 0.
+
+    Raises:
+        CommandError: not a whole number from 0 to 232.
+    """
+    said = os.environ.get("ROS_DOMAIN_ID", "") or "0" if given is None else str(given)
+    if not said.isdecimal() or int(said) > 232:
+        raise CommandError(f"ROS domain: expected a whole number from 0 to 232, got '{said}'.")
+    return int(said)
+
+
+def on_this_machine_only() -> bool:
+    """Return whether the environment asks ROS to talk within this machine only."""
+    within = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+    return within or os.environ.get("ROS_LOCALHOST_ONLY") == "1"

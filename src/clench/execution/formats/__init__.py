@@ -1,0 +1,1 @@
+"""Grasps in other programs' files, out and in."""

@@ -1,0 +1,108 @@
+"""The isaac_grasp YAML format, version 1.0: the gripper's frame in the object's, and named joint angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from clench.base.errors import CommandError, FileError
+from clench.base.json_files import write_atomically
+from clench.base.pose import Pose
+from clench.solve.solution import GraspSolution
+
+from .grasp_posture import GraspPosture, before_the_grasp, palm_in_object
+
+FORMAT: Final = "isaac_grasp"
+VERSION: Final = 1.0
+
+
+def write_isaac_grasp(path: str | Path, solutions: Sequence[GraspSolution]) -> None:
+    """Write solutions of one hand and object; the confidence is 1 for valid ones, else 0.
+
+    Raises:
+        CommandError: solutions of several hands or objects. FileError: the file cannot be written.
+    """
+    import yaml
+
+    if len({(s.hand, s.object) for s in solutions}) != 1:
+        raise CommandError(f"{FORMAT}: expected solutions of one hand and one object, got several or none.")
+    document = {
+        "format": FORMAT,
+        "format_version": VERSION,
+        "object_frame": solutions[0].object,
+        "gripper_frame": solutions[0].hand,
+        "grasps": {f"grasp_{i}": _grasp(s) for i, s in enumerate(solutions)},
+    }
+    write_atomically(path, yaml.safe_dump(document, sort_keys=False, width=110).encode())
+
+
+def read_isaac_grasp(path: str | Path) -> list[GraspPosture]:
+    """Read grasps with the object at the origin of the world; joint angles may be missing.
+
+    Raises:
+        FileError: missing, not YAML, another format, or a malformed key, which the message names.
+    """
+    import yaml
+
+    try:
+        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FileError(path, "no such file.") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise FileError(path, f"not YAML ({' '.join(str(error).split())}).") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise FileError(path, f"format: expected '{FORMAT}'.")
+    if data.get("format_version") != VERSION:
+        raise FileError(path, f"format_version: expected {VERSION}, got {data.get('format_version')!r}.")
+    grasps = data.get("grasps")
+    if not isinstance(grasps, dict) or not grasps:
+        raise FileError(path, "grasps: expected at least one, by name.")
+    return [_posture(str(name), grasp, str(path)) for name, grasp in grasps.items()]
+
+
+def _grasp(solution: GraspSolution) -> dict[str, Any]:
+    T_object_palm = palm_in_object(solution)
+    w, *xyz = T_object_palm.wxyz.tolist()
+    return {
+        "confidence": 1.0 if solution.is_valid() else 0.0,
+        "position": T_object_palm.position.tolist(),
+        "orientation": {"w": w, "xyz": xyz},
+        "cspace_position": dict(solution.joint_angles),
+        "pregrasp_cspace_position": dict(before_the_grasp(solution)),
+    }
+
+
+def _posture(name: str, grasp: Any, source: str) -> GraspPosture:
+    key = f"grasps.{name}"
+    if not isinstance(grasp, dict):
+        raise FileError(source, f"{key}: expected a mapping, got {grasp!r}.")
+    orientation = grasp.get("orientation")
+    if not isinstance(orientation, dict) or "w" not in orientation or "xyz" not in orientation:
+        raise FileError(source, f"{key}.orientation: expected 'w' and 'xyz'.")
+    xyz = orientation["xyz"] if isinstance(orientation["xyz"], list) else []
+    try:
+        pose = Pose(grasp.get("position", ()), wxyz=[orientation["w"], *xyz], key=key)
+    except CommandError as error:
+        raise FileError(source, str(error)) from None
+    confidence = grasp.get("confidence")
+    if confidence is not None and not _is_number(confidence):
+        raise FileError(source, f"{key}.confidence: expected a number, got {confidence!r}.")
+    return GraspPosture(name, pose, joint_angles=_angles(grasp, key, source), confidence=confidence)
+
+
+def _angles(grasp: Mapping[str, Any], key: str, source: str) -> dict[str, float]:
+    angles = grasp.get("cspace_position") or {}
+    if not isinstance(angles, dict):
+        raise FileError(source, f"{key}.cspace_position: expected angles by joint, got {angles!r}.")
+    for joint, angle in angles.items():
+        if not _is_number(angle):
+            raise FileError(source, f"{key}.cspace_position.{joint}: expected a finite number in rad, got {angle!r}.")
+    return {str(joint): float(angle) for joint, angle in angles.items()}
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,165 @@
+"""The command line of other controllers and formats: options that fit together, exit codes, one sentence, files."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import clench
+from clench.apps.cli.exchange import Format
+from clench.apps.cli.main import main
+from clench.execution.driven_hand import DrivenHand
+from clench.execution.drivers.ros2 import RosInterface
+from clench.execution.formats.exchange import GraspFormat
+from clench.grasp.scene import hash_bodies, hash_hand
+from clench.models.command_file import load_command
+from clench.models.shapes import CollisionSource
+from clench.solve.record import Record
+from clench.solve.solution import GraspSolution
+from handmade import make_solution
+
+
+@pytest.fixture
+def solution(tmp_path: Path) -> GraspSolution:
+    """Return a posture of the built-in hand as the solution of a command, and save it as s.json."""
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
+    q = hand.open_angles()
+    q[hand.joint_index("index_proximal")] = 0.3
+    made = make_solution(
+        hand="robonaut2",
+        object="ball",
+        hand_model="robonaut2",
+        object_model="ball",
+        geometry_hash=f"{hash_hand(hand, CollisionSource.ENGINE)}+{hash_bodies(obj.bodies, CollisionSource.RAW)}",
+        joint_angles=dict(zip(hand.joint_names, hand.coupled(q).tolist(), strict=True)),
+        open_angles=dict(zip(hand.joint_names, hand.open_angles().tolist(), strict=True)),
+        joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
+        max_penetration=0.0,
+        decomposition={"posture": {}, "closing": {}},
+        fingers={},
+        contacts=(),
+    )
+    made.save(tmp_path / "s.json")
+    return made
+
+
+def test_choices_are_the_values_of_the_enumerations() -> None:
+    from clench.apps.cli.actuators import Interface
+
+    assert set(Interface.__args__) == set(RosInterface)
+    assert set(Format.__args__) == set(GraspFormat)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--controller", "c"], "--controller means nothing to --actuator simulated."),
+        (["--actuator", "signal", "--joint-map", "j.toml"], "--joint-map means nothing to --actuator signal."),
+        (["--actuator", "signal"], "--actuator signal needs --to (file:PATH"),
+        (["--actuator", "signal", "--record", "r.db", "--to", "mail:x"], "to: expected file:PATH, tcp:HOST:PORT"),
+        (["--actuator", "ros2", "--controller", "a b"], "controller: expected a ROS name such as"),
+        (["--actuator", "ros2", "--joint-map", "absent.toml"], "absent.toml: no such file."),
+        (["--actuator", "ros2", "--timeout", "0"], "--timeout: expected seconds above 0, got 0."),
+        (["--actuator", "orca-mock", "--config", "absent.yaml"], "absent.yaml: no such file."),
+        (["--object", "mug"], "geometry_hash: the solution was computed for another geometry of object 'mug'"),
+        (["--log", "absent/x.mcap"], "absent/x.mcap: cannot be written (no folder 'absent')."),
+        (["--out", "absent/x.json"], "absent/x.json: cannot be written (no folder 'absent')."),
+    ],
+)
+def test_bad_input_moves_nothing(
+    solution: GraspSolution,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    message: str,
+) -> None:
+    if "orca-mock" in arguments:
+        pytest.importorskip("orca_core")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(DrivenHand, "carry_out", lambda *_: pytest.fail("moved"))
+    assert main(["execute", "s.json", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"clench: error: {message}")
+    assert err.count("\n") == 1
+
+
+def test_a_hand_without_controller_is_a_failed_execution(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("cyclonedds")
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    options = ["--actuator", "ros2", "--interface", "cyclonedds", "--timeout", "0.2", "--controller", "nobody"]
+    assert main(["execute", str(tmp_path / "s.json"), *options, "--json"]) == 1
+    report = json.loads(capsys.readouterr().out)
+    assert report["reason"].startswith("Not carried out: No controller listens on '/nobody/joint_trajectory'")
+    assert report["history"] is None
+
+
+def test_the_ready_signal(solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ready, record = tmp_path / "ready.json", tmp_path / "r.db"
+    options = ["--actuator", "signal", "--to", f"file:{ready}", "--record", str(record)]
+    assert main(["execute", str(tmp_path / "s.json"), *options]) == 0
+    assert "done: Recorded as 1 and signalled to" in capsys.readouterr().out
+    with Record(record) as recorded:
+        assert recorded.read(json.loads(ready.read_text())["id"]) == solution
+
+
+@pytest.mark.parametrize("ending", ["yaml", "npy", "json"])
+def test_export_and_import(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str], ending: str
+) -> None:
+    file, folder = tmp_path / f"g.{ending}", tmp_path / "commands"
+    assert main(["export", str(tmp_path / "s.json"), "--out", str(file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"schema": "clench.export/1", "file": str(file), "grasps": 1}
+    assert main(["import", str(file), "--hand", "robonaut2", "--out", str(folder), "--json"]) == 0
+    (command,) = json.loads(capsys.readouterr().out)["commands"]
+    assert command["name"] == "grasp_0"
+    read = load_command(command["file"])
+    assert read.preshape["index_yaw"] == solution.joint_angles["index_yaw"]
+    assert "index_proximal" not in read.preshape
+    assert read.object_pose == clench.Pose()
+    assert main(["import", str(file), "--hand", "patent15", "--out", str(tmp_path / "no")]) == 2
+    assert not (tmp_path / "no").exists()
+    assert main(["import", str(file), "--hand", "robonaut2", "--out", str(folder), "--grasp", "x"]) == 2
+    assert "Grasp 'x' is not in" in capsys.readouterr().err
+
+
+def test_names_that_lead_elsewhere_are_refused(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["export", str(tmp_path / "s.json"), "--out", str(tmp_path / "g.yaml")])
+    text = (tmp_path / "g.yaml").read_text().replace("grasp_0", "../grasp_0")
+    (tmp_path / "g.yaml").write_text(text)
+    assert main(["import", str(tmp_path / "g.yaml"), "--hand", "robonaut2", "--out", str(tmp_path / "c")]) == 2
+    assert "the name cannot be that of a file" in capsys.readouterr().err
+    assert not (tmp_path / "grasp_0.json").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_being_told_to_end_stops_the_hand(tmp_path: Path, number: int) -> None:
+    program = (
+        "import sys, time\n"
+        "from clench.apps.cli.interrupts import stopped_by_signals\n"
+        "try:\n"
+        "    with stopped_by_signals():\n"
+        "        print('moving', flush=True)\n"
+        "        time.sleep(20)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('stopped', flush=True)\n"
+    )
+    run = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert run.stdout is not None
+    assert run.stdout.readline() == "moving\n"
+    time.sleep(0.1)
+    run.send_signal(number)
+    out, _ = run.communicate(timeout=10)
+    assert out == "stopped\n"

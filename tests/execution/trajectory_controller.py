@@ -1,0 +1,154 @@
+"""A process of its own that behaves like ros2_controllers' joint_trajectory_controller and a joint_state_broadcaster.
+
+It takes a trajectory of exactly its joints whose times rise, starts it on arrival from where it is, interpolates
+linearly, replaces it when another one comes, and holds the last point. It can lose its connection, die or fall silent.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+
+class Joints:
+    def __init__(self, names: list[str], start: list[float]) -> None:
+        self.names, self.at = names, np.array(start)
+        self.times, self.points = np.zeros(1), self.at[None]
+        self.refused: list[str] = []
+        self.accepted = 0
+
+    def take(self, names: list[str], times: list[float], points: list[list[float]]) -> None:
+        if set(names) != set(self.names) or len(names) != len(self.names):
+            self.refused.append(f"joints {names}")
+        elif not points or any(len(p) != len(names) for p in points):
+            self.refused.append("points")
+        elif (np.diff(times) <= 0).any() or times[0] < 0:
+            self.refused.append(f"times {times}")
+        else:
+            order = [names.index(n) for n in self.names]
+            now = time.monotonic()
+            self.points = np.vstack([self.now(), np.array(points)[:, order]])
+            self.times = np.concatenate([[now], now + np.array(times)])
+            self.accepted += 1
+
+    def now(self) -> np.ndarray:
+        return np.array([np.interp(time.monotonic(), self.times, c) for c in self.points.T])
+
+
+class Cyclone:
+    def __init__(self, domain: int, topic: str, states: str) -> None:
+        from cyclonedds.domain import DomainParticipant
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
+
+        from clench.execution.drivers.cyclone_link import prepare_domain, quality
+        from clench.execution.drivers.dds_messages import JointState, JointTrajectory
+
+        prepare_domain(domain)
+        p = DomainParticipant(domain)
+        self.reader = DataReader(p, Topic(p, f"rt{topic}", JointTrajectory), qos=quality(reliable=True))
+        self.writer = DataWriter(p, Topic(p, f"rt{states}", JointState), qos=quality(reliable=True))
+
+    def spin(self, joints: Joints) -> None:
+        for m in self.reader.take(10):
+            if m.sample_info.valid_data:
+                times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in m.points]
+                joints.take(list(m.joint_names), times, [list(p.positions) for p in m.points])
+
+    def say(self, names: list[str], positions: list[float], stamp: int) -> None:
+        from clench.execution.drivers.dds_messages import Header, JointState, Time
+
+        self.writer.write(JointState(Header(Time(*divmod(stamp, 10**9)), ""), names, positions, [], []))
+
+    def cut(self) -> None:
+        self.reader = self.writer = None
+
+
+class Rclpy:
+    def __init__(self, domain: int, topic: str, states: str) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from sensor_msgs.msg import JointState
+        from trajectory_msgs.msg import JointTrajectory
+
+        self.context = rclpy.Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("trajectory_controller", context=self.context)
+        self.queue: list[JointTrajectory] = []
+        self.subscription = self.node.create_subscription(JointTrajectory, topic, self.queue.append, 10)
+        self.publisher = self.node.create_publisher(JointState, states, 10)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def spin(self, joints: Joints) -> None:
+        self.executor.spin_once(timeout_sec=0.0)
+        while self.queue:
+            m = self.queue.pop(0)
+            times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in m.points]
+            joints.take(list(m.joint_names), times, [list(p.positions) for p in m.points])
+
+    def say(self, names: list[str], positions: list[float], stamp: int) -> None:
+        from builtin_interfaces.msg import Time
+        from sensor_msgs.msg import JointState
+
+        message = JointState(name=names, position=positions)
+        message.header.stamp = Time(sec=stamp // 10**9, nanosec=stamp % 10**9)
+        self.publisher.publish(message)
+
+    def cut(self) -> None:
+        self.executor.remove_node(self.node)
+        self.node.destroy_node()
+
+
+def main() -> None:
+    p = argparse.ArgumentParser()
+    p.add_argument("--interface", choices=["cyclonedds", "rclpy"])
+    p.add_argument("--domain", type=int)
+    p.add_argument("--topic")
+    p.add_argument("--states")
+    p.add_argument("--joints")
+    p.add_argument("--start")
+    p.add_argument("--log", type=Path)
+    p.add_argument("--cut-after", type=float, default=np.inf, help="seconds of motion after which DDS is left")
+    p.add_argument("--die-after", type=float, default=np.inf)
+    p.add_argument("--freeze-after", type=float, default=np.inf, help="then the same state is sent on and on")
+    p.add_argument("--silent", action="store_true")
+    p.add_argument("--lifetime", type=float, default=40.0)
+    a = p.parse_args()
+    joints = Joints(a.joints.split(","), [float(x) for x in a.start.split(",")])
+    dds = {"cyclonedds": Cyclone, "rclpy": Rclpy}[a.interface](a.domain, a.topic, a.states)
+    begun, moving, cut, samples = time.monotonic(), None, None, []
+    ended: list[int] = []
+    signal.signal(signal.SIGTERM, lambda *_: ended.append(1))
+    stamp, at = time.time_ns(), joints.now()
+    while not ended and time.monotonic() - begun < a.lifetime:
+        if cut is None:
+            dds.spin(joints)
+        if moving is None and joints.accepted:
+            moving = time.monotonic()
+            a.log.with_suffix(".moving").touch()
+        since = 0.0 if moving is None else time.monotonic() - moving
+        if since > a.die_after:
+            os._exit(9)
+        if since > a.cut_after and cut is None:
+            cut = since
+            dds.cut()
+        if since <= a.freeze_after:
+            stamp, at = time.time_ns(), joints.now()
+        samples.append([since, *joints.now().tolist()])
+        if cut is None and not a.silent:
+            dds.say([*joints.names, "elbow"], [*at.tolist(), 1.0], stamp)
+        time.sleep(0.01)
+    log = {"accepted": joints.accepted, "refused": joints.refused, "cut": cut, "samples": samples}
+    a.log.write_text(json.dumps(log))
+    os._exit(0)
+
+
+main()
