@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from clench.models.shapes import CollisionSource, ShapeKind
     from clench.solve.controller import solve
     from clench.solve.pose_error import PoseErrorReport, pose_error
+    from clench.solve.quality import GraspQuality, grasp_quality
     from clench.solve.record import Record
     from clench.solve.sensitivity import Sensitivity, sensitivity
     from clench.solve.solution import (
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
         GraspSolution,
         SolutionStatus,
     )
+    from clench.solve.squeezing import SqueezePlan, plan_squeeze
 
 __version__ = "0.1.0"
 
@@ -80,6 +82,7 @@ _HOMES = {
     "GraspFormat": "clench.execution.formats.exchange",
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspPosture": "clench.execution.formats.grasp_posture",
+    "GraspQuality": "clench.solve.quality",
     "GraspSolution": "clench.solve.solution",
     "Hand": "clench.models.hand.hand",
     "HandCriterion": "clench.grasp.criteria",
@@ -100,15 +103,18 @@ _HOMES = {
     "ShapeKind": "clench.models.shapes",
     "SimulatedHand": "clench.execution.simulation",
     "SolutionStatus": "clench.solve.solution",
+    "SqueezePlan": "clench.solve.squeezing",
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
     "approach_poses": "clench.grasp.approach",
     "check_hand": "clench.grasp.self_check",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
+    "grasp_quality": "clench.solve.quality",
     "import_grasps": "clench.execution.formats.exchange",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
+    "plan_squeeze": "clench.solve.squeezing",
     "plan_trajectory": "clench.execution.trajectory",
     "pose_error": "clench.solve.pose_error",
     "register_criterion": "clench.grasp.criterion_registry",
@@ -143,6 +149,7 @@ __all__ = [
     "GraspFormat",
     "GraspObject",
     "GraspPosture",
+    "GraspQuality",
     "GraspSolution",
     "Hand",
     "HandCriterion",
@@ -163,6 +170,7 @@ __all__ = [
     "ShapeKind",
     "SimulatedHand",
     "SolutionStatus",
+    "SqueezePlan",
     "Trajectory",
     "UnknownNameError",
     "__version__",
@@ -170,9 +178,11 @@ __all__ = [
     "check_hand",
     "execute",
     "export_grasps",
+    "grasp_quality",
     "import_grasps",
     "load_calibration",
     "load_command",
+    "plan_squeeze",
     "plan_trajectory",
     "pose_error",
     "register_criterion",

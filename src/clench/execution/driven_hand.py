@@ -11,6 +11,7 @@ from clench.base.errors import UnknownNameError
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, command_limits, slowed_down
@@ -19,7 +20,7 @@ from .following import CLOSEST, HORIZON, Followed, Follower, TimedPlan
 from .history import ExecutionHistory
 from .joint_map import JointMap, MappedJoint
 from .report import ExecutionReport, JointReached
-from .trajectory import Trajectory, posture
+from .trajectory import Trajectory
 
 #: Points of the way from where the hand is found to the trajectory's start.
 WAY_POINTS = 9

@@ -10,11 +10,12 @@ import numpy as np
 from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.solve.posture import posture
 from clench.solve.solution import Contact, FingerStatus, GraspSolution
 
 from .report import ContactReached, ExecutionReport, JointReached
 from .scene import TIMESTEP, Scene, body_pose, build_scene
-from .trajectory import Trajectory, posture
+from .trajectory import Trajectory
 
 #: How long the hand stands still after the motion [s], so that the servos settle.
 SETTLING = 0.4

@@ -15,6 +15,7 @@ from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import DEFAULT_SPEED, Hand, JointRole
+from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 SCHEMA = "clench.trajectory/1"
@@ -131,20 +132,6 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
         positions=np.vstack([lead_in[:-1], positions]),
         velocity_limits=limits,
     )
-
-
-def posture(angles: Any, hand: Hand, key: str) -> FloatArray:
-    """Return named angles in model order, shape (J,) [rad].
-
-    Raises:
-        CommandError: a joint of the hand is missing, or a name is not one of its joints.
-    """
-    missing = [name for name in hand.joint_names if name not in angles]
-    extra = sorted(set(angles) - set(hand.joint_names))
-    if missing or extra:
-        problem = f"joint '{missing[0]}' is missing" if missing else f"'{extra[0]}' is no joint of it"
-        raise CommandError(f"{key}: the solution does not fit hand '{hand.name}': {problem}.")
-    return np.array([angles[name] for name in hand.joint_names], dtype=np.float64)
 
 
 def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:

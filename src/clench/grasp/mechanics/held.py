@@ -14,6 +14,7 @@ from clench.models.hand.hand import Hand
 from .contacts import ContactSet
 from .grasp_map import edge_wrenches, grasp_map
 from .jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
+from .tendons import TendonDrive, tendon_drive
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,7 @@ class HeldObject:
         length: length scale: largest distance of the object's surface from the centre of mass [m].
         dofs: degrees of freedom of the hand; none for contacts without a hand.
         jacobian: see `hand_jacobian`, shape (C * width, D).
+        drive: tendons that move the joints, None where joints are driven by themselves.
     """
 
     contacts: ContactSet
@@ -33,6 +35,7 @@ class HeldObject:
     length: float
     dofs: DegreesOfFreedom
     jacobian: FloatArray
+    drive: TendonDrive | None = None
 
     @cached_property
     def grasp_map(self) -> FloatArray:
@@ -52,8 +55,8 @@ class HeldObject:
         return replace(self, contacts=replace(self.contacts, friction=friction))
 
     def without_limits(self) -> HeldObject:
-        """Return the grasp with joints of unlimited torque."""
-        return replace(self, dofs=replace(self.dofs, limits=np.full_like(self.dofs.limits, np.inf)))
+        """Return the grasp with joints of unlimited torque, and no tendons."""
+        return replace(self, dofs=replace(self.dofs, limits=np.full_like(self.dofs.limits, np.inf)), drive=None)
 
 
 def held_by_hand(hand: Hand, q: FloatArray, contacts: ContactSet, center: ArrayLike, length: float) -> HeldObject:
@@ -68,9 +71,8 @@ def held_by_hand(hand: Hand, q: FloatArray, contacts: ContactSet, center: ArrayL
         CommandError: see `grasp_map`.
     """
     dofs = degrees_of_freedom(hand, q)
-    held = HeldObject(
-        contacts, np.asarray(center, dtype=np.float64), length, dofs, hand_jacobian(hand, q, contacts, dofs)
-    )
+    J = hand_jacobian(hand, q, contacts, dofs)
+    held = HeldObject(contacts, np.asarray(center, dtype=np.float64), length, dofs, J, tendon_drive(hand, dofs))
     _ = held.grasp_map  # refuses what is malformed
     return held
 

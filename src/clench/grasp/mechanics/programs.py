@@ -14,6 +14,7 @@ import numpy as np
 from clench.base.pose import FloatArray
 
 from .contacts import ContactSet
+from .tendons import TendonDrive
 
 #: Accuracy asked of the solver, relative and absolute [-].
 _ACCURACY = 1e-10
@@ -105,6 +106,21 @@ def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, ex
     inner = limits * (1.0 - _INSIDE)
     program.at_most(rows, inner - constant)
     program.at_most(-rows, inner + constant)
+
+
+def demand_tensions(program: ConeProgram, torques: FloatArray, drive: TendonDrive, first: int) -> FloatArray:
+    """Demand that tendons within their limits give torques; return the rows that give the tensions, shape (T, size).
+
+    Args:
+        program: to add to.
+        torques: rows that give those of all degrees of freedom, in units in which they are as large as forces.
+        drive: the tendons, in the same units. first: place of the first tension among the unknowns.
+    """
+    tensions = np.eye(len(drive.t_min), program.size, first)
+    program.equal(torques[list(drive.columns)] - drive.arms @ tensions, np.zeros(len(drive.columns)))
+    program.at_most(tensions / drive.t_max[:, None], np.full(len(tensions), 1.0 - _INSIDE))
+    program.at_most(-tensions, -drive.t_min * (1.0 + _INSIDE))
+    return tensions
 
 
 def balanced(G: FloatArray, forces: FloatArray, wrench: FloatArray) -> FloatArray:

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
 
-from .actuation import MOST_FORCE, HoldingForces, checked, why_not
+from .actuation import Effort, HoldingForces, HoldingProgram, solve_first
+from .binding import why_not
 from .held import HeldObject
 from .loads import check_loads
-from .programs import ConeProgram, balanced, demand_cones, demand_limits
 
 #: Margin that is enough unless another is asked for [-].
 ENOUGH: Final = 2.0
@@ -67,14 +67,57 @@ def squeeze_forces(
     change = -_answers(held) @ rows.T
     missing = np.linalg.norm(held.grasp_map @ change + rows.T, axis=0)
     lost = missing > _UNRESISTED * np.linalg.norm(rows, axis=1)
-    changes = change.T[~lost]
-    best = _program(held, nominal, rows, changes, enough, None)
+    changes, unresisted = change.T[~lost], tuple(np.flatnonzero(lost).tolist())
+    unit = max(float(np.linalg.norm(nominal)), float(np.linalg.norm(rows, axis=1).max())) or 1.0
+    best = _largest_margin(held, nominal, unit, changes, enough)
     if best is None:
-        return SqueezeForces(None, 0.0, tuple(np.flatnonzero(lost).tolist()), why_not(held, nominal))
-    margin = max(0.0, best[1])
-    gentle = _program(held, nominal, rows, changes, enough, margin * (1.0 - _GIVEN_UP))
-    plan, reached = gentle if gentle is not None else best
-    return SqueezeForces(plan, max(0.0, reached), tuple(np.flatnonzero(lost).tolist()), "")
+        return SqueezeForces(None, 0.0, unresisted, why_not(held, nominal))
+    gentle = _least_torque(held, nominal, unit, changes, best[1] * (1.0 - _GIVEN_UP))
+    plan, margin = gentle if gentle is not None else best
+    return SqueezeForces(plan, margin, unresisted, "")
+
+
+def _largest_margin(
+    held: HeldObject, load: FloatArray, unit: float, changes: FloatArray, enough: float
+) -> tuple[HoldingForces, float] | None:
+    """Return forces and their margin, the largest one."""
+    place = held.jacobian.shape[0]
+
+    def build(tendons: bool) -> HoldingProgram:
+        program = HoldingProgram(held, load, unit, extra=1, tendons=tendons)
+        spread = np.eye(program.cone.size)[place]
+        program.cone.cost[place] = -1.0
+        program.cone.at_most(np.vstack([spread, -spread]), np.array([enough, 0.0]))
+        _demand_spread(program, changes / unit, spread)
+        return program
+
+    found = solve_first(build, held)
+    return None if found is None else (found[0], max(0.0, float(found[1][place])))
+
+
+def _least_torque(
+    held: HeldObject, load: FloatArray, unit: float, changes: FloatArray, margin: float
+) -> tuple[HoldingForces, float] | None:
+    """Return the forces of a given margin whose worst torque is smallest, and that margin."""
+    place = held.jacobian.shape[0]
+
+    def build(tendons: bool) -> HoldingProgram:
+        program = HoldingProgram(held, load, unit, extra=2, tendons=tendons)
+        spread, worst = np.eye(program.cone.size)[place : place + 2]
+        program.cone.cost[place + 1] = 1.0
+        program.cone.equal(spread[None], np.array([margin]))
+        program.keep_below(worst, Effort.TORQUE)
+        _demand_spread(program, changes / unit, spread)
+        return program
+
+    found = solve_first(build, held)
+    return None if found is None else (found[0], margin)
+
+
+def _demand_spread(program: HoldingProgram, changes: FloatArray, spread: FloatArray) -> None:
+    program.demand_forces()
+    for change in changes:
+        program.demand_forces(change, spread)
 
 
 def _answers(held: HeldObject) -> FloatArray:
@@ -85,35 +128,3 @@ def _answers(held: HeldObject) -> FloatArray:
     scaled = weights.reshape(-1)
     K: FloatArray = scaled[:, None] * np.linalg.pinv(held.grasp_map * scaled)
     return K
-
-
-def _program(
-    held: HeldObject, load: FloatArray, rows: FloatArray, changes: FloatArray, enough: float, margin: float | None
-) -> tuple[HoldingForces, float] | None:
-    """Return forces and their margin: the largest one, or the smallest worst torque at a given margin."""
-    contacts, G, J = held.contacts, held.grasp_map, held.jacobian
-    count = J.shape[0]
-    unit = max(float(np.linalg.norm(load)), float(np.linalg.norm(rows, axis=1).max())) or 1.0
-    arm = float(np.abs(J).max(initial=0.0)) or 1.0
-    size = count + 2
-    spread, worst = np.eye(size)[count], np.eye(size)[count + 1]
-    program = ConeProgram(size, -spread if margin is None else worst)
-    forces = np.eye(count, size)
-    program.equal(G @ forces, -load / unit)
-    if margin is None:
-        program.at_most(np.vstack([spread, -spread, worst, -worst]), np.array([enough, 0.0, 1.0, 0.0]))
-    else:
-        program.equal(spread[None], np.array([margin]))
-        for sign in (1.0, -1.0):
-            program.at_most(sign * (J.T @ forces) / arm - worst, np.zeros(J.shape[1]))
-    program.at_most(forces[2 :: contacts.width], np.full(len(contacts), MOST_FORCE))
-    for change in np.vstack([np.zeros((1, count)), changes / unit]):
-        disturbed = forces + np.outer(change, spread)
-        demand_cones(program, contacts, disturbed)
-        demand_limits(program, J.T @ disturbed / arm, held.dofs.limits / (unit * arm))
-    x = program.solve()
-    if x is None:
-        return None
-    f = balanced(G, x[:count] * unit, -load)
-    plan = checked(held, HoldingForces(load, f.reshape(len(contacts), contacts.width), held.torques(f)))
-    return None if plan is None else (plan, float(x[count]))

@@ -46,7 +46,7 @@ def load_hand(
         collision_source: which geometry is meant unless a command says otherwise.
     """
     text = read_model(model)
-    overrides = find_hand_file(text.path, hand_file)
+    overrides = find_hand_file(text.path, hand_file or text.hand_file)
     source = _source(collision_source, overrides)
     compiled, palm_body, findings = _hand_alone(text, palm or overrides.palm)
     bodies = hand_bodies(compiled.model, palm_body)

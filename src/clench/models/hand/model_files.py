@@ -28,6 +28,7 @@ class ModelText:
         assets: bytes of meshes and textures by the key that the text uses.
         is_urdf: which of the two formats the file has.
         velocities: velocity limits [rad/s] by joint name (URDF; MuJoCo drops them).
+        hand_file: the hand file that a built-in hand brings along, if any.
         still: the angle [rad] of joints whose two limits are equal, by name (URDF; MuJoCo lets them turn freely).
     """
 
@@ -37,6 +38,7 @@ class ModelText:
     xml: str
     assets: Mapping[str, bytes]
     is_urdf: bool
+    hand_file: Path | None = None
     velocities: Mapping[str, float] = field(default_factory=dict)
     still: Mapping[str, float] = field(default_factory=dict)
 
@@ -93,6 +95,7 @@ def read_model(model: str | Path) -> ModelText:
         assets = _prepare_mjcf(root, path)
     else:
         raise FileError(path, f"root element <{root.tag}>; expected <robot> (URDF) or <mujoco> (MJCF).")
+    own = path.with_suffix(".hand.toml")
     name = root.get("name") or root.get("model") or path.stem
     return ModelText(
         name=path.stem if builtin else name,
@@ -101,6 +104,7 @@ def read_model(model: str | Path) -> ModelText:
         xml=ET.tostring(root, encoding="unicode"),
         assets=assets,
         is_urdf=root.tag == "robot",
+        hand_file=own if builtin and own.is_file() else None,
         velocities=velocities,
         still=still,
     )
