@@ -37,11 +37,21 @@ def test_a_link_in_a_large_ball():
     assert contained_link(hand, np.zeros(1), pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, (1,)) == 1
 
 
-def test_nothing_is_certified_around_a_ball_between_the_planes():
+def test_a_ball_inside_a_link_between_the_planes_blocks_it():
     obj = GraspObject.from_shape(Shape(ShapeKind.SPHERE, SPHERE), pose=Pose([0.04, 0.006, 0.0]), name="ball")
     solution = clench.solve(thick(), obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))
+    assert solution.status == "blocked"
+    assert solution.fingers["index"].status == "blocked"
     assert not solution.certified
-    assert "overlaps" in solution.certificate["text"]
+
+
+def test_nothing_is_certified_with_a_link_inside_another():
+    palm = Shape(ShapeKind.BOX, (0.1, 0.05, 0.05), Pose([0.05, 0, 0]))
+    hand = HandBuilder(palm).finger("index", [along_x(0.002, 0.02), along_x(0.002, 0.02)], [0.03, 0.03]).hand()
+    obj = GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity()))
+    assert not solution.certified
+    assert "lies inside" in solution.certificate["text"]
 
 
 def test_a_point_of_every_part():

@@ -216,6 +216,16 @@ def test_open_sheets_stop_a_finger_from_either_side(faces):
     assert solution.status == "grasp"
 
 
+@pytest.mark.parametrize("faces", [[[0, 1, 2], [0, 2, 3]], [[0, 2, 1], [0, 3, 2]]], ids=["up", "down"])
+def test_an_open_sheet_flush_with_a_link_between_the_planes_stops_it(faces):
+    link = Shape(ShapeKind.BOX, (0.02, 0.01, 0.005), Pose([0.06, 0, 0]))
+    hand = HandBuilder().finger("index", [link], [0.08]).hand()
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * 0.002 + [0.06, 0.006, 0.005]
+    solution = clench.solve(hand, clench.GraspObject.from_meshes([(corners, faces)]), command(planes=1))
+    assert solution.joint_angles["index_0"] == pytest.approx(0.0, abs=1e-9)
+    assert solution.status == "grasp"
+
+
 def test_triangles_without_area_change_nothing():
     box = clench.GraspObject.load("box:x=0.02,y=0.1,z=0.02").bodies[0].shapes[0].to_mesh()
     vertices = np.vstack([box.vertices, box.vertices[:1], 0.5 * (box.vertices[0] + box.vertices[1])])

@@ -8,6 +8,7 @@ from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
 from .closing import ClosedHand, HandPlan
+from .containment import may_hold_part
 from .depths import LinkDepth, hand_depths
 from .plan import FingerPlan
 from .scene import PackedObject
@@ -16,6 +17,7 @@ from .scene import PackedObject
 def start_overlaps(
     hand: Hand,
     plan: HandPlan,
+    link_pose: FloatArray,
     closed: ClosedHand,
     packed: PackedObject,
     T_palm_object: FloatArray,
@@ -24,14 +26,18 @@ def start_overlaps(
     """Return, for every entry, the link that overlaps the object deepest at the start, or None.
 
     Args:
-        hand: the hand. plan: of its fingers. closed: which entries overlap, on a plane or anywhere over their width.
+        hand: the hand. plan: of its fingers. link_pose: see `ExactArrays`.
+        closed: which entries overlap, on a plane or anywhere over their width.
         packed, T_palm_object: the object, shape (4, 4). source: geometry of the hand.
     """
     result: list[LinkDepth | None] = []
+    around = may_hold_part(hand, link_pose, packed, T_palm_object, source)
     for entry, finger in enumerate(plan.plans):
         crossed = _crossed_link(plan, closed, entry)
-        # Links that closing moves are judged on the planes; those that only the posture moves lie on none.
-        links = finger.finger.links if crossed >= 0 else _resting_links(hand, finger)
+        # Links that closing moves are judged on the planes; those that only the posture moves lie on none, and a part
+        # of the object inside a link may lie between them.
+        everything = crossed >= 0 or around[entry]
+        links = finger.finger.links if everything else _resting_links(hand, finger)
         depths = hand_depths(hand, finger.posture, packed, T_palm_object, source, links=links) if links else ()
         deepest = max(depths, key=lambda d: d.depth, default=None)
         if deepest is not None and deepest.depth > ALLOWED_PENETRATION:

@@ -47,6 +47,46 @@ def contained_link(
     return None
 
 
+def may_hold_part(
+    hand: Hand, link_pose: FloatArray, packed: PackedObject, T_palm_object: FloatArray, source: CollisionSource
+) -> np.ndarray:
+    """Say, for every entry, whether a part of the object may lie inside a link, as their balls tell; shape (E,).
+
+    Args:
+        hand: the hand. link_pose: see `ExactArrays`, shape (E, L, 3, 4). The others as for `contained_link`.
+    """
+    meshes = link_meshes(hand, source)
+    T = link_pose[:, [mesh.link for mesh in meshes]]
+    centers = np.einsum("emij,mj->emi", T[..., :3], np.reshape([mesh.center for mesh in meshes], (-1, 3))) + T[..., 3]
+    points = packed.points @ T_palm_object[:3, :3].T + T_palm_object[:3, 3]
+    away = np.linalg.norm(centers[:, :, None] - points, axis=-1)
+    near: np.ndarray = (away <= np.array([mesh.radius for mesh in meshes])[:, None]).any(axis=(1, 2))
+    return near
+
+
+def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked: np.ndarray) -> tuple[int, int] | None:
+    """Return a link that has a part inside another one, and that one, or None.
+
+    Args:
+        hand: the hand. q: angles of all its joints [rad], shape (J,). source: geometry of the hand.
+        checked: which links may not overlap which, shape (L, L).
+    """
+    from clench.kernels.distance import is_inside
+
+    poses = hand.link_poses(q)
+    meshes = link_meshes(hand, source)
+    for outer in meshes:
+        T = poses[outer.link]
+        for inner in meshes:
+            if checked[inner.link, outer.link]:
+                points = inner.points @ poses[inner.link][:3, :3].T + poses[inner.link][:3, 3]
+                points = (points - T[:3, 3]) @ T[:3, :3]
+                for p in points[np.linalg.norm(points - outer.center, axis=1) <= outer.radius]:
+                    if is_inside(outer.tree, (p[0], p[1], p[2]), outer.closed):
+                        return inner.link, outer.link
+    return None
+
+
 def _fits(mesh: LinkMesh, T_object_link: FloatArray, packed: PackedObject) -> bool:
     """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
     if len(mesh.points) != 1 or not len(packed.full_tree.low):

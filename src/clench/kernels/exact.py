@@ -207,7 +207,7 @@ def sweep_stage(
         T_palm_object: (3, 4). length: of the finger [m]. turns: of every joint [rad], (J,). rates: (J,).
 
     Returns:
-        the travel; what is met: -1 nothing, L the object, else a link of the hand. `sweep.pair` and `sweep.poses`,
+        the travel; what is met: -1 nothing, L the object, else a link of the hand. `sweep.winner` and `sweep.poses`,
         which has every link where it is at the start of the segment, describe it. A link that overlaps the object
         already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
     """

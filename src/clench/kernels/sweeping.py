@@ -143,6 +143,14 @@ def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints,
 
 
 @inner_kernel
+def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, stack: Ints, waiting: int) -> int:
+    """Put the parts of the larger of two items on the stack, each against the other; return its new height."""
+    if b < 0 or (a >= 0 and moving.node[a, 3] >= resting.node[b, 3]):
+        return push_parts(moving, a, 0, b, stack, waiting)
+    return push_parts(resting, b, 1, a, stack, waiting)
+
+
+@inner_kernel
 def sweep_body(
     moving: BodyArrays,
     m: int,
@@ -172,8 +180,7 @@ def sweep_body(
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
-        if balls_miss(ball_a, ball_b, work, count, speed, best, touch, c, d):
+        if balls_miss(ball_of(moving, a), ball_of(resting, b), work, count, speed, best, touch, c, d):
             continue
         if a < 0 or b < 0 or count > 1:
             ka, wa = put_item(moving, a, work.moving, work.core)
@@ -193,10 +200,7 @@ def sweep_body(
                 turn = abs(work.chain[0, 0]) * best
                 c, d = math.cos(turn), math.sin(turn)
                 continue
-        if b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
-            waiting = push_parts(moving, a, 0, b, stack, waiting)
-        else:
-            waiting = push_parts(resting, b, 1, a, stack, waiting)
+        waiting = split_pair(moving, a, resting, b, stack, waiting)
     return best
 
 
@@ -208,36 +212,38 @@ def body_gap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: flo
         work: has `moving` and `resting`, the bodies' poses in one frame.
     """
     stack, best = work.stack, bound
-    a, b = moving.root[m], resting.root[r]
-    stack[0, 0], stack[0, 1] = a, b
-    waiting = 1 if a >= 0 and b >= 0 else 0
+    stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
+    waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        put_point(work.moving, moving.node[a], work.core[0])
-        put_point(work.resting, resting.node[b], work.fixed[0])
-        if point_distance(work.core, work.fixed) - moving.node[a, 3] - resting.node[b, 3] >= best:
+        if ball_gap(moving, a, resting, b, work) >= best:
             continue
-        leaf_a, leaf_b = moving.count[a] > 0, resting.count[b] > 0
-        if leaf_a and leaf_b:
-            for i in range(moving.first[a], moving.first[a] + moving.count[a]):
-                put_core(moving, i, work.moving, work.core)
-                for k in range(resting.first[b], resting.first[b] + resting.count[b]):
-                    put_core(resting, k, work.resting, work.fixed)
-                    d = separation(work.core, moving.corners[i], work.fixed, resting.corners[k])[0]
-                    gap = d - moving.radius[i] - resting.radius[k]
-                    if gap < best:
-                        best = gap
-                        work.pair[0], work.pair[1], work.pair[2], work.pair[3] = i, k, m, r
-        elif leaf_b or (not leaf_a and moving.node[a, 3] >= resting.node[b, 3]):
-            stack[waiting, 0], stack[waiting, 1] = moving.right[a], b
-            stack[waiting + 1, 0], stack[waiting + 1, 1] = a + 1, b
-            waiting += 2
+        if a < 0 and b < 0:
+            gap = element_gap(moving, a, resting, b, work)
+            if gap < best:
+                best = gap
+                work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
         else:
-            stack[waiting, 0], stack[waiting, 1] = a, resting.right[b]
-            stack[waiting + 1, 0], stack[waiting + 1, 1] = a, b + 1
-            waiting += 2
+            waiting = split_pair(moving, a, resting, b, stack, waiting)
     return best
+
+
+@inner_kernel
+def ball_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> float:
+    """Return the gap between the balls of two nodes or elements."""
+    ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
+    put_point(work.moving, ball_a, work.core[0])
+    put_point(work.resting, ball_b, work.fixed[0])
+    return point_distance(work.core, work.fixed) - float(ball_a[3] + ball_b[3])
+
+
+@inner_kernel
+def element_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> float:
+    """Return the gap between two items, elements or nodes' balls; their cores are left in `work`."""
+    ka, wa = put_item(moving, a, work.moving, work.core)
+    kb, wb = put_item(resting, b, work.resting, work.fixed)
+    return separation(work.core, ka, work.fixed, kb)[0] - wa - wb
 
 
 @inner_kernel
@@ -249,24 +255,18 @@ def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allo
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
-        put_point(work.moving, ball_a, work.core[0])
-        put_point(work.resting, ball_b, work.fixed[0])
-        if point_distance(work.core, work.fixed) > ball_a[3] + ball_b[3]:
+        if ball_gap(moving, a, resting, b, work) > 0.0:
             continue
         if a < 0 or b < 0:
-            ka, wa = put_item(moving, a, work.moving, work.core)
-            kb, wb = put_item(resting, b, work.resting, work.fixed)
-            crossing = a < 0 and b < 0 and crosses(work.core, ka, work.fixed, kb)
-            apart = separation(work.core, ka, work.fixed, kb)[0]
-            if crossing or (a < 0 and b < 0 and apart < wa + wb - allowed):
-                return True
-            if apart > wa + wb or (a < 0 and b < 0):
+            gap = element_gap(moving, a, resting, b, work)
+            if a < 0 and b < 0:
+                corners, others = moving.corners[-1 - a], resting.corners[-1 - b]
+                if gap < -allowed or crosses(work.core, corners, work.fixed, others):
+                    return True
                 continue
-        if b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
-            waiting = push_parts(moving, a, 0, b, stack, waiting)
-        else:
-            waiting = push_parts(resting, b, 1, a, stack, waiting)
+            if gap > 0.0:
+                continue
+        waiting = split_pair(moving, a, resting, b, stack, waiting)
     return False
 
 

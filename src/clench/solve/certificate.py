@@ -11,7 +11,7 @@ import numpy as np
 from clench.base.pose import FloatArray
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate
-from clench.grasp.containment import contained_link
+from clench.grasp.containment import contained_link, link_within_link
 from clench.grasp.depths import LinkDepth
 from clench.grasp.exact import hand_bodies, swept_deviation
 
@@ -85,7 +85,11 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
     inside = contained_link(hand, opened, problem.packed, T, problem.source, links)
     if inside is not None:
         return f"{hand.links[inside].name} overlaps the object before anything moves."
-    everything = exact._replace(object=problem.packed.bodies, checked=hand_bodies(hand, problem.source).across)
+    checked = hand_bodies(hand, problem.source).across
+    pair = link_within_link(hand, opened, problem.source, checked)
+    if pair is not None:
+        return f"{hand.links[pair[0]].name} lies inside {hand.links[pair[1]].name} before anything moves."
+    everything = exact._replace(object=problem.packed.bodies, checked=checked)
     poses = np.ascontiguousarray(hand.link_poses(final)[:, :3])
     one, other = find_link_overlap(everything, poses, np.ascontiguousarray(T[:3]), ALLOWED_PENETRATION)
     if one < 0:

@@ -89,7 +89,9 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     clock.lap("plan")
     closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, command.rounds)
     clock.lap("close")
-    overlaps = start_overlaps(hand, plan, closed, problem.packed, problem.T_palm_object, problem.source)
+    overlaps = start_overlaps(
+        hand, plan, exact.link_pose, closed, problem.packed, problem.T_palm_object, problem.source
+    )
     candidates = read_candidates(hand, plan, problem.packed, closed, overlaps)
     judged = judge_sets(hand, candidates, problem.packed, problem.T_palm_object, problem.source, command.check_sets)
     clock.lap("sets")

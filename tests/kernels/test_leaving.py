@@ -1,0 +1,124 @@
+"""Cores that touch exactly at the start: they go on where they part, and stop where they would overlap."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernel_entries import entry
+
+from clench.kernels.sweep_pairs import sweep_pair
+
+TOUCH = 1e-11
+BEST = 0.5
+call = entry(sweep_pair)
+
+
+def sweep(core, fixed, w=0.0, rate=1.0, best=BEST):
+    """Return how far `core` turns about the origin's y axis before it meets `fixed`."""
+    chain = np.array([[rate, 0.0, 0.0]])
+    rows = [np.vstack([c, np.tile(c[-1], (3 - len(c), 1))]) for c in (core, fixed)]
+    return call(rows[0], len(core), rows[1], len(fixed), w, chain, 1, TOUCH, best, False, np.zeros((6, 3)))
+
+
+def turned(core, angle):
+    """Return a core turned from x towards z."""
+    c, d = np.cos(angle), np.sin(angle)
+    return core @ np.array([[c, 0.0, d], [0.0, 1.0, 0.0], [-d, 0.0, c]])
+
+
+def apart(a, b):
+    """Return the gap of two triangles across the best plane between them, negative where there is none."""
+    edges = [[t[(k + 1) % 3] - t[k] for k in range(3)] for t in (a, b)]
+    normals = [np.cross(e[0], e[1]) for e in edges]
+    axes = [*normals, *(np.cross(u, v) for u, v in itertools.product(*edges))]
+    axes += [np.cross(n, e) for n in normals for es in edges for e in es]
+    best = -np.inf
+    for n in (n / np.linalg.norm(n) for n in axes if np.linalg.norm(n) > 1e-12):
+        best = max(best, (a @ n).min() - (b @ n).max(), (b @ n).min() - (a @ n).max())
+    return best
+
+
+def corner_on_face(rng):
+    """Return a triangle and one that has a corner on its inside and lies on one side of it."""
+    face = rng.normal(size=(3, 3)) * 0.02 + rng.normal(size=3) * 0.05
+    n = np.cross(face[1] - face[0], face[2] - face[0])
+    n /= np.linalg.norm(n)
+    foot = rng.dirichlet([2.0, 2.0, 2.0]) @ face
+    other = foot + rng.normal(size=(3, 3)) * 0.02
+    other += n * np.abs(rng.uniform(0.002, 0.02, (3, 1))) - n * ((other - foot) @ n)[:, None]
+    other[0] = foot
+    return face, other
+
+
+def edge_on_edge(rng):
+    """Return two triangles with an edge each that cross, on opposite sides of the plane along both."""
+    at, u, v = rng.normal(size=3) * 0.05, *rng.normal(size=(2, 3)) * 0.02
+    n = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
+    third = rng.normal(size=(2, 3)) * 0.01
+    third -= np.outer(third @ n, n)
+    a = at + np.array([u * rng.uniform(0.2, 1), -u * rng.uniform(0.2, 1), third[0] + n * rng.uniform(0.002, 0.02)])
+    b = at + np.array([v * rng.uniform(0.2, 1), -v * rng.uniform(0.2, 1), third[1] - n * rng.uniform(0.002, 0.02)])
+    return a, b
+
+
+def corner_on_corner(rng):
+    """Return two triangles that share a corner and lie on opposite sides of a plane."""
+    at, n = rng.normal(size=3) * 0.05, rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    spread = rng.normal(size=(2, 2, 3)) * 0.02
+    spread -= (spread @ n)[..., None] * n
+    a = at + np.vstack([np.zeros(3), spread[0] + n * rng.uniform(0.001, 0.02, (2, 1))])
+    b = at + np.vstack([np.zeros(3), spread[1] - n * rng.uniform(0.001, 0.02, (2, 1))])
+    return a, b
+
+
+@pytest.mark.parametrize("touching", [corner_on_face, edge_on_edge, corner_on_corner])
+@given(seed=st.integers(0, 10**6), swapped=st.booleans(), back=st.booleans())
+@settings(max_examples=150, deadline=None)
+def test_triangles_part_or_stop(touching, seed, swapped, back):
+    a, b = touching(np.random.default_rng(seed))
+    if swapped:
+        a, b = b, a
+    rate = -1.0 if back else 1.0
+    gaps = [apart(turned(a, rate * s), b) for s in (1e-6, 1e-5, 1e-4)]
+    found = sweep(a, b, rate=rate)
+    if min(gaps) > 1e-9:
+        assert found > 1e-5
+    elif max(gaps) < -1e-9:
+        assert found < 1e-6
+    if 0.0 < found < BEST:
+        assert apart(turned(a, rate * found), b) > -1e-9
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0])
+@pytest.mark.parametrize("behind", [-0.01, 0.03])
+def test_a_face_on_both_sides_of_its_pivot_tilts_off_a_ball(rate, behind):
+    face = np.array([[behind, -0.01, 0.0], [0.06, -0.01, 0.0], [0.06, 0.01, 0.0]])
+    ball = np.array([[0.05, -0.002, 0.01]])
+    found = sweep(face, ball, w=0.01, rate=rate)
+    assert found == (BEST if rate < 0.0 else 0.0)
+
+
+def test_sides_of_boxes_edge_to_edge():
+    a = np.array([[0.02, -0.01, 0.0], [0.02, 0.01, 0.0], [0.03, 0.0, 0.0]])
+    b = np.array([[0.02, -0.01, 0.0], [0.02, 0.012, 0.0], [0.02, 0.0, -0.01]])
+    assert sweep(a, b) == BEST
+    assert sweep(a, b, rate=-1.0) < 1e-6
+
+
+def test_sides_of_boxes_corner_to_corner_in_one_plane_part():
+    a = np.array([[0.02, 0.0, 0.0], [0.02, 0.01, 0.0], [0.03, 0.0, 0.0]])
+    b = np.array([[0.02, 0.0, 0.0], [0.02, -0.01, 0.0], [0.01, 0.0, 0.0]])
+    assert sweep(a, b) == BEST
+    assert sweep(a, b, rate=-1.0) == BEST
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_wall_across_the_axis_stops_nothing_that_slides_along_it(count):
+    wall = np.array([[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 2.0]])
+    core = np.array([[0.01, 1e-9, 0.0], [0.05, 0.01, 0.0], [0.05, 0.01, 0.01]])
+    chain = np.array([[1.0, 0.02, 0.0], [1.8, 0.0, 0.0]])[2 - count :]
+    found = call(core, 3, wall, 3, 0.0, chain, count, TOUCH, BEST, False, np.zeros((6, 3)))
+    assert found == BEST
