@@ -72,10 +72,13 @@ class HandBuilder:
         self.fingers.append(Finger(name, tuple(links), tuple(joints), thumb, links[-1]))
         return self
 
-    def couple(self, leader: str, follower: str, ratio: float, offset: float = 0.0) -> "HandBuilder":
+    def couple(
+        self, leader: str, follower: str, ratio: float, offset: float = 0.0, *, breakaway: bool = False
+    ) -> "HandBuilder":
         """Let a joint follow another."""
         names = [j.name for j in self.joints]
-        self.couplings.append(Coupling(names.index(leader), names.index(follower), ratio, offset, reason="test"))
+        found = Coupling(names.index(leader), names.index(follower), ratio, offset, breakaway, reason="test")
+        self.couplings.append(found)
         return self
 
     def hand(self, name: str = "chain", normal: FloatArray = Z) -> Hand:

@@ -20,7 +20,7 @@ def plans(hand, count=3, q=None):
 
 
 def close(found, obj, full_width=True, rounds=1):
-    plan = make_hand_plan(found, range(len(found)), [0] * len(found), full_width)
+    plan = make_hand_plan(found, range(len(found)), [0] * len(found), full_width, False)
     exact = planes_only(len(plan.whole), len(found))
     return plan, close_hand(plan, exact, pack_object(obj), obj.pose.matrix, rounds)
 

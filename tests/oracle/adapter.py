@@ -7,6 +7,7 @@ from clench.kernels.closing import close_items
 from clench.kernels.exact import planes_only
 from clench.kernels.family_section import make_sections
 from clench.kernels.layout import (
+    HIT_INTEGERS,
     ChainArrays,
     ClosingArrays,
     HandArrays,
@@ -64,6 +65,8 @@ def pack_finger(finger: PlanarFinger) -> HandArrays:
         start=np.zeros(joints),
         stop=stop,
         group_length=length,
+        speed=np.ones(groups),
+        breaks=_ints(np.zeros(groups)),
     )
     outlines = OutlineArrays(
         joint=_ints([o.joint for o in finger.outlines]),
@@ -111,7 +114,7 @@ def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
         np.zeros((items, groups)),
         np.zeros((items, joints)),
         np.zeros(items, np.int64),
-        np.zeros((items, contacts, 8), np.int64),
+        np.zeros((items, contacts, HIT_INTEGERS), np.int64),
         np.zeros((items, contacts, 7)),
         np.zeros((items, families, 3, 4)),
         np.zeros(items, np.int64),
@@ -120,15 +123,19 @@ def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
     )
 
 
-def solve_planar(finger: PlanarFinger, curve: PlanarCurve) -> tuple[tuple[StageAnswer, ...], ClosingArrays]:
+def solve_planar(
+    finger: PlanarFinger, curve: PlanarCurve, *, together: bool = False
+) -> tuple[tuple[StageAnswer, ...], ClosingArrays]:
     """Close a planar finger with the kernel; return its stages and the raw answer."""
     hand = pack_finger(finger)
     sections = pack_curve(curve)
-    items = ItemArrays(_ints([0]), _ints([0]), _ints([1]))
+    items = ItemArrays(_ints([0]), _ints([0]), _ints([1]), np.full((1, len(finger.rates)), np.inf))
     answer = empty_answer(hand, 1, finger.groups)
     closed = not curve.two_sided
     T = np.eye(4)[:3].copy()
-    close_items(hand, planes_only(1, 1), EMPTY_TREE, no_rounds(), closed, T, sections, sections, items, 1, answer)
+    close_items(
+        hand, planes_only(1, 1), EMPTY_TREE, no_rounds(), closed, T, sections, sections, items, 1, together, answer
+    )
     stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
     stages = tuple(
         StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)

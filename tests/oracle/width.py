@@ -113,6 +113,48 @@ class Oracle:
                 wrong.append(f"joint {leader}: stops at {travel:.9g} rad with a gap of {end:.3g} m")
         return wrong
 
+    def judge_together(self, answer: Floats, start: Floats, reach: float) -> list[str]:
+        """Return what is wrong with a closing of all joints at once, each at speed 1 until it is held.
+
+        Where a joint is held before its limit, a link behind it touches; going on with what moved until then collides.
+        """
+        wrong = []
+        finger = self.hand.fingers[0]
+        moving = set(finger.links)
+        followers = {c.follower for c in self.hand.couplings}
+        free = [j for j in finger.joints if j not in followers]
+
+        def at(s: float, held: Floats) -> Floats:
+            return self.hand.coupled(np.where([j in free for j in range(len(held))], np.minimum(start + s, held), held))
+
+        speed, end = 3.0 * reach * len(finger.joints), float(np.max(answer[free] - start[free]))
+        stops = np.unique(answer[free] - start[free])
+        s = 0.0
+        for _ in range(_STEPS):
+            found = self.gap(at(s, answer), moving)
+            if found < -TOUCHING:
+                wrong.append(f"a gap of {found:.3g} m at {s:.9g} of {end:.9g}")
+            near = np.abs(stops - s).min() < 1e-4
+            s += max(found / speed, 1e-4 if near else 1e-5, end / _STEPS / 2)
+            if s >= end:
+                break
+        for j in free:
+            if answer[j] < self.hand.joints[j].upper - 1e-12:
+                s = float(answer[j] - start[j])
+                behind = {i for i in finger.links if self._before(i) >= min(j, *self._group(j))}
+                found = self.gap(at(s, answer), behind)
+                if found > TOUCHING:
+                    wrong.append(f"joint {j}: held at {s:.9g} rad with a gap of {found:.3g} m")
+                on = np.where(answer >= answer[j] - 1e-12, np.inf, answer)
+                on = np.minimum(on, [x.upper for x in self.hand.joints])
+                deepest = min(self.gap(at(s + 2e-3 * k, on), moving) for k in range(1, 4))
+                if deepest > 0.0:
+                    wrong.append(f"joint {j}: held at {s:.9g} rad, but it could go on")
+        return wrong
+
+    def _group(self, leader: int) -> list[int]:
+        return [leader, *(c.follower for c in self.hand.couplings if c.leader == leader)]
+
     def _before(self, link: int) -> int:
         return self.hand.links[link].joint
 
@@ -199,11 +241,11 @@ def mesh_shape(mesh: Any) -> Shape:
     )
 
 
-def judge_case(seed: int) -> tuple[str, list[str]]:
+def judge_case(seed: int, order: str = "proximal-first") -> tuple[str, list[str]]:
     """Close one case and judge it; return what kind it was, and what is wrong."""
     case = make_case(seed)
     planes = (1, 2, 3)[seed % 3]
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=planes)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=planes, order=clench.ClosingOrder(order))
     solution = clench.solve(case.hand, case.obj, command)
     if solution.fingers["index"].status == "blocked":
         q = case.hand.open_angles()
@@ -211,6 +253,8 @@ def judge_case(seed: int) -> tuple[str, list[str]]:
         return "blocked", [] if start <= 1e-6 else [f"seed {seed}: called blocked with a gap of {start:.3g} m"]
     answer = np.array([solution.joint_angles[name] for name in case.hand.joint_names])
     reach = float(np.sum([0.05] * len(case.hand.joints))) + 0.02
-    wrong = Oracle(case).judge(answer, case.hand.open_angles(), reach)
+    oracle = Oracle(case)
+    judge = oracle.judge if order == "proximal-first" else oracle.judge_together
+    wrong = judge(answer, case.hand.open_angles(), reach)
     kind = "contact" if solution.contacts else "free"
     return kind, [f"seed {seed}: {sentence}" for sentence in wrong]

@@ -26,7 +26,8 @@ class Touch:
     """Describe one contact, in the palm frame.
 
     Args:
-        link, joint: indices in the hand: the touching link, and the leader of the group it stopped.
+        link, joint: indices in the hand: the touching link, and the leader of the group it stopped (where joints break
+            away, the last one that it stopped).
         body: index of the touched body, or -1 - index of a touched link of the hand itself. graspable: whether that
             body is to be grasped.
         plane: of the family, None where the touch lies on none. offset: its place along y [m].
@@ -107,6 +108,10 @@ def read_candidates(
         finger = plan.plans[entry]
         first, last = plan.arrays.entry_group[entry : entry + 2]
         travel = np.zeros(last - first) if blocked[i] else closed.answer.travel[i, first:last].copy()
+        q = finger.angles(hand, travel)
+        if any(finger.breaks) and not blocked[i]:
+            joints = slice(*np.searchsorted(plan.arrays.chain.joint_group, (first, last)))
+            q = finger.turned(hand, closed.answer.turn[i, joints])
         candidates.append(
             FingerCandidate(
                 item=i,
@@ -114,7 +119,7 @@ def read_candidates(
                 posture=plan.posture[entry],
                 plane=None if plan.whole[i] else int(plan.items.low[i]),
                 travel=travel,
-                q=finger.angles(hand, travel),
+                q=q,
                 touches=tuple(touches[i]),
                 overlap=overlaps[entry],
                 exact=bool(plan.whole[i] and not closed.answer.skipped[i]),
@@ -165,7 +170,7 @@ def _plane_touch(
     offset: float,
 ) -> Touch:
     """Return a touch on a plane, of numbers that are read already."""
-    plane, outline, kind, source, group, family, _, _ = hit
+    plane, outline, kind, source, group, family, _, _, stopped = hit
     _, _, nx, nz, cx, cz, gap = point
     arrays, entry = plan.arrays, int(plan.items.entry[i])
     finger = plan.plans[entry]
@@ -176,7 +181,7 @@ def _plane_touch(
     own_family = family - int(arrays.entry_family[entry])
     return Touch(
         link=link,
-        joint=finger.leaders[group - int(first)],
+        joint=_stopped(plan, entry, group - int(first), stopped),
         body=body,
         graspable=packed.body_roles[body] is BodyRole.GRASPABLE,
         plane=plane - int(arrays.family_plane[family]),
@@ -192,7 +197,7 @@ def _plane_touch(
 
 def _exact_touch(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int) -> Touch:
     """Read a touch that an exact sweep found, anywhere over the width."""
-    _, link, kind, element, group, family, _, met = closed.answer.hit[i, n].tolist()
+    _, link, kind, element, group, family, _, met, stopped = closed.answer.hit[i, n].tolist()
     entry = int(plan.items.entry[i])
     numbers = closed.answer.point[i, n]
     position, normal = numbers[:3].copy(), numbers[3:6].copy()
@@ -201,7 +206,7 @@ def _exact_touch(hand: Hand, plan: HandPlan, packed: PackedObject, closed: Close
     across = pose[:, :3].T @ normal
     return Touch(
         link=link,
-        joint=plan.plans[entry].leaders[group - int(plan.arrays.entry_group[entry])],
+        joint=_stopped(plan, entry, group - int(plan.arrays.entry_group[entry]), stopped),
         body=body,
         graspable=body >= 0 and packed.body_roles[body] is BodyRole.GRASPABLE,
         plane=None,
@@ -214,6 +219,15 @@ def _exact_touch(hand: Hand, plan: HandPlan, packed: PackedObject, closed: Close
         # Where the side of a round link touches, the two surfaces have one tangent.
         link_angle=math.atan2(across[0], -across[2]) if kind == 0 else None,
     )
+
+
+def _stopped(plan: HandPlan, entry: int, group: int, last: int) -> int:
+    """Return the joint that a contact stops: the leader of a group, or the last one before those that break away."""
+    finger = plan.plans[entry]
+    if not finger.breaks[group]:
+        return finger.leaders[group]
+    first = int(np.searchsorted(plan.arrays.chain.joint_group, plan.arrays.entry_group[entry]))
+    return finger.joints[last - first].joint
 
 
 def _carried(hand: Hand, plan: FingerPlan, link: int, family: int, travel: FloatArray, position: FloatArray) -> float:

@@ -37,7 +37,7 @@ class HandPlan:
         plans: one per finger and posture, in entry order. finger: index into the command's fingers of each entry.
         posture: index of the posture alternative of each entry.
         arrays: the plans packed. items: one per entry and plane, then the full width, if wanted.
-        whole: whether each item is the full width.
+        whole: whether each item is the full width. together: all joints of a finger move at once.
     """
 
     plans: tuple[FingerPlan, ...]
@@ -46,6 +46,7 @@ class HandPlan:
     arrays: HandArrays
     items: ItemArrays
     whole: tuple[bool, ...]
+    together: bool
 
     @property
     def most_planes(self) -> int:
@@ -69,7 +70,7 @@ class ClosedHand:
 
 
 def make_hand_plan(
-    plans: Sequence[FingerPlan], finger: Sequence[int], posture: Sequence[int], full_width: bool
+    plans: Sequence[FingerPlan], finger: Sequence[int], posture: Sequence[int], full_width: bool, together: bool
 ) -> HandPlan:
     """Pack plans and list their items of work."""
     from clench.kernels.layout import ItemArrays
@@ -81,10 +82,11 @@ def make_hand_plan(
         if full_width:
             rows.append((entry, 0, count, 1))
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
-    items = ItemArrays(*(np.ascontiguousarray(table[:, k]) for k in range(3)))
-    return HandPlan(
-        tuple(plans), tuple(finger), tuple(posture), pack_plans(plans), items, tuple(map(bool, table[:, 3]))
-    )
+    entries, low, high = (np.ascontiguousarray(table[:, k]) for k in range(3))
+    arrays = pack_plans(plans)
+    items = ItemArrays(entries, low, high, until=np.full((len(table), len(arrays.chain.rate)), np.inf))
+    whole = tuple(map(bool, table[:, 3]))
+    return HandPlan(tuple(plans), tuple(finger), tuple(posture), arrays, items, whole, together)
 
 
 def close_hand(
@@ -192,7 +194,7 @@ def _close_range(
     """Close the items of a range, and write their part of the answer."""
     from clench.kernels.closing import close_items
     from clench.kernels.family_section import make_sections
-    from clench.kernels.layout import ClosingArrays, ItemArrays
+    from clench.kernels.layout import ClosingArrays
 
     own = make_sections(plan.most_planes, capacity, len(obj.rounds.kind))
     part = slice(*span)
@@ -206,19 +208,16 @@ def _close_range(
         T,
         shared,
         own,
-        ItemArrays(*(column[part] for column in plan.items)),
+        _only(plan.items, part),
         rounds,
+        plan.together,
         ClosingArrays(*columns),
     )
 
 
 def only_item(plan: HandPlan, item: int) -> HandPlan:
     """Return a plan with one of its items alone."""
-    from clench.kernels.layout import ItemArrays
-
-    return replace(
-        plan, items=ItemArrays(*(column[item : item + 1] for column in plan.items)), whole=(plan.whole[item],)
-    )
+    return replace(plan, items=_only(plan.items, slice(item, item + 1)), whole=(plan.whole[item],))
 
 
 def close_item_again(
@@ -243,11 +242,11 @@ def close_item_again(
 
 
 def empty_answer(plan: HandPlan) -> ClosingArrays:
-    """Return the arrays that the kernels write, with room for one contact per group."""
+    """Return the arrays that the kernels write, with room for one contact per joint."""
     from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
 
     items = len(plan.items.entry)
-    contacts = max(len(p.lengths) for p in plan.plans)
+    contacts = max(len(p.joints) for p in plan.plans)
     return ClosingArrays(
         travel=np.zeros((items, len(plan.arrays.chain.group_length))),
         turn=np.zeros((items, len(plan.arrays.chain.rate))),
@@ -259,3 +258,7 @@ def empty_answer(plan: HandPlan) -> ClosingArrays:
         overlap=np.full(items, -1, dtype=np.int64),
         skipped=np.zeros(items, dtype=np.int64),
     )
+
+
+def _only(items: ItemArrays, part: slice) -> ItemArrays:
+    return items._replace(entry=items.entry[part], low=items.low[part], high=items.high[part], until=items.until[part])

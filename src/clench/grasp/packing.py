@@ -75,6 +75,8 @@ def _chain(plans: Sequence[FingerPlan]) -> ChainArrays:
         start=np.array([j[4] for j in joints], dtype=np.float64),
         stop=np.array([j[5] for j in joints], dtype=np.float64),
         group_length=np.array([length for plan in plans for length in plan.lengths], dtype=np.float64),
+        speed=np.array([speed for plan in plans for speed in plan.speeds], dtype=np.float64),
+        breaks=np.array([breaks for plan in plans for breaks in plan.breaks], dtype=np.int64),
     )
 
 

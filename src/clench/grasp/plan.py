@@ -5,6 +5,7 @@ A plan depends on the hand and the posture alone; nothing in it knows the object
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,8 @@ class FingerPlan:
         finger: the finger. posture: open angles of all joints of the hand [rad], shape (J,).
         joints: closing joints, palm side first. leaders: leader of each group (index in the hand).
         lengths: travel of each group to its limit [rad]. families: see `CurlFamily`.
+        speeds: of each group where all move at once, relative to each other. breaks: whether later joints of a group
+            go on when those before them are blocked.
         length: of the finger [m].
     """
 
@@ -87,8 +90,18 @@ class FingerPlan:
     joints: tuple[PlannedJoint, ...]
     leaders: tuple[int, ...]
     lengths: tuple[float, ...]
+    speeds: tuple[float, ...]
+    breaks: tuple[bool, ...]
     families: tuple[CurlFamily, ...]
     length: float
+
+    def turned(self, hand: Hand, turn: FloatArray) -> FloatArray:
+        """Return the angles of all joints of the hand when the plan's joints have turned, shape (J,) [rad]."""
+        q = self.posture.copy()
+        for p, s in zip(self.joints, turn, strict=True):
+            joint = hand.joints[p.joint]
+            q[p.joint] = min(max(q[p.joint] + p.turn * s, joint.lower), joint.upper)
+        return q
 
     def angles(self, hand: Hand, travel: FloatArray) -> FloatArray:
         """Return the angles of all joints of the hand when the groups have travelled, shape (J,) [rad]."""
@@ -99,13 +112,21 @@ class FingerPlan:
         return hand.coupled(q)
 
 
-def plan_finger(hand: Hand, finger: Finger, posture: FloatArray, planes: int, source: CollisionSource) -> FingerPlan:
+def plan_finger(
+    hand: Hand,
+    finger: Finger,
+    posture: FloatArray,
+    planes: int,
+    source: CollisionSource,
+    speeds: Mapping[str, float] | None = None,
+) -> FingerPlan:
     """Plan a finger's closing from an open posture.
 
     Args:
         hand: the hand. finger: one of its fingers.
         posture: angles of all joints [rad], couplings hold, shape (J,).
         planes: number of curl planes. source: geometry of the links.
+        speeds: by name of a free joint, where all move at once; those not named have speed 1.
 
     Raises:
         HandError: a coupling that the method does not cover.
@@ -131,7 +152,17 @@ def plan_finger(hand: Hand, finger: Finger, posture: FloatArray, planes: int, so
     order = list(dict.fromkeys(leaders[j] for j in closing))
     lengths = tuple(_travel(hand, posture, leader) for leader in order)
     families = _cut_families(hand, planned, frames, split, poses, moved_by, planes, source)
-    return FingerPlan(finger, posture, planned, tuple(order), lengths, families, max(f.reach for f in families))
+    return FingerPlan(
+        finger,
+        posture,
+        planned,
+        tuple(order),
+        lengths,
+        tuple((speeds or {}).get(hand.joints[leader].name, 1.0) for leader in order),
+        tuple(any(c.breakaway and c.leader == leader for c in hand.couplings) for leader in order),
+        families,
+        max(f.reach for f in families),
+    )
 
 
 def closing_joints(hand: Hand, finger: Finger) -> list[int]:

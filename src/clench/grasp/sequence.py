@@ -66,7 +66,7 @@ def _meets_another(
     plan: HandPlan, exact: ExactArrays, closed: ClosedHand, candidate: FingerCandidate, entry: int, rounds: int
 ) -> bool:
     """Say whether a finger meets another one's links on the path to a set; the object plays no part."""
-    if rounds > 1:
+    if rounds > 1 or any(candidate.plan.breaks):
         return True
     first, last = plan.arrays.entry_group[entry : entry + 2]
     length = np.zeros(len(plan.arrays.chain.group_length))

@@ -14,88 +14,128 @@ from .family_section import cut_planes
 from .layout import (
     HIT_GAP,
     HIT_GROUP,
+    HIT_JOINT,
     HIT_PLANE,
+    ChainArrays,
     ClosingArrays,
     Floats,
     HandArrays,
+    Ints,
     ItemArrays,
     RoundArrays,
     SectionArrays,
     Work,
 )
+from .segments import ALL, lock_held, lock_joints, move_groups, next_segment
 from .sweeping import SweepWork, make_sweep_work
 from .touching import describe_hit, settle_hit
 from .tree import MeshTree
-
-#: What `close_group` meets when a link overlaps the object already.
-OVERLAPS = -2
 
 
 @inner_kernel
 def close_group(
     hand: HandArrays,
     exact: ExactArrays,
-    entry: int,
-    group: int,
-    family: int,
-    T_palm_family: Floats,
     T_palm_object: Floats,
     sections: SectionArrays,
     base: int,
-    low: int,
-    high: int,
+    family: int,
+    group: int,
     closed: bool,
-    wanted: bool,
-    travel: float,
-    turns: Floats,
+    start: int,
+    items: ItemArrays,
+    i: int,
     rates: Floats,
+    locked: Ints,
     work: Work,
     sweep: SweepWork,
-) -> tuple[float, int, int]:
-    """Move one degree of freedom on to its first contact or limit.
+    answer: ClosingArrays,
+) -> bool:
+    """Move one degree of freedom, or all at once, until a contact or a limit holds every joint.
 
     The travel at which a follower starts or stops moving (its own limit) splits the motion into path segments. On each
     of them the planes give a first bound, and the exact sweep, where wanted, what comes before it.
 
     Args:
-        low, high: the range of planes in use, counted from the family's first.
+        sections, base: whose row `plane - base` belongs to `plane`. family: of the joints. group: or `ALL`.
+        start: the entry's first family. rates: scratch space, (J,). locked: joints that stand still, (J,); written.
 
     Returns:
-        its travel; the plane of the contact, or -1; what the exact sweep met before that, or -1, as `sweep_stage` says;
-        `OVERLAPS` instead where a link overlaps the object already.
+        False where a link overlaps the object already.
     """
-    chain = hand.chain
-    length = chain.group_length[group]
-    joints = rates.shape[0]
-    low, high = hand.family_plane[family] + low, hand.family_plane[family] + high
-    while travel < length:
-        end = length
-        for j in range(joints):
-            rates[j] = 0.0
-            if chain.joint_group[j] == group:
-                if chain.start[j] <= travel < chain.stop[j]:
-                    rates[j] = chain.rate[j]
-                    end = min(end, chain.stop[j])
-                elif travel < chain.start[j]:
-                    end = min(end, chain.start[j])
+    chain, entry, turns = hand.chain, items.entry[i], answer.turn[i]
+    joints = entry_joints(hand, entry)
+    low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
+    along = 0.0
+    while True:
+        lock_held(chain, joints, items.until[i], along, locked)
+        end = next_segment(chain, joints, group, answer.travel[i], locked, items.until[i], along, rates)
+        if end <= 0.0:
+            return True
         # A little further, so that a touch just at the end is one; no point moves by more than the touch tolerance.
-        reach = end - travel + TOUCH_FRACTION
+        reach = end + TOUCH_FRACTION
         moved, plane = advance(hand, family, sections, base, low, high, closed, turns, rates, reach, work)
-        moved = min(moved, end - travel)
+        moved = min(moved, end)
         met = -1
-        if wanted:
-            size = hand.family_length[family]
+        if exact.wanted[i]:
+            T, size = answer.pose[i, family], hand.family_length[family]
             moved, met = sweep_stage(
-                exact, chain, entry, family, T_palm_family, T_palm_object, size, turns, rates, moved, work, sweep
+                exact, chain, entry, family, T, T_palm_object, size, turns, rates, moved, work, sweep
             )
             if moved < 0.0:
-                return travel, -1, OVERLAPS
-        for j in range(joints):
+                answer.overlap[i] = sweep.winner[2]
+                return False
+        for j in range(joints[0], joints[1]):
             turns[j] += rates[j] * moved
+        move_groups(chain, joints, group, answer.travel[i], locked, moved)
+        along += moved
         if plane >= 0 or met >= 0:
-            return travel + moved, plane, met
-        travel = end
-    return travel, -1, -1
+            last = moving_joint(hand, exact, entry, met, work, sweep)
+            lock_joints(chain, joints, last, locked)
+            while last > joints[0] and rates[last] == 0.0:
+                last -= 1
+            write_contact(
+                hand,
+                exact,
+                T_palm_object,
+                sections,
+                base,
+                family,
+                chain.joint_group[last],
+                last,
+                plane,
+                met,
+                start,
+                i,
+                work,
+                sweep,
+                items,
+                answer,
+            )
+
+
+@inner_kernel
+def entry_joints(hand: HandArrays, entry: int) -> tuple[int, int]:
+    """Return the range of an entry's joints."""
+    first, groups = 0, hand.chain.joint_group
+    while first < groups.shape[0] and groups[first] < hand.entry_group[entry]:
+        first += 1
+    last = first
+    while last < groups.shape[0] and groups[last] < hand.entry_group[entry + 1]:
+        last += 1
+    return first, last
+
+
+@inner_kernel
+def moving_joint(hand: HandArrays, exact: ExactArrays, entry: int, met: int, work: Work, sweep: SweepWork) -> int:
+    """Return the last joint that moves the link which touches: by the exact sweep where `met` says so, else a plane."""
+    if met < 0:
+        return int(hand.outlines.joint[work.best[1]])
+    last = exact.joint_first[entry]
+    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
+        if exact.mover_link[n] == sweep.winner[2]:
+            last = max(last, exact.mover_joint[n])
+    return int(last)
 
 
 @inner_kernel
@@ -158,6 +198,12 @@ def settle(
 
 
 @inner_kernel
+def stops_same(chain: ChainArrays, hit: Ints, group: int, joint: int) -> bool:
+    """Say whether a contact stops what another one stops: a group, or its joints up to one that later ones leave."""
+    return hit[HIT_GROUP] == group and (not chain.breaks[group] or hit[HIT_JOINT] == joint)
+
+
+@inner_kernel
 def write_contact(
     hand: HandArrays,
     exact: ExactArrays,
@@ -166,6 +212,7 @@ def write_contact(
     base: int,
     family: int,
     group: int,
+    joint: int,
     plane: int,
     met: int,
     start: int,
@@ -175,16 +222,17 @@ def write_contact(
     items: ItemArrays,
     answer: ClosingArrays,
 ) -> None:
-    """Write a group's contact; in a further round it takes the place of the group's earlier one.
+    """Write a contact that stops a group, up to `joint`; in a further round it takes the place of the earlier one.
 
     Where a plane's contact and an exact one are the same touch, the plane describes it: it says more.
     """
     n = 0
-    while n < answer.contacts[i] and answer.hit[i, n, HIT_GROUP] != group:
+    while n < answer.contacts[i] and not stops_same(hand.chain, answer.hit[i, n], group, joint):
         n += 1
     if n == answer.hit.shape[1]:
         return
     hit, point = answer.hit[i, n], answer.point[i, n]
+    hit[HIT_JOINT] = joint
     answer.contacts[i] = max(answer.contacts[i], n + 1)
     if plane >= 0:
         describe_hit(hand, sections, base, family, plane, group, answer.turn[i], work, hit, point)
@@ -210,19 +258,21 @@ def close_item(
     items: ItemArrays,
     i: int,
     times: int,
+    together: bool,
     work: Work,
     sweep: SweepWork,
     answer: ClosingArrays,
 ) -> None:
-    """Close one item: its groups from the palm outwards, `times` over."""
+    """Close one item: its groups from the palm outwards, up to `times` over, or all at once."""
     entry = items.entry[i]
     start = hand.entry_family[entry]
-    rates = np.zeros(hand.chain.rate.shape[0])
+    joints = hand.chain.rate.shape[0]
+    rates, locked = np.zeros(joints), np.zeros(joints, dtype=np.int64)
     if exact.wanted[i]:
         sweep.poses[:] = exact.link_pose[entry]
     sweep.skipped[0] = 0
     for _ in range(times):
-        family = start - 1
+        family, before = start - 1, answer.turn[i].copy()
         for group in range(hand.entry_group[entry], hand.entry_group[entry + 1]):
             wanted = group_family(hand, group)
             while family < wanted:
@@ -231,48 +281,31 @@ def close_item(
             sections, base = shared, 0
             if family > start:
                 sections, base = own, hand.family_plane[start]
-            travel, plane, met = close_group(
+            locked[:] = 0
+            free = close_group(
                 hand,
                 exact,
-                entry,
-                group,
-                family,
-                answer.pose[i, family],
                 T_palm_object,
                 sections,
                 base,
-                items.low[i],
-                items.high[i],
+                family,
+                ALL if together else group,
                 closed,
-                exact.wanted[i] != 0,
-                answer.travel[i, group],
-                answer.turn[i],
+                start,
+                items,
+                i,
                 rates,
+                locked,
                 work,
                 sweep,
+                answer,
             )
-            if met == OVERLAPS:
-                answer.overlap[i] = sweep.winner[2]
+            if not free:
                 return
-            answer.travel[i, group] = travel
-            if plane >= 0 or met >= 0:
-                write_contact(
-                    hand,
-                    exact,
-                    T_palm_object,
-                    sections,
-                    base,
-                    family,
-                    group,
-                    plane,
-                    met,
-                    start,
-                    i,
-                    work,
-                    sweep,
-                    items,
-                    answer,
-                )
+            if together:
+                break
+        if np.all(answer.turn[i] == before):
+            break
     answer.skipped[i] = sweep.skipped[0]
     settle(hand, exact, T_palm_object, start, shared, own, items, i, work, sweep, answer)
 
@@ -289,9 +322,10 @@ def close_items(
     own: SectionArrays,
     items: ItemArrays,
     times: int,
+    together: bool,
     answer: ClosingArrays,
 ) -> None:
-    """Close every item of work (METHOD.md section 4, *proximal first*).
+    """Close every item of work (METHOD.md section 4).
 
     Args:
         hand: the fingers. exact: what the exact sweeps need.
@@ -299,10 +333,27 @@ def close_items(
         T_palm_object: where it is, shape (3, 4).
         shared: sections with every entry's first family, by global plane. own: arena for later families, with a row for
             every plane of the largest entry.
-        items: what to close. times: how often all groups are gone through.
+        items: what to close. times: how often all groups are gone through at most; fewer where nothing moves any more.
+        together: all groups move at once instead, those of a finger with one family.
         answer: written; `travel`, `turn`, `contacts` and `overflow` must be zero.
     """
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
     sweep = make_sweep_work(work.chain, exact.checked.shape[0])
     for i in range(items.entry.shape[0]):
-        close_item(hand, exact, tree, rounds, closed, T_palm_object, shared, own, items, i, times, work, sweep, answer)
+        close_item(
+            hand,
+            exact,
+            tree,
+            rounds,
+            closed,
+            T_palm_object,
+            shared,
+            own,
+            items,
+            i,
+            times,
+            together,
+            work,
+            sweep,
+            answer,
+        )

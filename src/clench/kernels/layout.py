@@ -25,6 +25,8 @@ class ChainArrays(NamedTuple):
         rate: turn per unit of its group's travel [-], (J,).
         start, stop: travel of the group between which the joint moves [rad], (J,).
         group_length: travel of each group up to its limit [rad], (G,).
+        speed: travel of each group per unit of the motion where all move at once [rad], (G,).
+        breaks: whether the joints of a group go on when those before them are blocked, (G,).
     """
 
     joint_family: Ints
@@ -34,6 +36,8 @@ class ChainArrays(NamedTuple):
     start: Floats
     stop: Floats
     group_length: Floats
+    speed: Floats
+    breaks: Ints
 
 
 class OutlineArrays(NamedTuple):
@@ -172,11 +176,13 @@ class ItemArrays(NamedTuple):
 
     Args:
         entry: (I,). low, high: range of planes, counted from the first plane of each family of the entry, (I,).
+        until: where in the motion each joint is held from outside, infinite where it is not, (I, J).
     """
 
     entry: Ints
     low: Ints
     high: Ints
+    until: Floats
 
 
 class ClosingArrays(NamedTuple):
@@ -184,7 +190,7 @@ class ClosingArrays(NamedTuple):
 
     Args:
         travel: of every group [rad], (I, G). turn: of every joint [rad], (I, J); only the entry's own are set.
-        contacts: how many there are, (I,). hit: integers of each contact, (I, S, 8), see below.
+        contacts: how many there are, (I,). hit: integers of each contact, (I, S, 9), see below.
         point: numbers of each contact in its family's plane, (I, S, 7), see below.
         pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
         overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
@@ -205,7 +211,9 @@ class ClosingArrays(NamedTuple):
 
 #: Columns of `ClosingArrays.hit`.
 HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE, HIT_WHICH = 0, 1, 2, 3, 4, 5, 6, 7
-HIT_INTEGERS = 8
+#: The last joint that the contact stops.
+HIT_JOINT = 8
+HIT_INTEGERS = 9
 #: For an exact contact the plane is -1, and the columns mean: link, kind, element that is met, group, family, element
 #: of the link, and what is met (a link, or the number of links for the object).
 #: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at

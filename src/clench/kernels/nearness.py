@@ -1,13 +1,14 @@
-"""The smallest gap between posed bodies and a resting one."""
+"""The smallest gap between posed bodies."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from .bodies import BodyArrays
+from .closest import separation
 from .compiling import kernel
 from .layout import Floats, Ints
-from .sweeping import body_gap, make_sweep_work
+from .sweeping import body_gap, make_sweep_work, put_core
 
 
 @kernel
@@ -33,3 +34,24 @@ def smallest_gap(
         if gap < best:
             best, nearest = gap, m
     return best, nearest
+
+
+@kernel
+def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, out: Floats) -> float:
+    """Return the gap of two links if it is below `bound`, else `bound`; where, and the direction to `m`, go to `out`.
+
+    Args:
+        links: every link in its frame. m, r: which. poses: `T_palm_link` of every link, (L, 3, 4). out: (6,).
+    """
+    sweep = make_sweep_work(np.empty((1, 3)), 0)
+    sweep.moving[:] = poses[m]
+    sweep.resting[:] = poses[r]
+    gap = body_gap(links, m, links, r, bound, sweep)
+    if gap < bound:
+        i, k = sweep.pair[0], sweep.pair[1]
+        put_core(links, i, sweep.moving, sweep.core)
+        put_core(links, k, sweep.resting, sweep.fixed)
+        _, nx, ny, nz, _, _, x, y, z = separation(sweep.core, links.corners[i], sweep.fixed, links.corners[k])
+        w = links.radius[k]
+        out[0], out[1], out[2], out[3], out[4], out[5] = x + w * nx, y + w * ny, z + w * nz, nx, ny, nz
+    return gap

@@ -95,7 +95,7 @@ def argument_types(kernel: Any, values: dict[str, Any]) -> tuple[Any, ...]:
 
 def sample_values() -> dict[str, Any]:
     """Return a value of the right type for every parameter of the kernels above, by name; arrays are empty."""
-    chain = ChainArrays(*_arrays("i1 i1 f2 f1 f1 f1 f1"))
+    chain = ChainArrays(*_arrays("i1 i1 f2 f1 f1 f1 f1 f1 i1"))
     outlines = OutlineArrays(*_arrays("i1 i1 f1 i1 f2 i1 f2 i1 f2"))
     hand: tuple[Any, ...] = (*_arrays("i1 i1"), chain, outlines, *_arrays("f3 i1 f1 f1 f1 i1"))
     sections = SectionArrays(*_arrays("f3 i2 f3 i2 f3 i2 i2"))
@@ -103,7 +103,7 @@ def sample_values() -> dict[str, Any]:
     values: dict[str, Any] = {
         "hand": HandArrays(*hand),
         "rounds": RoundArrays(*_arrays("i1 f2 f3")),
-        "items": ItemArrays(*_arrays("i1 i1 i1")),
+        "items": ItemArrays(*_arrays("i1 i1 i1 f2")),
         "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1 i1")),
         "exact": planes_only(0, 0),
         "chain": chain,
@@ -113,7 +113,7 @@ def sample_values() -> dict[str, Any]:
     values |= {"links": values["exact"].links, "target": values["exact"].object}
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values |= dict.fromkeys(("tree", "link", "obj"), tree)
-    values |= dict.fromkeys(("closed", "link_closed", "obj_closed"), True)
+    values |= dict.fromkeys(("closed", "link_closed", "obj_closed", "together"), True)
     values |= dict.fromkeys(("family", "start", "base", "low", "high", "i", "times", "group", "plane", "entry"), 0)
     kinds = {
         "f1": ("turns", "rates", "crossings", "point"),

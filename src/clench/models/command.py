@@ -18,6 +18,10 @@ class ClosingOrder(StrEnum):
 
     PROXIMAL_FIRST = "proximal-first"
     """one degree of freedom after another, from the palm outwards (the patent)"""
+    TOGETHER = "together"
+    """all at once; a contact stops the joints before it in its finger, the others go on"""
+    FINGERTIP = "fingertip"
+    """all at once; only a touch of the last link counts"""
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,9 @@ class GraspCommand:
         object_pose: `T_world_object`; None keeps the object's own.
         preshape: angles [rad] by joint name: posture joints, and open values of closing joints.
         fingers: names of the fingers that close, in order; None is all.
-        order, rounds: closing order, and how often it is gone through.
+        order, rounds: closing order, and how often it is gone through; 0 rounds: until nothing moves any more.
+        speeds: how fast joints close relative to each other where all move at once, by name of a free joint; 1 if not
+            named.
         planes: number of curl planes per finger.
         full_width: also compute the set that closes over all planes at once.
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
@@ -51,6 +57,7 @@ class GraspCommand:
     fingers: tuple[str, ...] | None = None
     order: ClosingOrder = ClosingOrder.PROXIMAL_FIRST
     rounds: int = 1
+    speeds: Mapping[str, float] = field(default_factory=dict)
     planes: int = 5
     full_width: bool = True
     yaw_grid: tuple[float, ...] = (0.0,)

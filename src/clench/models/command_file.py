@@ -18,7 +18,7 @@ from clench.base.errors import CommandError, FileError
 from clench.base.pose import Pose
 
 from .command import ClosingOrder, GraspCommand
-from .hand.hand import Hand
+from .hand.hand import Hand, JointRole
 from .shapes import CollisionSource
 
 Choice = TypeVar("Choice", bound=StrEnum)
@@ -27,9 +27,9 @@ Choice = TypeVar("Choice", bound=StrEnum)
 LIMIT_TOLERANCE: Final = 1e-9
 
 KEYS: Final = (
-    *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "planes", "full_width"),
-    *("yaw_grid", "open_variants", "opposition_grid", "check_sets", "measure", "collision_source", "criteria"),
-    *("next_steps", "seed"),
+    *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "speeds", "planes"),
+    *("full_width", "yaw_grid", "open_variants", "opposition_grid", "check_sets", "measure", "collision_source"),
+    *("criteria", "next_steps", "seed"),
 )
 
 
@@ -102,7 +102,13 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     for finger in _names(command.fingers, "fingers") or ():
         hand.finger(finger)
     _choice(command.order, ClosingOrder, "order")
-    _count(command.rounds, "rounds")
+    _count(command.rounds, "rounds", least=0)
+    if command.order != ClosingOrder.PROXIMAL_FIRST and command.rounds != 1:
+        raise CommandError(
+            f"rounds: expected 1 with order '{command.order}', where every joint moves until it is held, "
+            f"got {command.rounds}."
+        )
+    _check_speeds(hand, command)
     _count(command.planes, "planes")
     _numbers(command.yaw_grid, "yaw_grid", "offsets in rad")
     _numbers(command.open_variants, "open_variants", "offsets in rad")
@@ -113,6 +119,18 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
         _choice(command.collision_source, CollisionSource, "collision_source")
     if isinstance(command.criteria, Mapping):
         _weights(command.criteria, "criteria", "a weight")
+
+
+def _check_speeds(hand: Hand, command: GraspCommand) -> None:
+    followers = {c.follower for c in hand.couplings}
+    closing = [j for j, x in enumerate(hand.joints) if x.role is JointRole.CLOSING and j not in followers]
+    for name, speed in _weights(command.speeds, "speeds", "a relative speed above 0").items():
+        joint = hand.joint_index(name)
+        if speed <= 0.0:
+            raise CommandError(f"speeds.{name}: expected a relative speed above 0, got {speed:.6g}.")
+        if joint not in closing:
+            names = ", ".join(hand.joints[j].name for j in closing)
+            raise CommandError(f"speeds.{name}: expected a joint that closes and follows no other: {names}.")
 
 
 def check_angle(hand: Hand, joint: int, angle: float, key: str) -> None:
@@ -160,7 +178,8 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "preshape": lambda v, key: _weights(v, key, "a number in rad"),
         "fingers": _names,
         "order": lambda v, key: _choice(v, ClosingOrder, key),
-        "rounds": _count,
+        "rounds": lambda v, key: _count(v, key, least=0),
+        "speeds": lambda v, key: _weights(v, key, "a relative speed above 0"),
         "planes": _count,
         "full_width": _flag,
         "yaw_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
@@ -232,10 +251,10 @@ def _whole(value: Any, key: str) -> int:
     return int(value)
 
 
-def _count(value: Any, key: str) -> int:
+def _count(value: Any, key: str, least: int = 1) -> int:
     count = _whole(value, key)
-    if count < 1:
-        raise CommandError(f"{key}: expected at least 1, got {count}.")
+    if count < least:
+        raise CommandError(f"{key}: expected at least {least}, got {count}.")
     return count
 
 

@@ -15,6 +15,7 @@ from clench.grasp.depths import LinkDepth, retreat_distance
 from clench.grasp.motion import asked_fingers, decompose
 from clench.grasp.scene import hash_hand
 from clench.grasp.surface import nearest_body
+from clench.models.command import ClosingOrder
 
 from .causes import finger_cause, no_closing_joint
 from .certificate import Certificate
@@ -183,6 +184,9 @@ def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, 
     hand, name = problem.hand, c.plan.finger.name
     if c.overlap is not None:
         return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} before {name} moves."
+    if problem.command.order == ClosingOrder.FINGERTIP and c.touches and c.touches[0].link != c.plan.finger.tip_link:
+        first, tip = hand.links[c.touches[0].link].name, hand.links[c.plan.finger.tip_link].name
+        return FingerStatus.MISSED, f"{first} touches {_body_name(c.touches[0], problem)} before the tip {tip} does."
     if c.holding:
         links = list(dict.fromkeys(hand.links[t.link].name for t in c.holding))
         return FingerStatus.TOUCH, f"{', '.join(links)} touches {_body_name(c.holding[0], problem)}."

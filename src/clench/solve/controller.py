@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,14 +20,15 @@ from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
 from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import score_sets
 from clench.grasp.depths import hand_depths
-from clench.grasp.exact import hand_bodies, pack_exact
+from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
 from clench.grasp.explaining import explain_choice
 from clench.grasp.feasibility import judge_sets
 from clench.grasp.motion import alternatives, asked_fingers, next_postures, open_posture, palm_pose
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
 from clench.grasp.scene import PackedObject, pack_object
 from clench.grasp.sequence import close_in_sequence
-from clench.models.command import GraspCommand
+from clench.grasp.simultaneous import close_together
+from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
@@ -42,6 +44,8 @@ if TYPE_CHECKING:
     from .record import Record
 
 _KEPT_PLANS = 64
+#: More rounds than any finger needs that comes to rest.
+UNTIL_REST = 1000
 _plans: OrderedDict[tuple[object, ...], tuple[Hand, HandPlan, ExactArrays]] = OrderedDict()
 
 
@@ -87,7 +91,8 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     clock.lap("read")
     plan, exact = _planned(problem)
     clock.lap("plan")
-    closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, command.rounds)
+    rounds = command.rounds or UNTIL_REST
+    closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, rounds)
     clock.lap("close")
     overlaps = start_overlaps(
         hand, plan, exact.link_pose, closed, problem.packed, problem.T_palm_object, problem.source
@@ -101,7 +106,10 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     clock.lap("choose")
     best = [group[i] for group, i in zip(fingers, chosen, strict=True)]
     bodies = hand_bodies(hand, problem.source)
-    again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, command.rounds, bodies)
+    if plan.together:
+        again = close_together(hand, plan, exact, closed, problem.packed, best, bodies)
+    else:
+        again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, rounds, bodies)
     for k, (old, new) in enumerate(zip(best, again, strict=True)):
         if new is not old:
             best[k] = fingers[k][chosen[k]] = replace(new, clear=old.clear)
@@ -165,7 +173,9 @@ def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
         problem.start.tobytes(),
         None if command.fingers is None else tuple(command.fingers),
         command.planes,
-        command.rounds > 1,
+        command.rounds != 1,
+        command.order != ClosingOrder.PROXIMAL_FIRST,
+        tuple(sorted(command.speeds.items())),
         command.full_width,
         tuple(command.yaw_grid),
         tuple(command.open_variants),
@@ -179,23 +189,26 @@ def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
     for f, asked in enumerate(asked_fingers(hand, command)):
         if closing_joints(hand, asked):
             for p, q in enumerate(alternatives(hand, asked, problem.start, command)):
-                plans.append(plan_finger(hand, asked, q, command.planes, problem.source))
+                plans.append(plan_finger(hand, asked, q, command.planes, problem.source, command.speeds))
                 finger.append(f)
                 posture.append(p)
     if not plans:
         raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
-    if command.rounds > 1:
-        _check_rounds(plans)
-    plan = make_hand_plan(plans, finger, posture, command.full_width)
+    together = command.order != ClosingOrder.PROXIMAL_FIRST
+    if together or command.rounds != 1:
+        _check_parallel(plans, f"order {command.order}" if together else "rounds")
+    plan = make_hand_plan(plans, finger, posture, command.full_width, together)
     exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
+    if together:
+        exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
     _plans[key] = (hand, plan, exact)
     while len(_plans) > _KEPT_PLANS:
         _plans.popitem(last=False)
     return plan, exact
 
 
-def _check_rounds(plans: list[FingerPlan]) -> None:
-    """Refuse further rounds where outlines, cut once at the open posture, would no longer hold.
+def _check_parallel(plans: list[FingerPlan], what: str) -> None:
+    """Refuse joints that move at once, or again, where outlines, cut once at the open posture, would no longer hold.
 
     Raises:
         CommandError: a finger whose closing axes are not parallel.
@@ -203,9 +216,18 @@ def _check_rounds(plans: list[FingerPlan]) -> None:
     for plan in plans:
         if len(plan.families) > 1:
             raise CommandError(
-                f"rounds: finger '{plan.finger.name}' closes about axes that are not parallel; "
-                "more than one round needs parallel axes."
+                f"{what}: finger '{plan.finger.name}' closes about axes that are not parallel; only order "
+                f"'{ClosingOrder.PROXIMAL_FIRST}' with one round covers that."
             )
+
+
+def _with_resting(hand: Hand, plans: Sequence[FingerPlan], bodies: HandBodies) -> np.ndarray:
+    """Return which links may not overlap while all fingers close: those of fingers that rest are in the way."""
+    closing = {plan.finger.name for plan in plans}
+    resting = [link for f in hand.fingers if f.name not in closing for link in f.links]
+    checked = bodies.within.copy()
+    checked[:, resting] = bodies.across[:, resting]
+    return checked
 
 
 def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> list[list[FingerCandidate]]:
@@ -222,7 +244,7 @@ def combine(hand: Hand, start: FloatArray, chosen: list[FingerCandidate]) -> Flo
     for candidate in chosen:
         own = list(candidate.plan.finger.joints)
         q[own] = candidate.q[own]
-    return hand.coupled(q)
+    return hand.tied(q)
 
 
 def judge_answer(

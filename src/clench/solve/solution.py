@@ -36,6 +36,8 @@ class FingerStatus(StrEnum):
     """a link of the finger overlaps the object before anything moves"""
     NO_MOTION = "no_motion"
     """no closing joint can move"""
+    MISSED = "missed"
+    """another link touched before the tip, which alone was to touch"""
 
 
 class ContactKind(StrEnum):

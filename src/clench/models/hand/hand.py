@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -258,8 +258,15 @@ class Hand:
 
     def coupled(self, q: FloatArray) -> FloatArray:
         """Return a posture whose followers obey their couplings, each inside its limits, shape (J,) [rad]."""
+        return self._tied(q, self.couplings)
+
+    def tied(self, q: FloatArray) -> FloatArray:
+        """Return a posture as `coupled` does, but with followers that can break away where they are."""
+        return self._tied(q, [c for c in self.couplings if not c.breakaway])
+
+    def _tied(self, q: FloatArray, couplings: Iterable[Coupling]) -> FloatArray:
         q = np.array(q, dtype=np.float64)
-        for c in self.couplings:
+        for c in couplings:
             j = self.joints[c.follower]
             q[c.follower] = min(max(c.ratio * q[c.leader] + c.offset, j.lower), j.upper)
         return q

@@ -1,0 +1,163 @@
+"""Closing orders other than proximal first, breakaway, and rounds until rest: closed forms and what they promise."""
+
+import numpy as np
+import pytest
+
+import clench
+from chain_hands import HandBuilder, along_x, mount, three_links
+from clench.base.pose import Pose
+
+RADIUS = 0.007
+
+
+def solve(hand, obj, **changes):
+    return clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, **changes))
+
+
+def bar(x, z, r=0.004):
+    """Return a rod across the finger, along y."""
+    half = np.sqrt(0.5)
+    return clench.GraspObject.load(f"cylinder:r={r},h=0.1", pose=Pose([x, 0, z], wxyz=[half, half, 0, 0]))
+
+
+def angle_to_bar(x, z, r=0.004):
+    """Return at which turn a straight capsule from the origin along x touches the rod."""
+    return np.arctan2(z, x) - np.arcsin((RADIUS + r) / np.hypot(x, z))
+
+
+def angles(solution):
+    return np.array(list(solution.joint_angles.values()))
+
+
+def test_a_contact_holds_the_joints_before_it_and_the_others_go_on():
+    solution = solve(three_links(upper=1.2), bar(0.03, 0.02), order="together")
+    first = angle_to_bar(0.03, 0.02)
+    q = angles(solution)
+    assert q[0] == pytest.approx(first, abs=1e-7)
+    assert solution.contacts[0].stops_joint == "index_0"
+    assert (q[1:] > first).all()
+    assert solution.certified
+
+
+def test_speeds_set_the_path():
+    """The far link leads: with the distal joint slow, the first link touches alone; every joint stops in proportion."""
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    hand = three_links(upper=1.0)
+    assert angles(solve(hand, free, order="together", speeds={"index_0": 3.0})) == pytest.approx([1.0, 1.0, 1.0])
+    tip = solve(three_links(upper=2.0), bar(0.1, 0.03), order="together", speeds={"index_1": 0.25, "index_2": 0.125})
+    q = angles(tip)
+    assert tip.contacts[0].link == "index_link_2"
+    assert q[1] == pytest.approx(0.25 * q[0], rel=1e-12)
+    assert q[2] == pytest.approx(0.125 * q[0], rel=1e-12)
+
+
+def test_only_the_tip_counts():
+    hand = three_links(upper=1.2)
+    missed = solve(hand, bar(0.03, 0.02), order="fingertip")
+    assert missed.fingers["index"].status == "missed"
+    assert missed.status == "no_contact"
+    assert "index_link_0" in missed.fingers["index"].reason
+    touched = solve(hand, bar(0.09, 0.03), order="fingertip")
+    assert touched.fingers["index"].status == "touch"
+    assert [c.link for c in touched.contacts] == ["index_link_2"]
+
+
+def breaking(breaks):
+    """Return a finger whose second joint follows the first, and may break away from it."""
+    shapes = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)]
+    builder = HandBuilder().finger("index", shapes, [0.05, 0.04], upper=2.0)
+    return builder.couple("index_0", "index_1", 0.5, breakaway=breaks).hand()
+
+
+def test_the_distal_joint_goes_on_when_the_proximal_one_is_blocked():
+    rod = bar(0.03, 0.02)
+    first = angle_to_bar(0.03, 0.02)
+    rigid, loose = (angles(solve(breaking(b), rod)) for b in (False, True))
+    assert rigid == pytest.approx([first, 0.5 * first], abs=1e-7)
+    assert loose[0] == pytest.approx(first, abs=1e-7)
+    # It goes on with the actuator, up to the actuator's limit.
+    assert loose[1] == pytest.approx(0.5 * 2.0, abs=1e-9)
+
+
+def test_a_link_that_broke_away_stops_at_its_own_contact():
+    rods = [(0.03, 0.02), (0.055, 0.035)]
+    obj = clench.GraspObject.from_shape(bar(*rods[0]).bodies[0].shapes[0], pose=bar(*rods[0]).pose, name="rods")
+    solution = solve(breaking(True), obj)
+    both = clench.GraspObject.from_meshes([two_bars(rods)])
+    solution = solve(breaking(True), both)
+    assert [c.stops_joint for c in solution.contacts] == ["index_0", "index_1"]
+    assert [c.link for c in solution.contacts] == ["index_link_0", "index_link_1"]
+    assert max(abs(c.gap) for c in solution.contacts) < 1e-9
+    assert solution.certified
+
+
+def two_bars(places):
+    """Return square rods along y as one mesh."""
+    vertices, triangles = [], []
+    for n, (x, z) in enumerate(places):
+        mesh = clench.GraspObject.load("box:x=0.006,y=0.1,z=0.006").bodies[0].shapes[0].to_mesh()
+        vertices.append(mesh.vertices + np.array([x, 0, z]))
+        triangles.append(mesh.triangles + 8 * n)
+    return np.vstack(vertices), np.vstack(triangles)
+
+
+@pytest.mark.parametrize("order", ["together", "proximal-first"])
+def test_rounds_until_rest_end(order):
+    rounds = 1 if order == "together" else 0
+    solution = solve(three_links(upper=1.5), bar(0.06, 0.02), order=order, rounds=rounds)
+    again = solve(three_links(upper=1.5), bar(0.06, 0.02), order=order, rounds=rounds)
+    assert solution.certified
+    assert (angles(solution) == angles(again)).all()
+
+
+def facing(apart):
+    """Return two fingers, one above the other, that close towards each other."""
+    shapes, lengths = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)], [0.05, 0.04]
+    builder = HandBuilder().finger("index", shapes, lengths, upper=1.5)
+    down = [np.array([0.0, 1.0, 0.0])] * 2
+    return builder.finger("thumb", shapes, lengths, base=mount((0, 0, apart)), axes=down, upper=1.5, thumb=True).hand()
+
+
+def test_fingers_that_meet_on_their_way_hold_each_other():
+    hand = facing(0.1)
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = solve(hand, free, order="together")
+    q = angles(solution)
+    # Mirror images move alike and meet on the plane between them, where their distal links' highest points touch.
+    assert q[:2] == pytest.approx(q[2:], abs=1e-6)
+    assert q[0] == pytest.approx(q[1], abs=1e-12)
+    tip = 0.05 * np.sin(q[0]) + 0.04 * np.sin(2.0 * q[0])
+    assert tip + RADIUS == pytest.approx(0.05, abs=1e-8)
+    assert solution.certified
+    assert "thumb" in solution.fingers["index"].reason
+    assert solution.contacts == ()
+
+
+def test_fingers_that_overlap_before_they_move_are_not_certified():
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    assert not solve(facing(0.01), free, order="together").certified
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"order": "together", "rounds": 2}, "rounds"),
+        ({"speeds": {"index_0": 0.0}}, "above 0"),
+        ({"speeds": {"index_0": np.nan}}, "speeds.index_0"),
+        ({"speeds": {"nothing": 1.0}}, "nothing"),
+        ({"order": "sideways"}, "together"),
+        ({"rounds": -1}, "at least 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changes, words):
+    with pytest.raises(clench.ClenchError, match=words):
+        solve(three_links(), bar(0.03, 0.02), **changes)
+
+
+def test_joints_that_are_not_parallel_cannot_close_together():
+    axes = [[0, -1, 0], [0, -1, 0.2]]
+    axes = [np.array(a) / np.linalg.norm(a) for a in axes]
+    shapes = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)]
+    hand = HandBuilder().finger("index", shapes, [0.05, 0.04], axes=axes).hand()
+    with pytest.raises(clench.ClenchError, match="not parallel"):
+        solve(hand, bar(0.03, 0.02), order="together")
