@@ -6,20 +6,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_entries import entry
 
 from clench.kernels.sweep_pairs import sweep_pair
 
 TOUCH = 1e-11
 BEST = 0.5
-call = entry(sweep_pair)
 
 
 def sweep(core, fixed, w=0.0, rate=1.0, best=BEST):
     """Return how far `core` turns about the origin's y axis before it meets `fixed`."""
     chain = np.array([[rate, 0.0, 0.0]])
     rows = [np.vstack([c, np.tile(c[-1], (3 - len(c), 1))]) for c in (core, fixed)]
-    return call(rows[0], len(core), rows[1], len(fixed), w, chain, 1, TOUCH, best, False, np.zeros((6, 3)))
+    return sweep_pair(rows[0], len(core), rows[1], len(fixed), w, chain, 1, TOUCH, best, False, np.zeros((6, 3)))
 
 
 def turned(core, angle):
@@ -120,5 +118,5 @@ def test_a_wall_across_the_axis_stops_nothing_that_slides_along_it(count):
     wall = np.array([[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 2.0]])
     core = np.array([[0.01, 1e-9, 0.0], [0.05, 0.01, 0.0], [0.05, 0.01, 0.01]])
     chain = np.array([[1.0, 0.02, 0.0], [1.8, 0.0, 0.0]])[2 - count :]
-    found = call(core, 3, wall, 3, 0.0, chain, count, TOUCH, BEST, False, np.zeros((6, 3)))
+    found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, BEST, False, np.zeros((6, 3)))
     assert found == BEST

@@ -10,7 +10,7 @@ the neighbours of a core: open, thin and flipped meshes are as good as closed on
 from __future__ import annotations
 
 from .closest import crosses, separation
-from .compiling import inner_kernel
+from .compiling import inner_kernel, kernel
 from .core_motion import corner_motion, move_core, plane_offset, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
@@ -60,7 +60,7 @@ def step_to_plane(
     return step
 
 
-@inner_kernel
+@kernel
 def sweep_pair(
     core: Floats,
     ka: int,
