@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from clench.base.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
     from clench.base.pose import Pose
+    from clench.execution.completing import complete
     from clench.execution.driven_hand import DrivenHand
     from clench.execution.driver import DriverError, DriverLimits, HandDriver, HandState, JointPath
     from clench.execution.drivers.orca import OrcaDriver
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from clench.execution.formats.mcap_log import write_log
     from clench.execution.history import ExecutionHistory
     from clench.execution.joint_map import JointMap
+    from clench.execution.pregrasp import plan_pregrasp
     from clench.execution.ready_signal import ReadySignal
     from clench.execution.report import ExecutionReport
     from clench.execution.simulation import SimulatedHand
@@ -108,12 +110,14 @@ _HOMES = {
     "UnknownNameError": "clench.base.errors",
     "approach_poses": "clench.grasp.approach",
     "check_hand": "clench.grasp.self_check",
+    "complete": "clench.execution.completing",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
     "grasp_quality": "clench.solve.quality",
     "import_grasps": "clench.execution.formats.exchange",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
+    "plan_pregrasp": "clench.execution.pregrasp",
     "plan_squeeze": "clench.solve.squeezing",
     "plan_trajectory": "clench.execution.trajectory",
     "pose_error": "clench.solve.pose_error",
@@ -176,12 +180,14 @@ __all__ = [
     "__version__",
     "approach_poses",
     "check_hand",
+    "complete",
     "execute",
     "export_grasps",
     "grasp_quality",
     "import_grasps",
     "load_calibration",
     "load_command",
+    "plan_pregrasp",
     "plan_squeeze",
     "plan_trajectory",
     "pose_error",

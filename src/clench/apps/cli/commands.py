@@ -61,6 +61,9 @@ def solve(
     record: Path | None = None,
     pose_error: tuple[float, float] | None = None,
     explain: bool = False,
+    forces: bool = False,
+    mass: float = 0.2,
+    friction: float | None = None,
     strict: bool = False,
     json: bool = False,
 ) -> int:
@@ -82,6 +85,9 @@ def solve(
         record: SQLite record to append the solution to.
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
         explain: print the alternative sets with their scores, and why the chosen ones won.
+        forces: print how steady the grasp is, and the forces that hold the object.
+        mass: of the object, for the forces [kg].
+        friction: of links on the object, for the forces; by default what hand file and object say, else 0.5.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """
@@ -91,7 +97,7 @@ def solve(
     import clench
     from clench.kernels.warming import warm_up
 
-    from .printing import print_choice, print_pose_error, print_solution
+    from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
@@ -109,6 +115,8 @@ def solve(
     warm_up()
     solution = clench.solve(the_hand, the_object, the_command)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
+    if json or forces or out is not None or record is not None:
+        solution = clench.complete(solution, the_hand, the_object, mass=mass, friction=friction)
     files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)
     if record is not None:
         with clench.Record(record) as recorded:
@@ -126,6 +134,8 @@ def solve(
             print_pose_error(error)
         if explain:
             print_choice(solution)
+        if forces:
+            print_forces(solution)
     return exit_code(solution, strict)
 
 

@@ -49,6 +49,7 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         # The first call of a process loads the compiled kernels; this one shows what a solve takes.
         solution = clench.solve(hand, obj, command)
         solution = replace(solution, hand_model=loadable(hand_model), object_model=loadable(object_model))
+        solution = clench.complete(solution, hand, obj)
         step("Drawing every finger in its curl planes, and the hand")
         files = write_results(hand, obj, command, solution, out)
         step("Closing the simulated hand")

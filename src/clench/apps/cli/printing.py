@@ -44,6 +44,38 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     print_files(files)
 
 
+def print_forces(solution: GraspSolution) -> None:
+    """Print how steady a completed solution is, and the forces, torques and offsets of its squeeze."""
+    console = _console()
+    quality, squeeze = solution.quality or {}, solution.squeeze or {}
+    effort = quality["actuation"]
+    closure = "force closure" if quality["force_closure"] else "no force closure"
+    console.print(
+        f"{closure}: epsilon {quality['epsilon']:.4f} ({quality['norm']}, {quality['edges']} edges, length scale "
+        f"{quality['length_scale'] * 1e3:.1f} mm, {quality['contact_model']} contacts), volume {quality['volume']:.4g}"
+    )
+    if effort["worst_torque"] is None:
+        console.print(f"{effort['mass']:g} kg are not held in every direction of gravity: {_plain(effort['reason'])}")
+    else:
+        tension = "" if effort["worst_tension"] is None else f" and {effort['worst_tension']:.1f} N in tendons"
+        console.print(
+            f"{effort['mass']:g} kg in any direction of gravity take {effort['worst_torque']:.3f} Nm{tension}"
+        )
+    console.print(_plain(squeeze["text"]))
+    if not squeeze["forces"]:
+        return
+    table = _table("squeeze, forces on the object", "finger", "link", "friction", "force [N]", "x", "y", "z")
+    for contact, mu, force in zip(squeeze["contacts"], squeeze["friction"], squeeze["forces"], strict=True):
+        numbers = [f"{mu:g}", f"{float(np.linalg.norm(force)):.2f}", *(f"{f:.2f}" for f in force)]
+        table.add_row(*map(_plain, (contact["finger"], contact["link"], *numbers)))
+    console.print(table)
+    table = _table("squeeze, degrees of freedom", "joint", "torque [Nm]", "offset [deg]")
+    for name, torque in squeeze["torques"].items():
+        offset = squeeze["offsets"].get(name)
+        table.add_row(_plain(name), f"{torque:.3f}", "" if offset is None else f"{np.rad2deg(offset):.2f}")
+    console.print(table)
+
+
 def print_pose_error(error: PoseErrorReport) -> None:
     """Print what an error of the object's pose does to angles and touching links."""
     console = _console()

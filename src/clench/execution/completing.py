@@ -1,0 +1,42 @@
+"""Fill in what a solution is asked for only when somebody reads it: quality, squeeze and pregrasp."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from clench.grasp.mechanics.contacts import ContactModel
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.quality import DEFAULT_MASS, grasp_quality
+from clench.solve.solution import GraspSolution
+from clench.solve.squeezing import plan_squeeze
+
+from .pregrasp import CLEARANCE, plan_pregrasp
+
+
+def complete(
+    solution: GraspSolution,
+    hand: Hand,
+    obj: GraspObject,
+    *,
+    mass: float = DEFAULT_MASS,
+    friction: float | None = None,
+    contact_model: ContactModel | str = ContactModel.POINT,
+    clearance: float = CLEARANCE,
+) -> GraspSolution:
+    """Return a solution with `quality`, `squeeze` and `pregrasp`, as its document has them.
+
+    They cost a hundred times the solve, so `clench.solve` leaves them out; the command line fills them into every
+    document that it writes.
+
+    Args:
+        solution: the solution. hand, obj: what it was computed for.
+        mass: of the object [kg]. friction, contact_model: see `grasp_quality`. clearance: see `plan_pregrasp` [m].
+
+    Raises:
+        CommandError: a value out of range; the solution is of another hand.
+    """
+    quality = grasp_quality(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
+    squeeze = plan_squeeze(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
+    pregrasp = plan_pregrasp(solution, hand, obj, clearance=clearance)
+    return replace(solution, quality=quality.to_dict(), squeeze=squeeze.to_dict(), pregrasp=pregrasp)

@@ -1,0 +1,91 @@
+"""The pregrasp: every finger backed off along its own closing path to a clearance (METHOD.md section 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from clench.base.errors import CommandError
+from clench.base.pose import FloatArray, invert
+from clench.grasp.reach import nearest_link
+from clench.grasp.scene import pack_object
+from clench.models.hand.hand import Finger, Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
+from clench.solve.posture import posture
+from clench.solve.solution import GraspSolution
+
+from .trajectory import Trajectory, plan_trajectory
+
+#: Clearance of the pregrasp unless another is asked for [m].
+CLEARANCE: Final = 0.005
+#: Steps in which the closing path is walked back, and halvings that find the place within a step.
+_STEPS = 100
+_HALVINGS = 30
+
+
+def plan_pregrasp(
+    solution: GraspSolution, hand: Hand, obj: GraspObject, *, clearance: float = CLEARANCE
+) -> dict[str, float]:
+    """Return the posture in which every touching finger is backed off along its closing path to a clearance [rad].
+
+    The clearance is the smallest gap of the finger's moving links to object and obstacles. A finger that does not get
+    so far is taken back to where it starts; one that does not touch stays where the solution has it.
+
+    Args:
+        solution: the solution. hand, obj: what it was computed for.
+        clearance: [m].
+
+    Raises:
+        CommandError: a clearance that is not finite and above 0; the solution is of another hand.
+    """
+    if not (np.isfinite(clearance) and clearance > 0.0):
+        raise CommandError(f"clearance: expected a finite number above 0 m, got {clearance!r}.")
+    trajectory = plan_trajectory(solution, hand)
+    q = posture(solution.joint_angles, hand, "joint_angles")
+    T_palm_object = invert(solution.hand_pose.matrix) @ solution.object_pose.matrix
+    target, source = pack_object(obj).bodies, CollisionSource(solution.collision_source)
+    touching = {c.finger for c in solution.contacts if not c.passed}
+    for finger in hand.fingers:
+        if finger.name not in touching:
+            continue
+        own, links = list(finger.joints), _moving_links(hand, finger, trajectory)
+
+        def gap(time: float, own: list[int] = own, links: tuple[int, ...] = links) -> float:
+            there = q.copy()
+            there[own] = trajectory.at(time)[own]
+            return nearest_link(hand, there, links, source, target, T_palm_object)[0]
+
+        back = _latest_clear(gap, trajectory, clearance)
+        q[own] = trajectory.at(back)[own]
+    return dict(zip(hand.joint_names, q.tolist(), strict=True))
+
+
+def _latest_clear(gap: Callable[[float], float], trajectory: Trajectory, clearance: float) -> float:
+    """Return the last time of a trajectory before which the gap is large enough; its start when it never is."""
+    times = np.linspace(trajectory.duration, 0.0, _STEPS + 1)
+    for later, earlier in pairwise(times.tolist()):
+        if gap(earlier) >= clearance:
+            low, high = earlier, later
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if gap(middle) >= clearance else (low, middle)
+            return float(low)
+    return 0.0
+
+
+def _moving_links(hand: Hand, finger: Finger, trajectory: Trajectory) -> tuple[int, ...]:
+    """Return the links of a finger that the trajectory moves."""
+    moved: FloatArray = np.ptp(trajectory.positions, axis=0)
+    first = next((k for k, j in enumerate(finger.joints) if moved[j] > 0.0), None)
+    if first is None:
+        return ()
+    moving: set[int] = set()
+    for i in finger.links:
+        link = hand.links[i]
+        if link.joint in finger.joints[first:] or link.parent in moving:
+            moving.add(i)
+    return tuple(sorted(moving))

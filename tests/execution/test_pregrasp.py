@@ -1,0 +1,108 @@
+"""The pregrasp: a clearance along the closing path; and solutions completed for their documents."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import clench
+from clench.apps.cli.main import main
+from clench.base.errors import CommandError
+from clench.base.pose import invert
+from clench.grasp.reach import nearest_link
+from clench.grasp.scene import pack_object
+from clench.models.shapes import CollisionSource
+
+
+@pytest.fixture(scope="module")
+def grip():
+    hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
+    pose = clench.approach_poses(hand, ball, 1, 1)[0]
+    return hand, ball, clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+
+
+def gaps(hand, ball, solution, angles) -> dict[str, float]:
+    q = np.array([angles[name] for name in hand.joint_names])
+    T = invert(solution.hand_pose.matrix) @ solution.object_pose.matrix
+    body, source = pack_object(ball).bodies, CollisionSource(solution.collision_source)
+    return {f.name: nearest_link(hand, q, f.links, source, body, T)[0] for f in hand.fingers}
+
+
+@pytest.mark.parametrize("clearance", [0.001, 0.005])
+def test_touching_fingers_stand_off_by_the_clearance(grip, clearance: float) -> None:
+    hand, ball, solution = grip
+    touching = {c.finger for c in solution.contacts if not c.passed}
+    assert touching
+    before, after = solution.joint_angles, clench.plan_pregrasp(solution, hand, ball, clearance=clearance)
+    at_touch, off = gaps(hand, ball, solution, before), gaps(hand, ball, solution, after)
+    for finger in hand.fingers:
+        own = [hand.joints[j].name for j in finger.joints]
+        if finger.name not in touching:
+            assert [after[n] for n in own] == [before[n] for n in own]
+            continue
+        assert at_touch[finger.name] < 1e-8
+        assert off[finger.name] == pytest.approx(clearance, abs=1e-8)
+        # Backed off: every joint lies between the open and the closed angle.
+        for n in own:
+            low, high = sorted((solution.open_angles[n], before[n]))
+            assert low - 1e-12 <= after[n] <= high + 1e-12
+
+
+def test_a_finger_that_cannot_get_so_far_opens_as_far_as_it_may(grip) -> None:
+    hand, ball, solution = grip
+    after = clench.plan_pregrasp(solution, hand, ball, clearance=10.0)
+    touching = {c.finger for c in solution.contacts if not c.passed}
+    for finger in hand.fingers:
+        expected = solution.open_angles if finger.name in touching else solution.joint_angles
+        for j in finger.joints:
+            assert after[hand.joints[j].name] == pytest.approx(expected[hand.joints[j].name], abs=1e-12)
+
+
+def test_a_completed_solution_is_read_back_equal(grip, tmp_path) -> None:
+    hand, ball, solution = grip
+    full = clench.complete(solution, hand, ball, mass=0.1, friction=0.7)
+    assert full.quality["actuation"]["mass"] == full.squeeze["mass"] == 0.1
+    assert set(full.quality["friction"]) == {0.7}
+    assert set(full.pregrasp) == set(hand.joint_names)
+    assert full.is_valid() == solution.is_valid()
+    full.save(tmp_path / "full.json")
+    assert clench.GraspSolution.load(tmp_path / "full.json") == full
+
+
+def test_bad_clearance_is_refused(grip) -> None:
+    for clearance in (0.0, -0.001, np.nan):
+        with pytest.raises(CommandError, match=r"clearance: expected a finite number above 0 m"):
+            clench.plan_pregrasp(grip[2], grip[0], grip[1], clearance=clearance)
+
+
+def run(capsys, *arguments: str) -> tuple[int, str, str]:
+    code = main(["solve", "--hand", "robonaut2", "--object", "sphere:r=0.03", "--seed", "1", *arguments])
+    return (code, *capsys.readouterr())
+
+
+def test_the_document_of_the_command_line_is_complete(capsys) -> None:
+    code, out, _ = run(capsys, "--json", "--mass", "0.15", "--friction", "0.9")
+    document = json.loads(out)
+    assert code == 0
+    assert document["quality"]["epsilon"] > 0.0
+    assert document["squeeze"]["mass"] == 0.15
+    assert document["squeeze"]["friction"][0] == 0.9
+    assert len(document["squeeze"]["forces"]) == len(document["squeeze"]["contacts"])
+    assert document["pregrasp"].keys() == document["joint_angles"].keys()
+
+
+def test_forces_are_printed(capsys) -> None:
+    _, out, _ = run(capsys, "--forces", "--friction", "0.8")
+    assert "force closure: epsilon 0." in out
+    assert "Holds 0.2 kg under gravity" in out
+    assert "thumb_proximal" in out
+
+
+@pytest.mark.parametrize(("option", "value"), [("--mass", "-1"), ("--friction", "0"), ("--mass", "nan")])
+def test_bad_numbers_end_with_one_sentence(capsys, option: str, value: str) -> None:
+    code, out, err = run(capsys, "--json", option, value)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"clench: error: {option[2:]}: expected a finite number")
+    assert err.count("\n") == 1
