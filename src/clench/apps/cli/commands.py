@@ -146,6 +146,7 @@ def hand(
     hand_file: Path | None = None,
     palm: str | None = None,
     collision_source: Source | None = None,
+    figure: Path | None = None,
     json: bool = False,
 ) -> int:
     """Show what was understood of a hand, check it, and say what to do: fingers, roles, coupling, findings.
@@ -155,20 +156,26 @@ def hand(
         hand_file: TOML file that overrides what was found in the model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         collision_source: geometry to use.
+        figure: PNG file for a picture of the hand: joint axes, roles, closing directions, curl planes.
         json: print one JSON document on standard output.
     """
     import clench
     from clench.models.hand.report import describe_hand
 
-    from .printing import print_hand
+    from .printing import print_files, print_hand
     from .results import print_json
 
     loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
     report = describe_hand(loaded, clench.check_hand(loaded))
+    if figure is not None:
+        from clench.apps.figures.hand_map import draw_hand_map
+
+        draw_hand_map(loaded, figure)
     if json:
         print_json(report.to_dict())
     else:
         print_hand(report)
+        print_files([] if figure is None else [figure])
     return 0
 
 

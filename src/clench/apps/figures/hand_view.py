@@ -15,18 +15,15 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.solution import Contact, GraspSolution
 
 from . import style
-from .raster import Camera, Image, Picture, borders, halved, look_along, rasterise, shade
+from .raster import Camera, Image, halved, rasterise
 from .surfaces import COARSE, OBJECT_COLOR, PALM_COLOR, Surface, hand_surface, object_surface
+from .views import GAP, VIEW, fitted_camera, frame_axes, lit, scale_bar, two_views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_VIEW: Final = (590, 620)
 _TEXT: Final = 330
-_GAP: Final = 20
-_TOP: Final = 70
-_BOTTOM: Final = 60
 #: A contact farther than this behind the nearest surface is hidden [m].
 _HIDDEN: Final = 2e-3
 _ARROW: Final = 0.016
@@ -37,21 +34,21 @@ _THROUGH: Final = 0.3
 def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path) -> Path:
     """Write a figure of the closed hand on the object from two sides, with every contact and its normal."""
     body, things = hand_surface(hand, solution), object_surface(obj, solution)
-    figure, views = _layout()
+    figure, views = two_views(_TEXT)
     coarse = (hand_surface(hand, solution, COARSE).corners, object_surface(obj, solution, COARSE).corners)
     focus = _focus(*coarse)
     directions = viewpoints(*coarse, focus, solution)
-    scale = min(_camera(d, focus, _VIEW).scale for d in directions)
+    scale = min(fitted_camera(d, focus, VIEW).scale for d in directions)
     for axes, direction in zip(views, directions, strict=True):
-        image, nearness = render(body, things, _camera(direction, focus, (2 * _VIEW[0], 2 * _VIEW[1]), 2.0 * scale))
-        axes.imshow(halved(image), extent=(0, _VIEW[0], _VIEW[1], 0), interpolation="nearest")
-        camera = _camera(direction, focus, _VIEW, scale)
+        image, nearness = render(body, things, fitted_camera(direction, focus, (2 * VIEW[0], 2 * VIEW[1]), 2.0 * scale))
+        axes.imshow(halved(image), extent=(0, VIEW[0], VIEW[1], 0), interpolation="nearest")
+        camera = fitted_camera(direction, focus, VIEW, scale)
         _mark(axes, camera, nearness[::2, ::2], solution.contacts)
-        _world_axes(axes, camera)
-        axes.set_xlim(0, _VIEW[0])
-        axes.set_ylim(_VIEW[1], 0)
+        frame_axes(axes, camera)
+        axes.set_xlim(0, VIEW[0])
+        axes.set_ylim(VIEW[1], 0)
         axes.set_axis_off()
-    _scale_bar(views[0], scale)
+    scale_bar(views[0], scale)
     _explain(figure, hand, solution)
     return style.save_figure(figure, path)
 
@@ -67,17 +64,6 @@ def _focus(body: FloatArray, things: FloatArray) -> FloatArray:
     return np.concatenate([hand, others[near]])
 
 
-def _camera(towards: FloatArray, focus: FloatArray, size: tuple[int, int], scale: float | None = None) -> Camera:
-    """Return a camera that shows all points of the focus, as large as the picture allows or at a given scale."""
-    right, up, back = look_along(towards, np.array([0.0, 0.0, 1.0]))
-    across = np.column_stack([focus @ right, focus @ up])
-    low, high = across.min(axis=0), across.max(axis=0)
-    fitting = float((0.9 * np.array(size) / np.maximum(high - low, 1e-6)).min())
-    middle = 0.5 * (low + high)
-    center = right * middle[0] + up * middle[1]
-    return Camera(right, up, back, center, scale or fitting, *size)
-
-
 def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution: GraspSolution) -> list[FloatArray]:
     """Choose two directions that show contacts and object well, at least 60 degrees from each other.
 
@@ -90,7 +76,7 @@ def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution
     directions = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
     points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
     corners = np.concatenate([body, things])
-    scores = np.array([_score(corners, len(body), _camera(d, focus, (140, 140)), points) for d in directions])
+    scores = np.array([_score(corners, len(body), fitted_camera(d, focus, (140, 140)), points) for d in directions])
     first = int(np.argmax(scores))
     apart = directions @ directions[first] < 0.5
     second = int(np.argmax(np.where(apart, scores, -np.inf)))
@@ -120,37 +106,13 @@ def _hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray
 def render(body: Surface, things: Surface, camera: Camera) -> tuple[Image, FloatArray]:
     """Return the picture, shape (H, W, 3), and the nearness of what is seen [m]; the hand shows through the object."""
     front, back = rasterise(things.corners, camera), rasterise(body.corners, camera)
-    image = _lit(back, body, camera)
-    over = _lit(front, things, camera)
+    image = lit(back, body, camera)
+    over = lit(front, things, camera)
     alone = (front.triangle >= 0) & (back.triangle < 0)
     covered = (front.nearness > back.nearness) & (back.triangle >= 0)
     image[alone] = over[alone]
     image[covered] = (1.0 - _THROUGH) * over[covered] + _THROUGH * image[covered]
     return image, np.maximum(front.nearness, back.nearness)
-
-
-def _lit(picture: Picture, surface: Surface, camera: Camera) -> Image:
-    image = shade(picture, surface.normals, surface.colors, camera)
-    edge = borders(picture, surface.groups, 4e-3) & (picture.triangle >= 0)
-    image[edge] *= np.float32(0.45)
-    return image
-
-
-def _layout() -> tuple[Figure, list[Axes]]:
-    width, height = 2 * _VIEW[0] + _TEXT + 4 * _GAP, _VIEW[1] + _TOP + _BOTTOM
-    figure = style.new_figure(width, height)
-    views = [
-        figure.add_axes(
-            (
-                (_GAP + k * (_VIEW[0] + _GAP)) / width,
-                _BOTTOM / height,
-                _VIEW[0] / width,
-                _VIEW[1] / height,
-            )
-        )
-        for k in range(2)
-    ]
-    return figure, views
 
 
 def _mark(axes: Axes, camera: Camera, nearness: FloatArray, contacts: Sequence[Contact]) -> None:
@@ -208,39 +170,18 @@ def _labels(points: FloatArray, tips: FloatArray) -> FloatArray:
             break
         places = places + 0.4 * push
     margin = 14.0
-    bounded: FloatArray = np.clip(places, margin, np.array(_VIEW) - margin)
+    bounded: FloatArray = np.clip(places, margin, np.array(VIEW) - margin)
     return bounded
-
-
-def _world_axes(axes: Axes, camera: Camera) -> None:
-    """Draw the directions of the world's axes in the lower left corner."""
-    origin = np.array([46.0, _VIEW[1] - 46.0])
-    for name, axis in zip("xyz", np.eye(3), strict=True):
-        step = 32.0 * np.array([axis @ camera.right, -(axis @ camera.up)])
-        if np.linalg.norm(step) < 14.0:
-            continue  # it points at the viewer
-        arrow = {"arrowstyle": "-|>", "color": style.FAINT, "lw": 1.2, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate("", tuple(origin + step), tuple(origin), arrowprops=arrow)
-        place = origin + 1.3 * step
-        style.write(axes, place[0], place[1], name, fontsize=9, color=style.FAINT, ha="center", va="center")
-
-
-def _scale_bar(axes: Axes, scale: float) -> None:
-    length = next(mm for mm in (200, 100, 50, 20, 10, 5, 2, 1) if mm * 1e-3 * scale < 0.3 * _VIEW[0] or mm == 1)
-    right, row = _VIEW[0] - 20.0, _VIEW[1] - 18.0
-    left = right - length * 1e-3 * scale
-    axes.plot([left, right], [row, row], "-", color=style.INK, lw=2.5, solid_capstyle="butt")
-    style.write(axes, 0.5 * (left + right), row - 8.0, f"{length} mm", fontsize=9, ha="center")
 
 
 def _explain(figure: Figure, hand: Hand, solution: GraspSolution) -> None:
     width, height = figure.get_size_inches() * style.DPI
-    left = (2 * _VIEW[0] + 3 * _GAP) / width
+    left = (2 * VIEW[0] + 3 * GAP) / width
     title = f"{solution.hand} and {solution.object}: the closed hand from two sides"
-    style.write(figure, _GAP / width, 1.0 - 16 / height, title, fontsize=14, fontweight="bold", va="top")
+    style.write(figure, GAP / width, 1.0 - 16 / height, title, fontsize=14, fontweight="bold", va="top")
     text = str(solution.reason.get("text", ""))
     answer = f"{solution.status.value.replace('_', ' ')}{': ' if text else ''}{text}"
-    style.write(figure, _GAP / width, 1.0 - 44 / height, answer, fontsize=10, va="top", color=style.CHOSEN)
+    style.write(figure, GAP / width, 1.0 - 44 / height, answer, fontsize=10, va="top", color=style.CHOSEN)
     row = 70.0
 
     def line(words: str, step: float, **options: Any) -> None:

@@ -48,9 +48,15 @@ class Surface:
 
 def hand_surface(hand: Hand, solution: GraspSolution, deviation: float = _DEVIATION) -> Surface:
     """Return the hand's geometry at the chosen joint angles, each finger's links in the colours of their joints."""
-    source = CollisionSource(solution.collision_source)
     q = np.array([solution.joint_angles.get(j.name, j.open_value) for j in hand.joints])
-    poses = solution.hand_pose.matrix @ hand.link_poses(q)
+    return posed_surface(hand, q, CollisionSource(solution.collision_source), solution.hand_pose.matrix, deviation)
+
+
+def posed_surface(
+    hand: Hand, q: FloatArray, source: CollisionSource, T_world_palm: FloatArray, deviation: float = _DEVIATION
+) -> Surface:
+    """Return the hand's geometry at a posture, shape (J,) [rad], each finger's links in the colours of their joints."""
+    poses = T_world_palm @ hand.link_poses(q)
     colors = link_colors(hand)
     parts = []
     for i, link in enumerate(hand.links):

@@ -92,7 +92,7 @@ def _hand_alone(text: ModelText, palm: str | None) -> tuple[CompiledModel, int, 
         findings.append(
             Finding(
                 FindingCode.LINKS_LEFT_OUT,
-                f"Left out, being neither the hand nor between it and the root: {dropped} of {dropped + len(kept)} links.",
+                f"Left out, as neither the hand nor between it and the root: {dropped} of {dropped + len(kept)} links.",
                 "Nothing to do, unless the hand itself is incomplete: then name its palm (--palm).",
                 Severity.NOTE,
             )
