@@ -100,5 +100,5 @@ def test_bad_weights_are_refused_with_their_place(weight):
 
 
 def test_unknown_criteria_are_refused_with_those_that_exist():
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'touching_links'.*range_of_motion"):
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'touching_links'\? Criteria: range_of_motion"):
         check_numbers({"touching_link": 1.0}, "criteria", 0.0, above=False)

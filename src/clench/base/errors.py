@@ -52,6 +52,7 @@ class UnknownNameError(ClenchError):
         known = list(names)
         close = difflib.get_close_matches(name, known, n=1)
         guess = f" Did you mean '{close[0]}'?" if close else ""
-        listed = f" {kind.capitalize()}s: {', '.join(known)}." if known else f" It has no {kind}s."
+        many = {"criterion": "criteria"}.get(kind, f"{kind}s")
+        listed = f" {many.capitalize()}: {', '.join(known)}." if known else f" It has no {many}."
         super().__init__(f"{kind.capitalize()} '{name}' is not in {owner}.{guess}{listed}")
         self.name = name

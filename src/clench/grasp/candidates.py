@@ -95,6 +95,15 @@ class FingerCandidate:
         return tuple(t for t in self.touches if t.graspable and not t.passed)
 
 
+def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandidate]) -> FloatArray:
+    """Return the posture of the whole hand with every finger at its chosen set, shape (J,) [rad]."""
+    q = start.copy()
+    for candidate in chosen:
+        own = list(candidate.plan.finger.joints)
+        q[own] = candidate.q[own]
+    return hand.coupled(q)
+
+
 def read_candidates(
     hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, overlaps: Sequence[LinkDepth | None]
 ) -> list[FingerCandidate]:

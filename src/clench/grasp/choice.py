@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from .calibration import Calibration
 from .candidates import FingerCandidate
 from .combinations import Combination, best_combination
-from .criteria import HandCriterion, Setting
-from .criterion_registry import checked_value, find_criterion, is_of_finger, is_of_hand, score_sets
+from .criteria import Setting
+from .criterion_registry import find_criterion, is_of_finger, is_of_hand, score_hand, score_sets
 
 #: What puts one set before another, whatever their scores, strongest first; as `tier` lists them.
 TIERS = (
@@ -86,7 +84,7 @@ def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration
     for group in groups:
         score_sets(group, of_finger, setting)
     fingers = [_compare(group, of_finger, calibration) for group in groups]
-    of_hand = {name: c for name, c in criteria.items() if is_of_hand(c)}
+    of_hand = [name for name, c in criteria.items() if is_of_hand(c)]
     judge = _HandJudge(groups, fingers, of_hand, calibration, setting)
     known = {name for group in groups for c in group for name in c.scores}
     if of_hand:
@@ -148,7 +146,7 @@ class _HandJudge:
         self,
         groups: Sequence[Sequence[FingerCandidate]],
         fingers: Sequence[FingerChoice],
-        criteria: Mapping[str, HandCriterion],
+        criteria: Sequence[str],
         calibration: Calibration,
         setting: Setting,
     ) -> None:
@@ -157,13 +155,9 @@ class _HandJudge:
 
     def __call__(self, sets: tuple[int, ...]) -> Combination:
         """Return a combination with its scores and total."""
-        total = float(np.sum([f.totals[i] for f, i in zip(self._fingers, sets, strict=True)]))
         chosen = [group[i] for group, i in zip(self._groups, sets, strict=True)]
-        scores = {}
-        for name, criterion in self._criteria.items():
-            value = criterion.score_hand(chosen, self._setting)
-            if value is not None:
-                scores[name] = checked_value(criterion, value)
-                total += self._calibration.worth(name, scores[name])
-        allowed = all(self._calibration.allows(name, scores.get(name)) for name in scores)
+        scores = score_hand(chosen, self._criteria, self._setting)
+        total = sum(f.totals[i] for f, i in zip(self._fingers, sets, strict=True))
+        total += sum(self._calibration.worth(name, value) for name, value in scores.items())
+        allowed = all(self._calibration.allows(name, scores.get(name)) for name in self._criteria)
         return Combination(sets, scores, allowed, total)

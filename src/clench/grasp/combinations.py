@@ -17,6 +17,8 @@ import numpy as np
 EXHAUSTIVE: Final = 128
 #: Starts of the ascent besides the best of every finger; they are drawn from a fixed seed.
 RESTARTS: Final = 12
+#: No other start is taken once so many combinations were tried.
+MOST_TRIED: Final = 220
 _SEED: Final = 0
 
 
@@ -25,7 +27,7 @@ class Combination:
     """Hold one set per finger and how it was judged.
 
     Args:
-        sets: index of the set of every finger. scores: values of the criteria of the whole hand.
+        sets: index of the set of every finger. scores: values of those criteria of the whole hand that have one.
         allowed: these are inside the limits. total: weighted sum over fingers and hand [-].
     """
 
@@ -35,9 +37,9 @@ class Combination:
     total: float
 
     @property
-    def rank(self) -> tuple[bool, float]:
-        """What is larger for the better combination."""
-        return self.allowed, self.total
+    def rank(self) -> tuple[bool, int, float]:
+        """What is larger for the better combination: limits first, then that every criterion has a value."""
+        return self.allowed, len(self.scores), self.total
 
 
 def best_combination(
@@ -67,6 +69,8 @@ def best_combination(
         random = np.random.default_rng(_SEED)
         _ascend((0,) * len(counts), counts, value)
         for _ in range(RESTARTS):
+            if len(tried) > MOST_TRIED:
+                break
             _ascend(tuple(int(random.integers(n)) for n in counts), counts, value)
     ranked = sorted(tried, key=lambda places: (*(-float(r) for r in tried[places].rank), places))
     second = tried[ranked[1]] if len(ranked) > 1 else None

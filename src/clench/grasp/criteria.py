@@ -10,6 +10,7 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 
 from .candidates import FingerCandidate
@@ -27,6 +28,8 @@ class Setting:
         packed, T_palm_object: the object and where it is, shape (4, 4). source: geometry of the hand.
         steps: postures of the next steps of the work, NaN for joints that a step leaves alone, (J,) each [rad].
         joint_weights: of the joints in the range of motion, shape (J,); None is 1 for all.
+        obj: the object, its friction and mass; None where only its surface counts.
+        gravity: its direction in the palm frame, unit, shape (3,).
         kept: what a criterion wants to keep from one set to the next; emptied with every solve.
     """
 
@@ -37,6 +40,8 @@ class Setting:
     source: CollisionSource | None = None
     steps: tuple[FloatArray, ...] = ()
     joint_weights: FloatArray | None = None
+    obj: GraspObject | None = None
+    gravity: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
     kept: dict[Any, Any] = field(default_factory=dict)
 
 

@@ -12,6 +12,7 @@ from clench.base.errors import CommandError, UnknownNameError
 from .candidates import FingerCandidate
 from .criteria import Criterion, HandCriterion, Setting
 from .finger_criteria import (
+    Clearance,
     LimitDistance,
     NextStepDistance,
     NextStepTime,
@@ -19,6 +20,7 @@ from .finger_criteria import (
     RangeOfMotion,
     TouchingLinks,
 )
+from .hand_criteria import ActuationForce, ActuationForceAnyWay, Steadiness, TendonTension
 
 #: Installed packages name their criteria under this group of entry points: `name = "module:Class"`.
 ENTRY_POINTS: Final = "clench.criteria"
@@ -35,6 +37,11 @@ _registry: dict[str, Criterion | HandCriterion] = {
         NextStepTime(),
         NextStepDistance(),
         PadIndentation(),
+        Clearance(),
+        Steadiness(),
+        ActuationForce(),
+        ActuationForceAnyWay(),
+        TendonTension(),
     )
 }
 
@@ -117,6 +124,21 @@ def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], sett
             value = criterion.score(candidate, setting)
             if value is not None:
                 candidate.scores[criterion.name] = checked_value(criterion, value)
+
+
+def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting: Setting) -> dict[str, float]:
+    """Return the values that those of the named criteria which are about the whole hand give one set per finger.
+
+    Raises:
+        CommandError: a criterion gave a value that is not a finite number.
+    """
+    scores = {}
+    for name in names:
+        criterion = _registry[name]
+        value = criterion.score_hand(chosen, setting) if is_of_hand(criterion) else None
+        if value is not None:
+            scores[name] = checked_value(criterion, value)
+    return scores
 
 
 def checked_value(criterion: Criterion | HandCriterion, value: float) -> float:

@@ -138,6 +138,9 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     sets = [(groups[k][choice.chosen[k]], groups[k][second.sets[k]]) for k in changed]
     swapped = ", ".join(f"{set_name(b, groups[k])} for {names[k]}" for k, (_, b) in zip(changed, sets, strict=True))
     lead = choice.total - second.total
+    unknown = [name for name in choice.hand_scores if name not in second.scores]
+    if unknown:
+        return f"The next best ({swapped}) has no {', '.join(unknown)}."
     if not second.allowed and lead <= 0.0:
         return f"The next best ({swapped}) is outside a limit of the calibration."
     if lead <= 0.0:

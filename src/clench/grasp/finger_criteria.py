@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 
 from clench.models.hand.hand import DEFAULT_SPEED
+from clench.models.objects.grasp_object import BodyRole
 
 from .candidates import FingerCandidate
 from .criteria import Setting, own_angles
+from .reach import nearest_link, obstacle_body
+
+#: More clearance than this is no better [m].
+MOST_CLEARANCE: Final = 0.05
 
 
 class RangeOfMotion:
@@ -108,6 +113,27 @@ def _moves(candidate: FingerCandidate, setting: Setting) -> np.ndarray | None:
         moves.append(np.abs(then - at))
         at = then
     return np.array(moves)
+
+
+class Clearance:
+    """Smallest gap between the finger's links and the obstacles at the set; farther than 5 cm is no better."""
+
+    name: ClassVar[str] = "clearance"
+    unit: ClassVar[str] = "m"
+    source: ClassVar[str] = "METHOD.md section 6"
+    scale: ClassVar[float] = 0.01
+    larger_is_better: ClassVar[bool] = True
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float | None:
+        """Return the gap [m]; None without obstacles."""
+        if setting.obj is None or setting.T_palm_object is None or setting.source is None:
+            return None
+        if all(body.role is BodyRole.GRASPABLE for body in setting.obj.bodies):
+            return None
+        links, there = candidate.plan.finger.links, setting.T_palm_object
+        body = obstacle_body(setting.obj)
+        gap, _ = nearest_link(setting.hand, candidate.q, links, setting.source, body, there)
+        return min(gap, MOST_CLEARANCE)
 
 
 class PadIndentation:

@@ -31,14 +31,19 @@ def graspable_body(obj: GraspObject, packed: PackedObject) -> BodyArrays:
     """Return what is to be grasped of an object as one body, in the object's frame; obstacles are left out."""
     if all(role is BodyRole.GRASPABLE for role in packed.body_roles):
         return packed.bodies
-    return _without_obstacles(obj.bodies, CollisionSource(obj.collision_source))
+    return _of_role(obj.bodies, BodyRole.GRASPABLE, CollisionSource(obj.collision_source))
+
+
+def obstacle_body(obj: GraspObject) -> BodyArrays:
+    """Return the obstacles of an object as one body, in the object's frame."""
+    return _of_role(obj.bodies, BodyRole.OBSTACLE, CollisionSource(obj.collision_source))
 
 
 @lru_cache(maxsize=8)
-def _without_obstacles(bodies: tuple[Body, ...], source: CollisionSource) -> BodyArrays:
+def _of_role(bodies: tuple[Body, ...], role: BodyRole, source: CollisionSource) -> BodyArrays:
     from clench.kernels.bodies import join_elements, pack_bodies
 
-    shapes = [shape for body in bodies if body.role is BodyRole.GRASPABLE for shape in body.shapes]
+    shapes = [shape for body in bodies if body.role is role for shape in body.shapes]
     return pack_bodies([join_elements([shape_elements(shape, source) for shape in shapes])])
 
 

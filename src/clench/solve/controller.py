@@ -14,11 +14,11 @@ from clench.base.errors import CommandError, HandError, ObjectError
 from clench.base.pose import FloatArray, Pose, invert
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration, calibration_of
-from clench.grasp.candidates import FingerCandidate, read_candidates
+from clench.grasp.candidates import FingerCandidate, combined_posture, read_candidates
 from clench.grasp.choice import choose
 from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
 from clench.grasp.criteria import Setting
-from clench.grasp.criterion_registry import score_sets
+from clench.grasp.criterion_registry import score_hand, score_sets
 from clench.grasp.depths import hand_depths
 from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
 from clench.grasp.explaining import explain_choice
@@ -115,6 +115,7 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
             best[k] = fingers[k][chosen[k]] = replace(new, clear=old.clear)
             score_sets([best[k]], choice.used, setting)
             explained["fingers"][new.plan.finger.name]["closed_again"] = True
+            explained["hand_scores"] = score_hand(best, choice.used, setting)
     clock.lap("sequence")
     answer = judge_answer(problem, fingers, chosen, best, exact, explained)
     clock.lap("judge")
@@ -153,6 +154,8 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         problem.source,
         next_postures(hand, problem.command),
         weights if calibration.joints else None,
+        problem.obj,
+        problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
     )
 
 
@@ -238,15 +241,6 @@ def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> list[l
     return list(groups.values())
 
 
-def combine(hand: Hand, start: FloatArray, chosen: list[FingerCandidate]) -> FloatArray:
-    """Return the posture of the whole hand with every finger at its chosen set, shape (J,) [rad]."""
-    q = start.copy()
-    for candidate in chosen:
-        own = list(candidate.plan.finger.joints)
-        q[own] = candidate.q[own]
-    return hand.tied(q)
-
-
 def judge_answer(
     problem: Problem,
     fingers: list[list[FingerCandidate]],
@@ -257,7 +251,7 @@ def judge_answer(
 ) -> Answer:
     """Combine the best sets, and measure what overlaps at the start and at the end, over the whole width."""
     hand = problem.hand
-    final = combine(hand, problem.start, best)
+    final = combined_posture(hand, problem.start, best)
     at_start = hand_depths(
         hand, problem.start, problem.packed, problem.T_palm_object, problem.source, links=hand.fixed_links
     )

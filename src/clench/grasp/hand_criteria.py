@@ -1,0 +1,136 @@
+"""The criteria of all fingers together: what forces their contacts resist and need (METHOD.md section 6).
+
+Contacts are those of the chosen sets that still touch, as points with friction. Forces are per newton of load, so no
+mass has to be known, and torque limits play no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.objects.mass import mass_properties
+
+from .candidates import FingerCandidate, combined_posture
+from .criteria import Setting
+from .mechanics.actuation import Effort, least_effort
+from .mechanics.contacts import ContactSet, make_contacts, pair_friction
+from .mechanics.held import HeldObject, held_by_contacts, held_by_hand
+from .mechanics.loads import GRAVITY, gravity_any_direction, weight
+from .mechanics.steadiness import ConeParts, cone_parts, epsilon_bound_of
+
+#: Mass whose weight is 1 N [kg].
+_NEWTON: Final = 1.0 / GRAVITY
+
+
+class Steadiness:
+    """Lower bound of the Ferrari-Canny epsilon (normal forces sum to 1 N): the worst pull or twist that is resisted."""
+
+    name: ClassVar[str] = "steadiness"
+    unit: ClassVar[str] = "N/N"
+    source: ClassVar[str] = "Ferrari and Canny, ICRA 1992"
+    scale: ClassVar[float] = 0.1
+    larger_is_better: ClassVar[bool] = True
+
+    def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
+        """Return the bound [N per N of normal force]; 0 where none was found."""
+        if setting.obj is None:
+            return None
+        parts = [p for p in (_parts(c, setting) for c in chosen) if p is not None]
+        return epsilon_bound_of(parts) if parts else 0.0
+
+
+class ActuationForce:
+    """Smallest worst joint torque that holds the object against gravity, per newton of its weight."""
+
+    name: ClassVar[str] = "actuation_force"
+    unit: ClassVar[str] = "Nm/N"
+    source: ClassVar[str] = "Bicchi and Kumar, ICRA 2000"
+    scale: ClassVar[float] = 0.02
+    larger_is_better: ClassVar[bool] = False
+
+    def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
+        """Return the torque [Nm per N]; None when the contacts cannot hold the object."""
+        return _worst_torque(chosen, setting, weight(_NEWTON, setting.gravity))
+
+
+class ActuationForceAnyWay:
+    """Smallest worst joint torque that holds the object whichever way gravity points, per newton of its weight."""
+
+    name: ClassVar[str] = "actuation_force_any_way"
+    unit: ClassVar[str] = "Nm/N"
+    source: ClassVar[str] = "Bicchi and Kumar, ICRA 2000"
+    scale: ClassVar[float] = 0.05
+    larger_is_better: ClassVar[bool] = False
+
+    def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
+        """Return the torque over 12 loads whose hull holds 1 N in every direction [Nm per N]; None as above."""
+        return _worst_torque(chosen, setting, gravity_any_direction(_NEWTON))
+
+
+class TendonTension:
+    """Smallest worst tendon tension that holds 1 N of the object's weight; tendons are kept taut."""
+
+    name: ClassVar[str] = "tendon_tension"
+    unit: ClassVar[str] = "N"
+    source: ClassVar[str] = "Abdallah et al., Humanoids 2010"
+    scale: ClassVar[float] = 5.0
+    larger_is_better: ClassVar[bool] = False
+
+    def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
+        """Return the tension [N]; None without tendons, or when they or the contacts cannot hold the object."""
+        held = _held(chosen, setting)
+        if held is None or held.drive is None:
+            return None
+        plan = least_effort(held, weight(_NEWTON, setting.gravity)[0], Effort.TENSION)
+        return None if plan is None else plan.worst_tension
+
+
+def _worst_torque(chosen: Sequence[FingerCandidate], setting: Setting, loads: FloatArray) -> float | None:
+    """Return the smallest worst torque over loads, without regard to torque limits; None when one cannot be held."""
+    held = _held(chosen, setting)
+    plans = [] if held is None else [least_effort(held.without_limits(), load) for load in loads]
+    return max((p.worst_torque for p in plans if p), default=None) if plans and all(plans) else None
+
+
+def _held(chosen: Sequence[FingerCandidate], setting: Setting) -> HeldObject | None:
+    """Return the object as the sets hold it; None when the setting has none, or nothing touches."""
+    if setting.obj is None or not any(c.holding for c in chosen):
+        return None
+    contacts = _contacts(chosen, setting)
+    return held_by_hand(setting.hand, combined_posture(setting.hand, setting.start, chosen), contacts, *_mass(setting))
+
+
+def _parts(candidate: FingerCandidate, setting: Setting) -> ConeParts | None:
+    """Return what a set adds to the bound of epsilon; found once per set."""
+    key = ("cones", id(candidate))
+    if key not in setting.kept:
+        parts = None
+        if candidate.holding:
+            parts = cone_parts(held_by_contacts(_contacts([candidate], setting), *_mass(setting)))
+        setting.kept[key] = (candidate, parts)
+    found: ConeParts | None = setting.kept[key][1]
+    return found
+
+
+def _contacts(chosen: Sequence[FingerCandidate], setting: Setting) -> ContactSet:
+    """Return the contacts of sets in the palm frame."""
+    assert setting.obj is not None
+    touches = [t for c in chosen for t in c.holding]
+    return make_contacts(
+        np.array([t.position for t in touches]),
+        -np.array([t.normal for t in touches]),
+        [pair_friction(setting.hand, t.link, setting.obj.bodies[t.body]) for t in touches],
+        links=[t.link for t in touches],
+    )
+
+
+def _mass(setting: Setting) -> tuple[FloatArray, float]:
+    """Return the centre of mass in the palm frame [m] and the length scale [m]."""
+    assert setting.obj is not None
+    assert setting.T_palm_object is not None
+    mass = mass_properties(setting.obj)
+    return setting.T_palm_object[:3, :3] @ mass.center + setting.T_palm_object[:3, 3], mass.length

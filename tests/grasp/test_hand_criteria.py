@@ -1,0 +1,185 @@
+"""Criteria of the whole hand agree with the mechanics they are made of, and with forces worked out by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import clench
+from chain_hands import HandBuilder, along_x, mount
+from clench.base.pose import Pose
+from clench.grasp import criterion_registry
+from clench.grasp.criteria import Setting
+from clench.grasp.criterion_registry import find_criterion
+from clench.grasp.mechanics.contacts import make_contacts, pair_friction
+from clench.grasp.mechanics.held import held_by_contacts
+from clench.grasp.mechanics.steadiness import epsilon, epsilon_bound
+from clench.models.hand.tendons import TendonMap
+from clench.models.objects.grasp_object import BodyRole
+from clench.models.objects.mass import mass_properties
+
+MUG = clench.GraspObject.load("mug")
+SEEN = {}
+
+
+class Spy:
+    """Keep what criteria are given."""
+
+    name, unit, source, scale, larger_is_better = "spy", "-", "test", 1.0, True
+
+    def score_hand(self, chosen, setting):
+        SEEN.update(chosen=list(chosen), setting=setting)
+        return 0.0
+
+
+@pytest.fixture
+def chosen(monkeypatch):
+    """Return the chosen sets of a solve, and their setting."""
+
+    def solve(hand, obj, command):
+        with monkeypatch.context() as patch:
+            patch.setattr(criterion_registry, "_registry", {**criterion_registry._registry, "spy": Spy()})
+            solution = clench.solve(hand, obj, command)
+        return SEEN["chosen"], SEEN["setting"], solution
+
+    return solve
+
+
+def mug_command(**changes):
+    pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
+    return clench.GraspCommand(hand_pose=pose, criteria={"spy": 1.0}, **changes)
+
+
+def score(name, sets, setting):
+    return find_criterion(name, "test").score_hand(sets, setting)
+
+
+def test_steadiness_is_the_bound_of_all_contacts_and_below_epsilon(chosen):
+    hand = clench.Hand.load("robonaut2")
+    sets, setting, _ = chosen(hand, MUG, mug_command())
+    touches = [t for c in sets for t in c.holding]
+    friction = [pair_friction(hand, t.link, MUG.bodies[t.body]) for t in touches]
+    contacts = make_contacts([t.position for t in touches], [-t.normal for t in touches], friction)
+    mass = mass_properties(MUG)
+    T = setting.T_palm_object
+    held = held_by_contacts(contacts, T[:3, :3] @ mass.center + T[:3, 3], mass.length)
+    found = score("steadiness", sets, setting)
+    assert found == pytest.approx(epsilon_bound(held), rel=1e-9, abs=1e-12)
+    assert 0.0 <= found <= epsilon(held).radius + 1e-12
+    assert score("steadiness", [], setting) == 0.0
+
+
+def pincer(height=0.035, **changes):
+    """Return two fingers that close on what is between them, along z, links 80 mm long."""
+    builder = HandBuilder().finger(
+        "index", [along_x(0.007, 0.08)], [0.08], base=mount((-0.04, 0, height)), upper=1.5, axes=[[0, 1, 0]]
+    )
+    builder.finger("thumb", [along_x(0.007, 0.08)], [0.08], base=mount((-0.04, 0, -height)), upper=1.5, thumb=True)
+    return replace(builder.hand(), **changes)
+
+
+def held_ball(chosen, hand):
+    command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"spy": 1.0})
+    sets, setting, _ = chosen(hand, clench.GraspObject.load("sphere:r=0.02"), command)
+    return sets, setting
+
+
+def test_the_least_torque_agrees_with_statics(chosen):
+    """Two opposed fingers and a weight: what the lower one carries and both squeeze, balanced about both joints."""
+    sets, setting = held_ball(chosen, pincer())
+    below, above = (next(t for t in c.holding) for c in sorted(sets, key=lambda c: c.holding[0].position[2]))
+    found = score("actuation_force", sets, setting)
+    # Planar statics: forces (x, z) at both contacts inside cones of 0.5, and a fine grid over the one that is free.
+    points = np.array([below.position, above.position])[:, [0, 2]]
+    normals = -np.array([below.normal, above.normal])[:, [0, 2]]
+    tangents = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
+    anchors = np.array([[-0.04, -0.035], [-0.04, 0.035]])
+    columns = np.array([normals[0], tangents[0], normals[1], tangents[1]])
+    moments = np.repeat(points, 2, axis=0)
+    rows = np.column_stack([columns, moments[:, 1] * columns[:, 0] - moments[:, 0] * columns[:, 1]])
+    base = np.linalg.lstsq(rows.T, np.array([0.0, 1.0, 0.0]), rcond=None)[0]
+    f = base + np.linspace(-50.0, 50.0, 400001)[:, None] * np.linalg.svd(rows.T)[2][-1]
+    f = f[(np.abs(f[:, [1, 3]]) <= 0.5 * f[:, [0, 2]]).all(axis=1)]
+    forces = f[:, [0, 2], None] * normals + f[:, [1, 3], None] * tangents
+    arms = points - anchors
+    torques = arms[:, 1] * forces[:, :, 0] - arms[:, 0] * forces[:, :, 1]
+    assert found == pytest.approx(np.abs(torques).max(axis=1).min(), abs=1e-5)
+
+
+def test_any_way_is_no_less_than_one_way(chosen):
+    hand = clench.Hand.load("robonaut2")
+    sets, setting, _ = chosen(hand, MUG, mug_command())
+    one, any_way = (score(name, sets, setting) for name in ("actuation_force", "actuation_force_any_way"))
+    assert one is not None
+    assert any_way is None or any_way >= one - 1e-9
+
+
+def test_what_cannot_be_held_has_no_force(chosen):
+    sets, setting = held_ball(chosen, pincer())
+    lower = [c for c in sets if c.holding and c.holding[0].position[2] > 0.0]
+    assert score("actuation_force", lower, setting) is None
+    assert score("actuation_force", [], setting) is None
+
+
+def test_tensions_of_equal_antagonistic_tendons_are_torque_over_arm(chosen):
+    """With equal arms the least worst tension is the least worst torque over the arm, and above the least tension."""
+    arm, least = 0.01, 1.0
+    arms = ((arm, -arm, 0.0, 0.0), (0.0, 0.0, arm, -arm))
+    hand = pincer(tendons=TendonMap(("index_0", "thumb_0"), arms, (least,) * 4, (500.0,) * 4))
+    sets, setting = held_ball(chosen, hand)
+    torque = score("actuation_force", sets, setting)
+    assert score("tendon_tension", sets, setting) == pytest.approx(torque / arm + least, rel=1e-5)
+
+
+def test_no_tendons_no_tension(chosen):
+    assert score("tendon_tension", *held_ball(chosen, pincer())) is None
+
+
+def test_criteria_of_the_hand_say_nothing_without_an_object():
+    setting = Setting(pincer(), np.zeros(2))
+    assert score("steadiness", [], setting) is None
+    assert score("actuation_force", [], setting) is None
+
+
+@pytest.mark.parametrize("preset", ["steady", "gentle", "quick", "balanced"])
+def test_presets_choose(preset):
+    hand = clench.Hand.load("robonaut2")
+    pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
+    command = clench.GraspCommand(hand_pose=pose, criteria=preset, yaw_grid=(0.0, 0.1), planes=1)
+    solution = clench.solve(hand, MUG, command)
+    assert solution.choice["calibration"] == preset
+    assert solution.is_valid()
+    assert set(solution.choice["criteria"]) | set(solution.choice["unused"])
+
+
+def test_weight_on_steadiness_never_makes_the_grip_less_steady():
+    hand = clench.Hand.load("robonaut2")
+    pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
+    bounds = []
+    for weight in (0.0, 0.1, 1.0, 10.0):
+        criteria = {"range_of_motion": 1.0, "steadiness": weight} if weight else {"range_of_motion": 1.0}
+        command = clench.GraspCommand(hand_pose=pose, criteria=criteria, yaw_grid=(0.0, 0.15, -0.15), planes=1)
+        scores = clench.solve(hand, MUG, command).choice["hand_scores"]
+        bounds.append(scores.get("steadiness", 0.0))
+    assert bounds[1:] == sorted(bounds[1:])
+
+
+def test_clearance_is_the_gap_to_obstacles_alone():
+    hand = pincer(0.06)
+    ball = clench.GraspObject.load("sphere:r=0.02")
+    wall = clench.GraspObject.load("box:x=0.02,y=0.2,z=0.02").bodies[0].moved(Pose([0.09, 0.0, 0.03]))
+    scene = replace(ball, bodies=(*ball.bodies, replace(wall, name="wall", role=BodyRole.OBSTACLE)))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"clearance": 1.0})
+    solution = clench.solve(hand, scene, command)
+    index = solution.fingers["index"]
+    chosen = index.candidates[index.chosen]
+    q = chosen.joint_angles["index_0"]
+    # The index is a capsule from (-0.04, 0, 0.06), 80 mm long, turned down by q; the wall is a box beside its tip.
+    along = np.array([np.cos(q), -np.sin(q)])
+    points = np.array([-0.04, 0.06]) + np.linspace(0.0, 0.08, 20001)[:, None] * along
+    low, high = np.array([0.08, 0.02]), np.array([0.10, 0.04])
+    outside = np.maximum(np.maximum(low - points, points - high), 0.0)
+    gap = np.linalg.norm(outside, axis=1).min() - 0.007
+    assert chosen.scores["clearance"] == pytest.approx(min(gap, 0.05), abs=1e-6)
+    alone = clench.solve(hand, ball, command)
+    assert alone.choice["unused"] == ["clearance"]
