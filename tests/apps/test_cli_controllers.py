@@ -98,10 +98,14 @@ def test_a_hand_without_controller_is_a_failed_execution(
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     options = ["--actuator", "ros2", "--interface", "cyclonedds", "--timeout", "0.2", "--controller", "nobody"]
-    assert main(["execute", str(tmp_path / "s.json"), *options, "--json"]) == 1
+    log = ["--log", str(tmp_path / "x.mcap"), "--out", str(tmp_path / "r.json")]
+    assert main(["execute", str(tmp_path / "s.json"), *options, *log, "--json"]) == 1
     report = json.loads(capsys.readouterr().out)
     assert report["reason"].startswith("Not carried out: No controller listens on '/nobody/joint_trajectory'")
     assert report["history"] is None
+    assert report["notes"] == ["Nothing was measured on the way: no log was written."]
+    assert json.loads((tmp_path / "r.json").read_text()) == report
+    assert not (tmp_path / "x.mcap").exists()
 
 
 def test_the_ready_signal(solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,6 +115,17 @@ def test_the_ready_signal(solution: GraspSolution, tmp_path: Path, capsys: pytes
     assert "done: Recorded as 1 and signalled to" in capsys.readouterr().out
     with Record(record) as recorded:
         assert recorded.read(json.loads(ready.read_text())["id"]) == solution
+
+
+def test_the_simulated_hand_is_logged(solution: GraspSolution, tmp_path: Path) -> None:
+    pytest.importorskip("mcap_ros2")
+    log = tmp_path / "x.mcap"
+    main(["execute", str(tmp_path / "s.json"), "--log", str(log), "--json"])
+    from mcap.reader import make_reader
+
+    with log.open("rb") as stream:
+        counts = make_reader(stream).get_summary().statistics.channel_message_counts
+    assert max(counts.values()) > 20
 
 
 @pytest.mark.parametrize("ending", ["yaml", "npy", "json"])

@@ -21,6 +21,7 @@ from clench.execution.executing import execute
 from clench.execution.following import HORIZON, PERIOD, TimedPlan
 from clench.execution.joint_map import JointMap, MappedJoint
 from clench.models.hand.hand import Hand
+from clench.models.hand.tendons import TendonMap
 from clench.models.objects.grasp_object import GraspObject
 from clench.solve.solution import GraspSolution
 
@@ -201,6 +202,44 @@ def test_a_solution_of_another_geometry_never_reaches_the_driver(pincer: Hand, s
     with pytest.raises(CommandError, match="geometry_hash"):
         run(driver, pincer, replace(solution, geometry_hash="ab+cd"))
     assert driver.commands == []
+
+
+class Puller(FakeDriver):
+    """A controller that pulls tendons, too."""
+
+    pulled: list[list[float]]
+
+    def pull(self, tensions: np.ndarray) -> None:
+        self.pulled = [*getattr(self, "pulled", []), tensions.tolist()]
+
+
+def test_the_squeeze_of_a_tendon_driven_hand(pincer: Hand, solution: GraspSolution) -> None:
+    tendons = TendonMap(("thumb", "index"), ((0.01, 0.0), (0.0, 0.01)), (0.0, 1.0), (50.0, 60.0))
+    hand = replace(pincer, tendons=tendons)
+    planned = replace(solution, squeeze={"tensions": [12.0, 1.0]})
+    driver = Puller(OPEN)
+    report = run(driver, hand, planned)
+    assert report.success
+    assert driver.pulled == [[12.0, 1.0]]
+    assert "The tendons were told the tensions of the squeeze plan, up to 12 N." in report.notes
+    for wrong, message in (
+        ([12.0], "Expected 2 tensions, one a tendon"),
+        ([60.0, 1.0], "Tendon 1 would be told 60 N, outside its limits [0, 50] N."),
+        ([1.0, np.nan], "Tendon 2 would be told nan N"),
+    ):
+        driver = Puller(OPEN)
+        report = run(driver, hand, replace(solution, squeeze={"tensions": wrong}))
+        assert any(note.startswith("The tendons were not pulled: " + message) for note in report.notes), report.notes
+        assert not hasattr(driver, "pulled")
+        assert driver.stops == 1
+    plain = FakeDriver(OPEN)
+    assert len(run(plain, hand, planned).notes) == 2  # a driver without tendons is asked nothing
+
+
+def test_staying_connected(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN)
+    assert run(driver, pincer, solution, stay_connected=True).success
+    assert driver.connected
 
 
 LIMITS = {"a": CommandLimits(-1.0, 1.0, 2.0, 1.0, "rad"), "b": CommandLimits(0.0, 90.0, 60.0, 57.3, "deg")}

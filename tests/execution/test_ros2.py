@@ -48,9 +48,18 @@ def installed(interface: str) -> bool:
     return importlib.util.find_spec(interface) is not None
 
 
-INTERFACES = [
-    pytest.param("cyclonedds", marks=pytest.mark.skipif(not installed("cyclonedds"), reason="needs cyclonedds")),
-    pytest.param("rclpy", marks=pytest.mark.skipif(not installed("rclpy"), reason="needs rclpy (Linux, x86-64)")),
+NEEDS = {
+    "cyclonedds": pytest.mark.skipif(not installed("cyclonedds"), reason="needs cyclonedds"),
+    "rclpy": pytest.mark.skipif(not installed("rclpy"), reason="needs rclpy (Linux, x86-64)"),
+}
+#: The real client library in everyday tests, the other one with -m long.
+RCLPY_FIRST = [
+    pytest.param("rclpy", marks=NEEDS["rclpy"]),
+    pytest.param("cyclonedds", marks=[NEEDS["cyclonedds"], pytest.mark.long]),
+]
+CYCLONE_FIRST = [
+    pytest.param("cyclonedds", marks=NEEDS["cyclonedds"]),
+    pytest.param("rclpy", marks=[NEEDS["rclpy"], pytest.mark.long]),
 ]
 
 
@@ -135,8 +144,15 @@ def targets(solution: GraspSolution) -> np.ndarray:
     return np.array([solution.joint_angles["thumb"], solution.joint_angles["index"]])
 
 
-@pytest.mark.parametrize("theirs", INTERFACES)
-@pytest.mark.parametrize("ours", INTERFACES)
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        pytest.param("cyclonedds", "rclpy", marks=[NEEDS["cyclonedds"], NEEDS["rclpy"]]),
+        pytest.param("rclpy", "cyclonedds", marks=[NEEDS["cyclonedds"], NEEDS["rclpy"]]),
+        pytest.param("cyclonedds", "cyclonedds", marks=[NEEDS["cyclonedds"], pytest.mark.long]),
+        pytest.param("rclpy", "rclpy", marks=[NEEDS["rclpy"], pytest.mark.long]),
+    ],
+)
 def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str, theirs: str) -> None:
     node = world.node(theirs)
     report = world.report(world.drive(ours, 0.5))
@@ -158,7 +174,7 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
         assert near.max() < 0.03
 
 
-@pytest.mark.parametrize("theirs", INTERFACES)
+@pytest.mark.parametrize("theirs", RCLPY_FIRST)
 def test_a_cut_connection_stops_the_hand_and_is_reported(world: World, theirs: str) -> None:
     node = world.node(theirs, "--cut-after", "0.8")
     report = world.report(world.drive("cyclonedds" if installed("cyclonedds") else "rclpy", 0.15))
@@ -175,7 +191,7 @@ def test_a_cut_connection_stops_the_hand_and_is_reported(world: World, theirs: s
     assert (later[-1] > [0.01, 0.01]).any()
 
 
-@pytest.mark.parametrize("ours", INTERFACES)
+@pytest.mark.parametrize("ours", RCLPY_FIRST)
 def test_killing_our_program_stops_the_hand(world: World, ours: str) -> None:
     node = world.node("cyclonedds" if installed("cyclonedds") else "rclpy")
     driving = world.drive(ours, 0.05)
@@ -190,6 +206,8 @@ def test_killing_our_program_stops_the_hand(world: World, ours: str) -> None:
     assert (samples[-1, 1:] > 0.0).any()
 
 
+@NEEDS["cyclonedds"]
+@pytest.mark.long
 def test_a_controller_that_dies_is_reported(world: World) -> None:
     world.node("cyclonedds", "--die-after", "0.6")
     report = world.report(world.drive("cyclonedds", 0.05))
@@ -197,6 +215,7 @@ def test_a_controller_that_dies_is_reported(world: World) -> None:
     assert "is stale" in report["reason"] or "Nobody listens" in report["reason"]
 
 
+@NEEDS["cyclonedds"]
 def test_a_state_that_is_sent_again_and_again_is_stale(world: World) -> None:
     node = world.node("cyclonedds", "--freeze-after", "0.5")
     report = world.report(world.drive("cyclonedds", 0.05))
@@ -205,6 +224,7 @@ def test_a_state_that_is_sent_again_and_again_is_stale(world: World) -> None:
     assert log["samples"][-1][1] < 0.9 * targets(world.solution)[0]
 
 
+@NEEDS["cyclonedds"]
 def test_a_controller_of_other_joints_never_moves(world: World) -> None:
     node = world.node("cyclonedds", "--start", "0.05,0.0,0.0", joints="thumb,index,toe")
     report = world.report(world.drive("cyclonedds", 1.0))
@@ -215,7 +235,7 @@ def test_a_controller_of_other_joints_never_moves(world: World) -> None:
     assert np.ptp(np.array(log["samples"])[:, 1:]) == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize("ours", INTERFACES)
+@pytest.mark.parametrize("ours", CYCLONE_FIRST)
 def test_who_is_not_there(world: World, ours: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     begun = time.monotonic()

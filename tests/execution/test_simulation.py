@@ -90,6 +90,12 @@ def test_the_watcher_sees_the_motion(pincer: Hand, pinch: GraspSolution, ball: G
     assert len(seen) > 10
     np.testing.assert_allclose(seen[0][1], 0.0, atol=1e-9)
     assert seen[-1][1][0] == pytest.approx(report.joints["thumb"].reached)
+    history = report.history
+    assert history is not None
+    np.testing.assert_array_equal(history.times, [t for t, _ in seen[:-1]])
+    np.testing.assert_array_equal(history.measured, [q for _, q in seen[:-1]])
+    np.testing.assert_array_equal(history.commanded[-1], list(pinch.joint_angles.values()))
+    assert np.abs(history.commanded - history.measured).max() < 0.1
 
 
 def test_an_object_in_the_way_is_not_success(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:

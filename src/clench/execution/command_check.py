@@ -9,6 +9,7 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
+from clench.models.hand.tendons import TendonMap
 
 from .driver import DriverLimits, HandState, JointPath, RefusedCommandError
 from .joint_map import MappedJoint
@@ -140,6 +141,25 @@ class CommandCheck:
             raise RefusedCommandError("A command holds a number that is not finite.")
         if (np.diff(path.times, prepend=0.0) < SHORTEST).any():
             raise RefusedCommandError("The times of a command do not rise from now on.")
+
+
+def check_tensions(tensions: FloatArray, tendons: TendonMap) -> None:
+    """Check tensions before they are sent.
+
+    Args:
+        tensions: [N], shape (T,). tendons: of the hand.
+
+    Raises:
+        RefusedCommandError: another number of tendons, a number that is not finite, or outside the limits.
+    """
+    if tensions.shape != (tendons.count,):
+        raise RefusedCommandError(f"Expected {tendons.count} tensions, one a tendon, got shape {tensions.shape}.")
+    for k, (tension, low, high) in enumerate(zip(tensions, tendons.t_min, tendons.t_max, strict=True)):
+        # Written so that NaN fails.
+        if not low - ROUNDING <= tension <= high + ROUNDING:
+            raise RefusedCommandError(
+                f"Tendon {k + 1} would be told {tension:.4g} N, outside its limits [{low:.4g}, {high:.4g}] N."
+            )
 
 
 def slowed_down(times: FloatArray, positions: FloatArray, speeds: FloatArray) -> FloatArray:

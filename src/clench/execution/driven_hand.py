@@ -14,8 +14,8 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
-from .command_check import CommandCheck, command_limits, slowed_down
-from .driver import DriverError, HandDriver, HandState
+from .command_check import CommandCheck, check_tensions, command_limits, slowed_down
+from .driver import DriverError, HandDriver, HandState, TendonDriver
 from .following import CLOSEST, HORIZON, Followed, Follower, TimedPlan
 from .history import ExecutionHistory
 from .joint_map import JointMap, MappedJoint
@@ -41,6 +41,8 @@ class DrivenHand:
         max_age: oldest state of the hand on which a command may be based [s].
         max_deviation: how far a joint may be from where it was told to be, on the way [rad].
         settling: how long the hand may take to arrive after the trajectory's end [s].
+        stay_connected: leave the driver connected at the end, for hands that let go when it leaves; call
+            `driver.disconnect` later.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class DrivenHand:
         max_age: float = 0.5,
         max_deviation: float = 0.5,
         settling: float = 2.0,
+        stay_connected: bool = False,
     ) -> None:
         self._hand = hand
         self.driver = driver
@@ -65,6 +68,7 @@ class DrivenHand:
         self.max_age = max_age
         self.max_deviation = max_deviation
         self.settling = settling
+        self.stay_connected = stay_connected
         self._stopping = threading.Event()
 
     @property
@@ -104,11 +108,13 @@ class DrivenHand:
             check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
             arrived = {joint.name: 0.2 * self.angle_tolerance * abs(joint.scale) for joint in mapped.values()}
             followed = Follower(self.driver, check, self._stopping, self.settling, arrived).follow(plan)
+            pulled = self._pull(solution) if followed.trouble is None else ""
         except DriverError as error:
             return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}")
         finally:
-            self.driver.disconnect()
-        return self._report(followed, mapped, computed, way)
+            if not self.stay_connected:
+                self.driver.disconnect()
+        return self._report(followed, mapped, computed, (_way(way), pulled))
 
     def _check_joints(self, mapped: Mapping[str, MappedJoint]) -> None:
         for name, joint in mapped.items():
@@ -141,8 +147,22 @@ class DrivenHand:
         )
         return plan.thinned(), float(np.abs(angles[0] - found).max(initial=0.0))
 
+    def _pull(self, solution: GraspSolution) -> str:
+        """Send the squeeze plan's tensions to a driver that pulls tendons; return a sentence about it, or none."""
+        planned = (solution.squeeze or {}).get("tensions")
+        if planned is None or self.hand.tendons is None or not isinstance(self.driver, TendonDriver):
+            return ""
+        tensions = np.asarray(planned, dtype=np.float64)
+        try:
+            check_tensions(tensions, self.hand.tendons)
+            self.driver.pull(tensions)
+        except DriverError as error:
+            self.driver.stop()
+            return f"The tendons were not pulled: {error}"
+        return f"The tendons were told the tensions of the squeeze plan, up to {tensions.max():.3g} N."
+
     def _report(
-        self, followed: Followed, mapped: Mapping[str, MappedJoint], computed: FloatArray, way: float
+        self, followed: Followed, mapped: Mapping[str, MappedJoint], computed: FloatArray, notes: tuple[str, ...]
     ) -> ExecutionReport:
         history = _history(followed, mapped)
         joints = {
@@ -159,10 +179,7 @@ class DrivenHand:
             duration=followed.times[-1] if followed.times else 0.0,
             largest_angle_error=error,
             angle_tolerance=self.angle_tolerance,
-            notes=(
-                f"Before the trajectory the hand moved straight to its start, {way:.3g} rad at most.",
-                "Angles were compared; whether links touch was not measured.",
-            ),
+            notes=(*filter(None, notes), "Angles were compared; whether links touch was not measured."),
             history=history,
         )
 
@@ -179,6 +196,10 @@ class DrivenHand:
             far = f"joint '{worst}' is {abs(joints[worst].error):.3g} rad from its computed angle"
             return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad."
         return True, f"Every joint is within {error:.2g} rad of its computed angle."
+
+
+def _way(way: float) -> str:
+    return f"Before the trajectory the hand moved straight to its start, {way:.3g} rad at most."
 
 
 def _history(followed: Followed, mapped: Mapping[str, MappedJoint]) -> ExecutionHistory:

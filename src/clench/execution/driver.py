@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -69,6 +69,17 @@ class DriverLimits:
 
     positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     velocities: Mapping[str, float] = field(default_factory=dict)
+
+
+@runtime_checkable
+class TendonDriver(Protocol):
+    """Pull tendons: what a driver of a tendon-driven hand has besides `HandDriver`."""
+
+    def pull(self, tensions: FloatArray) -> None:
+        """Bring the tendons to these tensions [N], shape (T,), in the order of the hand file, and keep them there.
+
+        `stop` ends it: the joints then hold where they are.
+        """
 
 
 class HandDriver(Protocol):

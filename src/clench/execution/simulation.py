@@ -13,6 +13,7 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import Contact, FingerStatus, GraspSolution
 
+from .history import ExecutionHistory
 from .report import ContactReached, ExecutionReport, JointReached
 from .scene import TIMESTEP, Scene, body_pose, build_scene
 from .trajectory import Trajectory
@@ -73,7 +74,7 @@ class SimulatedHand:
         obj = self.obj.posed(solution.object_pose)
         start = trajectory.positions[0]
         scene = build_scene(self.hand, obj, solution.hand_pose, start, show_progress=self.show_progress)
-        data, first_touch = self._run(scene, trajectory)
+        data, first_touch, history = self._run(scene, trajectory)
         reached = np.array(data.qpos[scene.qpos])
         joints = {
             name: JointReached(float(c), float(r))
@@ -103,10 +104,11 @@ class SimulatedHand:
             angle_tolerance=self.angle_tolerance,
             contact_tolerance=self.contact_tolerance,
             notes=_notes(scene, solution),
+            history=history,
         )
 
-    def _run(self, scene: Scene, trajectory: Trajectory) -> tuple[Any, dict[str, float | None]]:
-        """Simulate the motion; return the final state and when each finger first touched."""
+    def _run(self, scene: Scene, trajectory: Trajectory) -> tuple[Any, dict[str, float | None], ExecutionHistory]:
+        """Simulate the motion; return the final state, when each finger first touched, and the samples on the way."""
         import mujoco
 
         data = mujoco.MjData(scene.model)
@@ -114,15 +116,20 @@ class SimulatedHand:
         data.ctrl[:] = trajectory.positions[0]
         mujoco.mj_forward(scene.model, data)
         first: dict[str, float | None] = {finger.name: None for finger in self.hand.fingers}
+        times: list[float] = []
+        measured: list[FloatArray] = []
         every = round(WATCH_INTERVAL / TIMESTEP)
         for step in range(int(np.ceil((trajectory.duration + SETTLING) / TIMESTEP)) + 1):
             if step % every == 0:
                 self._watch(scene, data, first)
+                times.append(float(data.time))
+                measured.append(np.array(data.qpos[scene.qpos]))
             data.ctrl[:] = trajectory.at(data.time)
             mujoco.mj_step(scene.model, data)
         mujoco.mj_forward(scene.model, data)
         self._watch(scene, data, first)
-        return data, first
+        commanded = np.array([trajectory.at(time) for time in times])
+        return data, first, ExecutionHistory(trajectory.joints, np.array(times), commanded, np.array(measured))
 
     def _watch(self, scene: Scene, data: Any, first: dict[str, float | None]) -> None:
         if self.on_step is not None:

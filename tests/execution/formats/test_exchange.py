@@ -79,6 +79,9 @@ def test_dexgraspbench_as_numpy_says_it(placed: GraspSolution, tmp_path: Path) -
     np.testing.assert_array_equal(data["grasp_qpos"][7:], list(placed.joint_angles.values()))
     assert data["pregrasp_qpos"][8] == 0.1
     np.testing.assert_array_equal(data["squeeze_qpos"], data["grasp_qpos"])
+    export_grasps(file, replace(placed, squeeze={"offsets": {"index_tip": 0.05}}))
+    data = np.load(file, allow_pickle=True).item()
+    np.testing.assert_array_equal(data["squeeze_qpos"] - data["grasp_qpos"], [0.0] * 9 + [0.25 - 0.2])
 
 
 def test_moveit_grasp_has_the_fields_of_the_message(placed: GraspSolution, tmp_path: Path) -> None:

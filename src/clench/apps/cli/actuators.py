@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from clench.models.objects.grasp_object import GraspObject
 
 ActuatorName = Literal["simulated", "ros2", "orca", "orca-mock", "signal"]
-Interface = Literal["auto", "rclpy", "cyclonedds"]
+Interface = Literal["auto", "rclpy", "cyclonedds", "action"]
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,8 @@ def execute(
         strict: exit with 1 unless the solution's status is grasp.
         json: print the report as one JSON document on standard output.
     """
+    from dataclasses import replace
+
     import clench
 
     from .printing import print_report
@@ -79,10 +81,12 @@ def execute(
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
         report = clench.execute(the_solution, moved, speed=speed, force=force)
+    if log is not None and report.history is None:
+        report = replace(report, notes=(*report.notes, "Nothing was measured on the way: no log was written."))
+    elif log is not None:
+        clench.write_log(log, report, the_solution)
     if out is not None:
         report.save(out)
-    if log is not None and report.history is not None:
-        clench.write_log(log, report, the_solution)
     if json:
         print_json(report.to_dict())
     else:

@@ -28,19 +28,20 @@ class RclpyLink:
     name = "rclpy"
 
     def __init__(self, topic: str, state_topic: str, domain: int) -> None:
-        with _clear_import():
+        with clear_import():
             from rclpy.executors import SingleThreadedExecutor
             from sensor_msgs.msg import JointState
             from trajectory_msgs.msg import JointTrajectory
         self._topic = topic
         self._waiting: deque[JointStates] = deque(maxlen=WAITING)
         self._open = ExitStack()
-        self._node = self._open.enter_context(joined(domain))
-        self._publisher = self._node.create_publisher(JointTrajectory, topic, _quality(reliable=True))
+        #: Our node, for those who reach more than the two topics.
+        self.node = self._open.enter_context(joined(domain))
+        self._publisher = self.node.create_publisher(JointTrajectory, topic, _quality(reliable=True))
         # Best effort hears senders of either kind, and the newest state is the only one that counts.
-        self._node.create_subscription(JointState, state_topic, self._heard, _quality(reliable=False))
-        self._executor = SingleThreadedExecutor(context=self._node.context)
-        self._executor.add_node(self._node)
+        self.node.create_subscription(JointState, state_topic, self._heard, _quality(reliable=False))
+        self._executor = SingleThreadedExecutor(context=self.node.context)
+        self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
 
@@ -57,16 +58,7 @@ class RclpyLink:
 
     def publish(self, joints: Sequence[str], times: Sequence[float], positions: Sequence[Sequence[float]]) -> None:
         """Send a trajectory that starts when it arrives."""
-        from builtin_interfaces.msg import Duration
-        from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-        message = JointTrajectory(joint_names=list(joints))
-        for time, values in zip(times, positions, strict=True):
-            second, rest = divmod(round(time * 1e9), 10**9)
-            message.points.append(
-                JointTrajectoryPoint(positions=list(values), time_from_start=Duration(sec=second, nanosec=rest))
-            )
-        self._publisher.publish(message)
+        self._publisher.publish(trajectory_message(joints, times, positions))
 
     def flush(self, timeout: float) -> None:
         """Wait until what was sent has been received, at most so long [s]."""
@@ -79,8 +71,8 @@ class RclpyLink:
         wanted = "trajectory_msgs/msg/JointTrajectory"
         return sorted(
             name
-            for name, types in self._node.get_topic_names_and_types()
-            if wanted in types and name != self._topic and self._node.count_subscribers(name)
+            for name, types in self.node.get_topic_names_and_types()
+            if wanted in types and name != self._topic and self.node.count_subscribers(name)
         )
 
     def close(self) -> None:
@@ -95,6 +87,19 @@ class RclpyLink:
         self._waiting.append(JointStates(positions, stamp.sec * 10**9 + stamp.nanosec))
 
 
+def trajectory_message(joints: Sequence[str], times: Sequence[float], positions: Sequence[Sequence[float]]) -> Any:
+    """Return a trajectory_msgs/JointTrajectory that starts when it arrives."""
+    from builtin_interfaces.msg import Duration
+    from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+    message = JointTrajectory(joint_names=list(joints))
+    for time, values in zip(times, positions, strict=True):
+        second, rest = divmod(round(time * 1e9), 10**9)
+        duration = Duration(sec=second, nanosec=rest)
+        message.points.append(JointTrajectoryPoint(positions=list(values), time_from_start=duration))
+    return message
+
+
 @contextmanager
 def joined(domain: int) -> Iterator[Any]:
     """Give a node of our own in a domain, and end it; signals stay with the program.
@@ -102,7 +107,7 @@ def joined(domain: int) -> Iterator[Any]:
     Raises:
         CommandError: ROS 2 is there but cannot be used, e.g. without a middleware.
     """
-    with _clear_import():
+    with clear_import():
         import rclpy
         from rclpy.signals import SignalHandlerOptions
     context = rclpy.Context()
@@ -116,7 +121,8 @@ def joined(domain: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _clear_import() -> Iterator[None]:
+def clear_import() -> Iterator[None]:
+    """Turn the failure to load what ROS 2 needs into one sentence."""
     try:
         yield
     except (ImportError, OSError, RuntimeError) as error:

@@ -1,6 +1,8 @@
 """ROS 2: a joint_trajectory_controller by its topics, through `rclpy` or, without a ROS installation, `cyclonedds`.
 
 Out: `/<controller>/joint_trajectory` (trajectory_msgs/JointTrajectory), in: `/joint_states` (sensor_msgs/JointState).
+Where a ROS installation has `control_msgs`, the action `/<controller>/follow_joint_trajectory` can take the topic's
+place.
 """
 
 from __future__ import annotations
@@ -35,6 +37,8 @@ class RosInterface(StrEnum):
     """the client library of a ROS installation"""
     CYCLONEDDS = "cyclonedds"
     """DDS alone, without a ROS installation"""
+    ACTION = "action"
+    """the controller's action, through rclpy, with a goal for every command; tells why a controller refuses"""
 
 
 @dataclass(frozen=True)
@@ -219,7 +223,12 @@ def open_link(interface: RosInterface, topic: str, state_topic: str, domain: int
     Raises:
         CommandError: neither rclpy nor cyclonedds is installed, or not the one that was asked for.
     """
-    if installed_interface(interface) is RosInterface.RCLPY:
+    chosen = installed_interface(interface)
+    if chosen is RosInterface.ACTION:
+        from .action_link import ActionLink
+
+        return ActionLink(topic, state_topic, domain)
+    if chosen is RosInterface.RCLPY:
         from .rclpy_link import RclpyLink
 
         return RclpyLink(topic, state_topic, domain)
@@ -234,18 +243,27 @@ def installed_interface(interface: RosInterface) -> RosInterface:
     Raises:
         CommandError: neither is installed, or not the one that was asked for.
     """
-    found = [name for name in (RosInterface.RCLPY, RosInterface.CYCLONEDDS) if importlib.util.find_spec(name)]
+    found = [name for name, module in _MODULES.items() if importlib.util.find_spec(module)]
     if interface is not RosInterface.AUTO and interface not in found:
-        raise CommandError(f"{interface} is not installed; {_ADVICE[interface]}.")
-    if not found:
+        raise CommandError(f"{_MODULES[interface]} is not installed; {_ADVICE[interface]}.")
+    if interface is not RosInterface.AUTO:
+        return interface
+    if not set(found) & {RosInterface.RCLPY, RosInterface.CYCLONEDDS}:
         raise CommandError(f"No ROS 2 found: neither rclpy nor cyclonedds is installed; {_ADVICE[interface]}.")
-    return found[0] if interface is RosInterface.AUTO else interface
+    return RosInterface.RCLPY if RosInterface.RCLPY in found else RosInterface.CYCLONEDDS
 
 
+#: The package that each interface needs.
+_MODULES: Final = {
+    RosInterface.RCLPY: "rclpy",
+    RosInterface.CYCLONEDDS: "cyclonedds",
+    RosInterface.ACTION: "control_msgs",
+}
 _ADVICE: Final = {
     RosInterface.AUTO: "source a ROS installation, or: pip install 'clench[ros2]'",
     RosInterface.RCLPY: "source a ROS installation, or: pip install 'clench[ros2]'",
     RosInterface.CYCLONEDDS: "pip install cyclonedds",
+    RosInterface.ACTION: "source a ROS installation that has it (no package index does)",
 }
 
 

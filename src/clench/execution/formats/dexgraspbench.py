@@ -14,7 +14,7 @@ from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray, Pose
 from clench.solve.solution import GraspSolution
 
-from .grasp_posture import GraspPosture, before_the_grasp
+from .grasp_posture import GraspPosture, before_the_grasp, squeezed
 
 #: What a file of arrays, numbers and names needs; nothing else is looked up, let alone called.
 _ALLOWED: Final = {
@@ -38,8 +38,7 @@ def write_dexgraspbench(path: str | Path, solution: GraspSolution) -> None:
     """
     palm = _pose(solution.hand_pose)
     names = list(solution.joint_angles)
-    squeezed = (solution.squeeze or {}).get("joint_angles") or solution.joint_angles
-    postures = (before_the_grasp(solution), solution.joint_angles, squeezed)
+    postures = (before_the_grasp(solution), solution.joint_angles, squeezed(solution))
     document = {
         "obj_pose": _pose(solution.object_pose),
         "obj_scale": 1.0,

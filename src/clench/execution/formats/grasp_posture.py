@@ -57,3 +57,9 @@ def palm_in_object(solution: GraspSolution) -> Pose:
 def before_the_grasp(solution: GraspSolution) -> Mapping[str, float]:
     """Return the angles of the pregrasp [rad], else of the open hand from which the fingers close."""
     return solution.pregrasp or solution.open_angles
+
+
+def squeezed(solution: GraspSolution) -> Mapping[str, float]:
+    """Return what position servos are told to squeeze [rad]: the grasp and, where planned, the squeeze's offsets."""
+    offsets = (solution.squeeze or {}).get("offsets") or {}
+    return {name: angle + float(offsets.get(name, 0.0)) for name, angle in solution.joint_angles.items()}
