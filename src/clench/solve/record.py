@@ -21,7 +21,7 @@ from .solution import FingerStatus, GraspSolution, SolutionStatus
 #: Marks a SQLite file as a record ("clch").
 APPLICATION_ID = 0x636C6368
 #: Version of the tables below; raised when they change, with a step that carries old files over.
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 _TABLES = """
 CREATE TABLE solves (
@@ -37,6 +37,15 @@ CREATE TABLE solves (
 );
 CREATE INDEX solves_by_names ON solves (hand, object, status);
 CREATE INDEX solves_by_geometry ON solves (geometry_hash, seed);
+"""
+#: What version 2 added: what came of executing a solve.
+_OUTCOMES = """
+CREATE TABLE outcomes (
+    id INTEGER PRIMARY KEY,
+    solve INTEGER NOT NULL REFERENCES solves (id),
+    time TEXT NOT NULL,
+    held INTEGER NOT NULL
+)
 """
 _INSERT = """
 INSERT INTO solves (time, hand, object, status, seed, geometry_hash, touching_fingers, document)
@@ -155,6 +164,23 @@ class Record:
             RecordEntry(**{**dict(zip(_COLUMNS, row, strict=True)), "status": SolutionStatus(row[4])}) for row in rows
         ]
 
+    def note_outcome(self, entry_id: int, *, held: bool) -> None:
+        """Note what came of executing a solve: the object was held, or dropped.
+
+        Raises:
+            UnknownNameError: no such id. FileError: the file cannot be written.
+        """
+        self.read(entry_id)
+        time = datetime.now(UTC).isoformat(timespec="microseconds")
+        with self._clear_errors(), self._transaction() as cursor:
+            cursor.execute("INSERT INTO outcomes (solve, time, held) VALUES (?, ?, ?)", (entry_id, time, int(held)))
+
+    def outcomes(self) -> list[tuple[int, bool]]:
+        """Return what was noted, in order: id of the solve, and whether the object was held."""
+        with self._clear_errors():
+            rows = self._connection.execute("SELECT solve, held FROM outcomes ORDER BY id").fetchall()
+        return [(int(solve), bool(held)) for solve, held in rows]
+
     def __len__(self) -> int:
         with self._clear_errors():
             return int(self._connection.execute("SELECT count(*) FROM solves").fetchone()[0])
@@ -182,7 +208,7 @@ class Record:
             with self._transaction() as cursor:
                 # Another process may have made the tables since; then there is nothing left to do.
                 if cursor.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0:
-                    for statement in filter(str.strip, _TABLES.split(";")):
+                    for statement in filter(str.strip, f"{_TABLES}{_OUTCOMES}".split(";")):
                         cursor.execute(statement)
                     cursor.execute(f"PRAGMA application_id = {APPLICATION_ID}")
                     cursor.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
@@ -192,6 +218,12 @@ class Record:
             raise FileError(self.path, f"a record of version {version}; this program reads up to {SCHEMA_VERSION}.")
         c.execute("PRAGMA journal_mode = WAL")
         c.execute("PRAGMA synchronous = NORMAL")
+        if identity == APPLICATION_ID and version < SCHEMA_VERSION:
+            with self._transaction() as cursor:
+                # Another process may have carried the file over since.
+                if cursor.execute("PRAGMA user_version").fetchone()[0] < SCHEMA_VERSION:
+                    cursor.execute(_OUTCOMES)
+                    cursor.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Cursor]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from clench.base.errors import CommandError, FileError
 
+from .calibrating import calibrate
 from .exchange import export, import_
 from .execute import execute
 
@@ -184,6 +185,7 @@ def record(
     /,
     *,
     id: int | None = None,
+    outcome: Literal["held", "dropped"] | None = None,
     hand: str | None = None,
     object: str | None = None,
     status: Status | None = None,
@@ -195,6 +197,7 @@ def record(
     Args:
         path: the record (SQLite file).
         id: show the solution with this number.
+        outcome: note what came of executing it, for `clench calibrate`.
         hand: only solves of this hand.
         object: only solves of this object.
         status: only solves that ended so.
@@ -210,7 +213,11 @@ def record(
 
     if not path.is_file():
         raise FileError(path, "no such record.")
+    if outcome is not None and id is None:
+        raise CommandError("record: --outcome belongs to a solve; give its --id.")
     with clench.Record(path) as recorded:
+        if id is not None and outcome is not None:
+            recorded.note_outcome(id, held=outcome == "held")
         if id is not None:
             solution = recorded.read(id)
             if json:
@@ -245,6 +252,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "export": export,
     "import": import_,
     "record": record,
+    "calibrate": calibrate,
     "bench": bench,
 }
 

@@ -179,6 +179,17 @@ def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
     console.print(table)
 
 
+def print_weights(weights: Mapping[str, float], sentence: str) -> None:
+    """Print fitted weights, and a sentence about them."""
+    console = _console()
+    if weights:
+        table = _table("fitted weights", "criterion", "weight")
+        for name, weight in weights.items():
+            table.add_row(_plain(name), f"{weight:.4g}")
+        console.print(table)
+    console.print(_plain(sentence))
+
+
 def print_files(files: Sequence[Path]) -> None:
     """Print where the files are."""
     console = _console()
