@@ -15,7 +15,9 @@ from clench.grasp import criterion_registry
 from clench.grasp.calibration import preset_names
 from clench.grasp.criterion_registry import criterion_names, find_criterion
 from clench.models.command_file import KEYS, command_from_dict
+from clench.models.hand.findings import FindingCode
 from clench.models.hand.hand_file import read_hand_file
+from clench.solve.causes import CauseCode
 from handmade import make_solution
 
 ROOT = Path(__file__).parents[1]
@@ -80,6 +82,34 @@ def test_every_key_of_a_solution_is_documented() -> None:
     documented = set(re.findall(r"`(\w+)", page("solution-format.md")))
     for keys in (document, finger, finger["candidates"][0], contact):
         assert set(keys) <= documented
+
+
+def test_every_finding_about_a_hand_is_documented() -> None:
+    assert {code.value for code in FindingCode} == set(re.findall(r"^\| `(\w+)` \|", page("own-hand.md"), re.MULTILINE))
+
+
+def test_every_cause_of_a_finger_that_does_not_touch_is_documented() -> None:
+    assert {code.value for code in CauseCode} <= set(
+        re.findall(r"^\| `(\w+)` \|", page("solution-format.md"), re.MULTILINE)
+    )
+
+
+def test_the_own_hand_page_leads_to_a_grasp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the page shows: a model, its findings, a hand file, a solve."""
+    text = page("own-hand.md")
+    (model,) = re.findall(r"```xml\n(.*?)```", text, re.DOTALL)
+    (hand_file,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "pincer.urdf").write_text(model)
+    monkeypatch.chdir(tmp_path)
+    for finding in clench.check_hand(clench.Hand.load("pincer.urdf")):
+        assert f"({finding.code}): {finding.text}" in " ".join(text.split())
+    (tmp_path / "pincer.hand.toml").write_text(hand_file)
+    assert [f.code for f in clench.check_hand(clench.Hand.load("pincer.urdf"))] == ["collision_from_visuals"]
+    names: dict[str, Any] = {}
+    exec(compile(code, "own-hand.md", "exec"), names)
+    assert names["solution"].status == "grasp"
+    assert names["solution"].certified
 
 
 def test_every_criterion_and_preset_is_documented() -> None:

@@ -127,6 +127,21 @@ def test_another_finger_in_the_way_shadows():
     assert cause(solution, "other")["joints"] == {"other_0": 0.0}
 
 
+def test_a_link_that_touches_before_the_tip_shadows_it():
+    center = np.array([0.03, 0.0, 0.02])
+    hand = three_links(upper=1.5)
+    solution = solved(hand, ball(center), order=clench.ClosingOrder.FINGERTIP)
+    found = cause(solution)
+    assert solution.fingers["index"].status == "missed"
+    assert (found["code"], found["link"], found["other"]) == ("shadowed", "index_link_0", "sphere:r=0.01")
+    assert found["nearest_link"] == "index_link_2"
+    q = np.array([solution.joint_angles[j.name] for j in hand.joints])
+    T = hand.link_poses(q)[3]
+    a, b = T[:3, 3], T[:3, 3] + 0.025 * T[:3, 0]
+    t = np.clip((center - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+    assert found["distance"] == pytest.approx(np.linalg.norm(a + t * (b - a) - center) - RADIUS - 0.01, abs=1e-12)
+
+
 def test_what_is_out_of_reach_stays_so_whatever_the_finger_meets():
     found = cause(solved(three_links(), ball([1.0, 0, 0])))
     assert (found["code"], found["other"]) == ("reach", "index_link_0")

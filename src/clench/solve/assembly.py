@@ -134,7 +134,7 @@ def _finger(answer: Answer, k: int, problem: Problem, placed: _Places) -> Finger
     candidates = tuple(_candidate(c, problem, placed) for c in answer.fingers[k])
     best = candidates[answer.chosen[k]]
     name = answer.fingers[k][0].plan.finger.name
-    cause = finger_cause(answer.best[k], problem)
+    cause = finger_cause(answer.best[k], best.status, problem)
     return FingerResult(name, best.status, best.reason, answer.chosen[k], candidates, cause)
 
 

@@ -11,6 +11,8 @@ from clench.grasp.reach import beside, beyond_reach, graspable_body, nearest_lin
 from clench.grasp.surface import nearest_body
 from clench.models.hand.hand import Hand
 
+from .solution import FingerStatus
+
 if TYPE_CHECKING:
     from clench.base.pose import FloatArray
     from clench.kernels.bodies import BodyArrays
@@ -39,25 +41,33 @@ class CauseCode(StrEnum):
     SELF_COLLISION = "self_collision"
     """a link meets the palm, a fixed link, or another link of the same finger"""
     SHADOWED = "shadowed"
-    """a link meets a link of another finger on the way"""
+    """a link meets another finger on the way, or, where only fingertips count, touches before the tip does"""
     OBSTACLE = "obstacle"
     """a link meets an obstacle on the way"""
     CARRIED_OFF = "carried_off"
     """the finger touched on its way, and a later joint carried it off again"""
 
 
-def finger_cause(c: FingerCandidate, problem: Problem) -> dict[str, Any] | None:
-    """Return why a finger's chosen set does not touch the object, as plain values; None when it touches."""
-    if c.overlap is not None:
-        return _blocked(c, problem)
-    if c.holding:
+def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> dict[str, Any] | None:
+    """Return why a finger's chosen set does not touch the object, as plain values; None when it touches.
+
+    Args:
+        c: the set. status: how it ended. problem: what was solved.
+    """
+    if status is FingerStatus.TOUCH:
         return None
-    if max(c.plan.lengths, default=0.0) <= 0.0:
+    if status is FingerStatus.BLOCKED:
+        return _blocked(c, problem)
+    if status is FingerStatus.NO_MOTION:
         return _no_motion(c, problem)
-    gap, link = nearest_link(problem.hand, c.q, c.plan.finger.links, problem.source, *_target(problem))
+    missed = status is FingerStatus.MISSED
+    counting = (c.plan.finger.tip_link,) if missed else c.plan.finger.links
+    gap, link = nearest_link(problem.hand, c.q, counting, problem.source, *_target(problem))
     near: dict[str, Any] = {"distance": None, "nearest_link": None}
     if link >= 0:
         near = {"distance": gap, "nearest_link": problem.hand.links[link].name}
+    if missed:
+        return {**_missed(c, c.touches[0], problem), **near}
     stopped = [t for t in c.touches if not t.passed]
     met = _stopped(c, stopped[0], problem) if stopped else {}
     beyond = _out_of_reach(c, problem)
@@ -121,6 +131,23 @@ def _stopped(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
         "other_finger": owner,
         "joint": joint,
         "angle": angle,
+    }
+
+
+def _missed(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
+    """Name the link that touched before the tip did: the object, or what else is in the way."""
+    if not t.graspable:
+        return _stopped(c, t, problem)
+    hand, tip = problem.hand, problem.hand.links[c.plan.finger.tip_link].name
+    link, joint = hand.links[t.link].name, hand.joints[t.joint].name
+    return {
+        "code": CauseCode.SHADOWED.value,
+        "text": f"{link} touches before the tip {tip} does: curl the finger less near the palm, or move the hand back.",
+        "link": link,
+        "other": problem.packed.body_names[t.body],
+        "other_finger": None,
+        "joint": joint,
+        "angle": float(c.q[t.joint]),
     }
 
 
