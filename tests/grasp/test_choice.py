@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from candidate_cases import HAND, candidate, touch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.grasp import criterion_registry
@@ -83,6 +83,7 @@ angles = st.integers(0, 150).map(lambda hundredths: hundredths / 100)
 travels = st.lists(st.tuples(angles, angles), min_size=1, max_size=8, unique=True)
 
 
+@settings(deadline=None)
 @given(travels, st.floats(0.0, 5.0), st.floats(0.0, 5.0))
 def test_more_weight_never_worsens_what_it_is_given_to(pairs, less, more):
     """With w larger, the chosen set has no larger range of motion: the sum is linear in the weight."""
@@ -96,6 +97,7 @@ def test_more_weight_never_worsens_what_it_is_given_to(pairs, less, more):
     assert motion(more) <= motion(less) + 1e-9
 
 
+@settings(deadline=None)
 @given(st.lists(travels, min_size=1, max_size=3))
 def test_additive_criteria_choose_as_exhaustive_search_does(groups):
     calibration = Calibration(weights={"range_of_motion": 0.7, "limit_distance": 2.0})

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from candidate_cases import HAND, candidate, touch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -23,6 +23,7 @@ def explained(groups, calibration=CALIBRATION):
     return explain_choice(choose(groups, calibration, SETTING), groups)
 
 
+@settings(deadline=None)
 @given(arrays(float, st.tuples(st.integers(1, 9), st.integers(1, 3)), elements=st.integers(0, 3).map(float)))
 def test_the_front_is_what_nothing_beats(rows):
     def beaten(i):

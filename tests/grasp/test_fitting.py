@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.base.errors import CommandError
@@ -20,6 +20,7 @@ def examples(better=(), worse=(), outcomes=(), held=(), names=("a",)):
     )
 
 
+@settings(deadline=None)  # loading SciPy takes a second
 @given(st.integers(1, 30), st.integers(1, 30))
 def test_one_criterion_gives_the_logarithm_of_the_odds(wins, losses):
     """With differences of one, the likeliest weight is ln(wins / losses), 0 when that is negative."""
