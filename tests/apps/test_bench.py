@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import clench
-from clench.apps.bench import solving
+from clench.apps.bench import choosing, solving
 from clench.apps.bench.checking import Checked, Surface, check_answer, triangle_distances
 from clench.apps.bench.main import BENCHMARKS, main
 from clench.apps.bench.report import BenchReport, describe_place
 from clench.base.errors import CommandError, UnknownNameError
+from clench.solve.controller import finger_sets, make_problem, make_setting
 from clench.solve.solution import GraspSolution
 from handmade import make_solution
 
@@ -164,3 +165,39 @@ def test_help_lists_the_benchmarks(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(f"\n  {name} " in out for name in BENCHMARKS)
     assert main(["solve", "--help"]) == 0
     assert "--passes" in capsys.readouterr().out
+
+
+def test_choose_is_checked_and_timed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["choose", "--poses", "2", "--passes", "1", "--alternatives", "3"]) == 0
+    lines = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines())
+    assert lines["answers_right"] == "True"
+    assert lines["alternatives"] == "3"
+    assert float(lines["choose_additive_median_ms"]) > 0.0
+    assert float(lines["choose_steady_median_ms"]) > 0.0
+    assert float(lines["combinations_tried_additive_median"]) == 0.0
+
+
+def test_a_wrong_choice_is_not_timed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(choosing, "_wrong", lambda *_: ["steady: chose 1, the best is 2."])
+    assert main(["choose", "--poses", "1", "--passes", "1", "--alternatives", "2"]) == 1
+    printed = capsys.readouterr()
+    assert "choose_steady_median_ms" not in printed.out
+    assert "pose 0: steady: chose 1" in printed.err
+
+
+def test_the_check_of_choices_sees_one_that_is_not_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    hand, obj = clench.Hand.load("patent15"), clench.GraspObject.load("mug")
+    pose = clench.approach_poses(hand, obj, 1, 0)[0]
+    command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1))
+    problem = make_problem(hand, obj, command)
+    groups = [[c for c in g if c.plane is None] for g in finger_sets(problem)]
+    setting = make_setting(problem, choosing.ADDITIVE)
+    assert choosing._wrong(groups, setting) == []
+    real = choosing.choose
+
+    def worst(given: Any, calibration: Any, setting: Any) -> Any:
+        choice = real(given, calibration, setting)
+        return replace(choice, total=choice.total - 1.0) if len(given[0]) > 1 else choice
+
+    monkeypatch.setattr(choosing, "choose", worst)
+    assert len(choosing._wrong(groups, setting)) == 2

@@ -16,7 +16,7 @@ from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, combined_posture, read_candidates
 from clench.grasp.choice import choose
-from clench.grasp.closing import HandPlan, close_hand, make_hand_plan
+from clench.grasp.closing import ClosedHand, HandPlan, close_hand, make_hand_plan
 from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import score_hand, score_sets
 from clench.grasp.depths import hand_depths
@@ -68,6 +68,11 @@ class Problem:
     packed: PackedObject
 
     @property
+    def rounds(self) -> int:
+        """How often all degrees of freedom are gone through."""
+        return self.command.rounds or UNTIL_REST
+
+    @property
     def T_palm_object(self) -> FloatArray:
         """Where the object is for the hand, shape (4, 4)."""
         return invert(self.T_world_palm.matrix) @ self.T_world_object.matrix
@@ -89,18 +94,7 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     calibration = calibration_of(command.criteria)
     setting = make_setting(problem, calibration)
     clock.lap("read")
-    plan, exact = _planned(problem)
-    clock.lap("plan")
-    rounds = command.rounds or UNTIL_REST
-    closed = close_hand(plan, exact, problem.packed, problem.T_palm_object, rounds)
-    clock.lap("close")
-    overlaps = start_overlaps(
-        hand, plan, exact.link_pose, closed, problem.packed, problem.T_palm_object, problem.source
-    )
-    candidates = read_candidates(hand, plan, problem.packed, closed, overlaps)
-    judged = judge_sets(hand, candidates, problem.packed, problem.T_palm_object, problem.source, command.check_sets)
-    clock.lap("sets")
-    fingers = group_by_finger(plan, judged)
+    plan, exact, closed, fingers = _close_fingers(problem, clock)
     choice = choose(fingers, calibration, setting)
     chosen, explained = choice.chosen, explain_choice(choice, fingers)
     clock.lap("choose")
@@ -109,7 +103,9 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     if plan.together:
         again = close_together(hand, plan, exact, closed, problem.packed, best, bodies)
     else:
-        again = close_in_sequence(hand, plan, exact, closed, problem.packed, best, problem.start, rounds, bodies)
+        again = close_in_sequence(
+            hand, plan, exact, closed, problem.packed, best, problem.start, problem.rounds, bodies
+        )
     for k, (old, new) in enumerate(zip(best, again, strict=True)):
         if new is not old:
             best[k] = fingers[k][chosen[k]] = replace(new, clear=old.clear)
@@ -123,6 +119,27 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     if record is not None:
         record.append(solution)
     return solution
+
+
+def finger_sets(problem: Problem) -> list[list[FingerCandidate]]:
+    """Return the sets of every finger that the choice is made of."""
+    return _close_fingers(problem, _Clock())[3]
+
+
+def _close_fingers(
+    problem: Problem, clock: _Clock
+) -> tuple[HandPlan, ExactArrays, ClosedHand, list[list[FingerCandidate]]]:
+    """Close every alternative of every finger, and judge what it passes through."""
+    hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
+    plan, exact = _planned(problem)
+    clock.lap("plan")
+    closed = close_hand(plan, exact, packed, T, problem.rounds)
+    clock.lap("close")
+    overlaps = start_overlaps(hand, plan, exact.link_pose, closed, packed, T, problem.source)
+    candidates = read_candidates(hand, plan, packed, closed, overlaps)
+    judged = judge_sets(hand, candidates, packed, T, problem.source, problem.command.check_sets)
+    clock.lap("sets")
+    return plan, exact, closed, group_by_finger(plan, judged)
 
 
 def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:

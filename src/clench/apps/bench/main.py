@@ -67,7 +67,36 @@ def solve(
     return _print(bench_solve(hand, object, scale, planes, poses, passes, seed), json)
 
 
-BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve}
+def choose(
+    *,
+    hand: str = "patent15",
+    object: str = "mug",
+    alternatives: int = 8,
+    poses: int = 20,
+    passes: int = 3,
+    seed: int = 0,
+    json: bool = False,
+) -> int:
+    """Time the choice over all fingers, with criteria that add up and with steadiness.
+
+    Args:
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
+        alternatives: sets per finger.
+        poses: how many approach poses are chosen for.
+        passes: how often each is timed.
+        seed: of the approach poses.
+        json: print one JSON document on standard output.
+    """
+    from .choosing import bench_choice
+
+    for key, count in (("alternatives", alternatives), ("poses", poses), ("passes", passes)):
+        if count < 1:
+            raise CommandError(f"--{key}: expected at least 1, got {count}.")
+    return _print(bench_choice(hand, object, alternatives, poses, passes, seed), json)
+
+
+BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose}
 
 
 def _print(report: BenchReport, json: bool) -> int:
