@@ -37,7 +37,7 @@ def bench_choice(
     """Check choices against trying everything, then time them.
 
     Args:
-        hand_model, object_model: what is loaded. alternatives: sets per finger, the full width from as many open values.
+        hand_model, object_model: what is loaded. alternatives: sets per finger, each from an open value of its own.
         count: number of poses. passes: how often each is timed. seed: of the poses.
     """
     hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)
