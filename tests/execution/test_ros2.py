@@ -51,7 +51,10 @@ def installed(interface: str) -> bool:
 NEEDS = {
     "cyclonedds": pytest.mark.skipif(not installed("cyclonedds"), reason="needs cyclonedds"),
     "rclpy": pytest.mark.skipif(not installed("rclpy"), reason="needs rclpy (Linux, x86-64)"),
+    "action": pytest.mark.skipif(not installed("control_msgs"), reason="needs a ROS installation with control_msgs"),
 }
+#: What reports call the interfaces.
+SPOKEN = {"cyclonedds": "cyclonedds", "rclpy": "rclpy", "action": "rclpy, action"}
 #: The real client library in everyday tests, the other one with -m long.
 RCLPY_FIRST = [
     pytest.param("rclpy", marks=NEEDS["rclpy"]),
@@ -151,6 +154,7 @@ def targets(solution: GraspSolution) -> np.ndarray:
         pytest.param("rclpy", "cyclonedds", marks=[NEEDS["cyclonedds"], NEEDS["rclpy"]]),
         pytest.param("cyclonedds", "cyclonedds", marks=[NEEDS["cyclonedds"], pytest.mark.long]),
         pytest.param("rclpy", "rclpy", marks=[NEEDS["rclpy"], pytest.mark.long]),
+        pytest.param("action", "action", marks=[NEEDS["action"], pytest.mark.long]),
     ],
 )
 def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str, theirs: str) -> None:
@@ -158,7 +162,7 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
     report = world.report(world.drive(ours, 0.5))
     log = world.log(node)
     assert report["success"], report["reason"]
-    assert report["actuator"] == f"ros2 ({ours})"
+    assert report["actuator"] == f"ros2 ({SPOKEN[ours]})"
     assert log["refused"] == []
     assert log["accepted"] > 5
     samples = np.array(log["samples"])
@@ -233,6 +237,15 @@ def test_a_controller_of_other_joints_never_moves(world: World) -> None:
     assert log["accepted"] == 0
     assert log["refused"]
     assert np.ptp(np.array(log["samples"])[:, 1:]) == pytest.approx(0.05)
+
+
+@NEEDS["action"]
+@pytest.mark.long
+def test_an_action_of_other_joints_refuses(world: World) -> None:
+    node = world.node("action", "--start", "0.05,0.0,0.0", joints="thumb,index,toe")
+    report = world.report(world.drive("action", 1.0))
+    assert "refused the goal; does it have exactly these joints?" in report["reason"]
+    assert world.log(node)["accepted"] == 0
 
 
 @pytest.mark.parametrize("ours", CYCLONE_FIRST)

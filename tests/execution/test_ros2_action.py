@@ -148,6 +148,22 @@ def test_a_goal_that_is_given_up_is_told(client: type[Client], error: str, told:
         link.states()
 
 
+def test_what_becomes_of_a_replaced_goal_does_not_matter(client: type[Client]) -> None:
+    link = ActionLink("/hand/joint_trajectory", "/joint_states", 0)
+    ended = []
+    slow = SimpleNamespace(add_done_callback=ended.append)
+    handle = SimpleNamespace(accepted=True, get_result_async=lambda: slow)
+    client.made[0].send_goal_async = lambda goal: Now(handle)  # type: ignore[method-assign]
+    send(link)
+    send(link)
+    aborted = Now(SimpleNamespace(status=ABORTED, result=SimpleNamespace(error_code=-1, error_string="replaced")))
+    ended[0](aborted)
+    assert link.states() == []
+    ended[1](aborted)
+    with pytest.raises(DriverError, match="gave up: replaced"):
+        link.states()
+
+
 def test_it_is_only_used_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ros2.importlib.util, "find_spec", lambda _: True)
     assert installed_interface(RosInterface.AUTO) is RosInterface.RCLPY

@@ -107,9 +107,59 @@ class Rclpy:
         self.node.destroy_node()
 
 
+class Action(Rclpy):
+    """The same by the action: a new goal takes the place of the one before, which ends as aborted."""
+
+    def __init__(self, domain: int, topic: str, states: str) -> None:
+        super().__init__(domain, topic + "_unused", states)
+        from control_msgs.action import FollowJointTrajectory
+        from rclpy.action import ActionServer, GoalResponse
+
+        self.kind = FollowJointTrajectory
+        self.answers = GoalResponse
+        self.goals: list[object] = []
+        self.joints: Joints | None = None
+        self.server = ActionServer(
+            self.node,
+            FollowJointTrajectory,
+            topic.replace("joint_trajectory", "follow_joint_trajectory"),
+            execute_callback=self.end,
+            goal_callback=self.judge,
+            handle_accepted_callback=self.start,
+        )
+
+    def spin(self, joints: Joints) -> None:
+        self.joints = joints
+        super().spin(joints)
+        if self.goals and time.monotonic() > joints.times[-1]:
+            self.goals.pop().execute()
+
+    def judge(self, goal: object) -> object:
+        before = self.joints.accepted
+        times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in goal.trajectory.points]
+        self.joints.take(list(goal.trajectory.joint_names), times, [list(p.positions) for p in goal.trajectory.points])
+        return self.answers.ACCEPT if self.joints.accepted > before else self.answers.REJECT
+
+    def start(self, goal: object) -> None:
+        while self.goals:
+            self.goals.pop(0).execute()
+        self.goals.append(goal)
+
+    def end(self, goal: object) -> object:
+        if self.goals:
+            goal.abort()
+        else:
+            goal.succeed()
+        return self.kind.Result()
+
+    def cut(self) -> None:
+        self.server.destroy()
+        super().cut()
+
+
 def main() -> None:
     p = argparse.ArgumentParser()
-    p.add_argument("--interface", choices=["cyclonedds", "rclpy"])
+    p.add_argument("--interface", choices=["cyclonedds", "rclpy", "action"])
     p.add_argument("--domain", type=int)
     p.add_argument("--topic")
     p.add_argument("--states")
@@ -123,7 +173,7 @@ def main() -> None:
     p.add_argument("--lifetime", type=float, default=40.0)
     a = p.parse_args()
     joints = Joints(a.joints.split(","), [float(x) for x in a.start.split(",")])
-    dds = {"cyclonedds": Cyclone, "rclpy": Rclpy}[a.interface](a.domain, a.topic, a.states)
+    dds = {"cyclonedds": Cyclone, "rclpy": Rclpy, "action": Action}[a.interface](a.domain, a.topic, a.states)
     begun, moving, cut, samples = time.monotonic(), None, None, []
     ended: list[int] = []
     signal.signal(signal.SIGTERM, lambda *_: ended.append(1))

@@ -73,6 +73,15 @@ class JointMap:
             raise FileError(path, f"not TOML ({error}).") from None
         return joint_map_from_dict(data, str(path))
 
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], source: str = "joint map") -> JointMap:
+        """Read the form of a joint map; `source` names it in messages.
+
+        Raises:
+            FileError: unknown, missing or malformed key.
+        """
+        return joint_map_from_dict(data, source)
+
     def of(self, hand: Hand) -> dict[str, MappedJoint]:
         """Return how every joint of the hand that a controller may move is said, by the model's names.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final
 
 from clench.execution.driver import DriverError
@@ -16,7 +17,7 @@ from clench.execution.driver import DriverError
 from .rclpy_link import RclpyLink, clear_import, trajectory_message
 from .ros2 import LOOK, JointStates
 
-#: action_msgs/GoalStatus: the controller gave the goal up. One that is replaced is canceled instead.
+#: action_msgs/GoalStatus: the controller gave the goal up.
 ABORTED: Final = 6
 
 
@@ -38,6 +39,7 @@ class ActionLink:
         self._link = RclpyLink(topic, state_topic, domain)
         self._client = ActionClient(self._link.node, FollowJointTrajectory, self._action)
         self._pending = 0
+        self._sent = 0
         self._trouble: str | None = None
 
     def listeners(self) -> int:
@@ -59,7 +61,8 @@ class ActionLink:
         """Send a goal that starts when it arrives, in place of the one before."""
         goal = self._goal(trajectory=trajectory_message(joints, times, positions))
         self._pending += 1
-        self._client.send_goal_async(goal).add_done_callback(self._answered)
+        self._sent += 1
+        self._client.send_goal_async(goal).add_done_callback(partial(self._answered, self._sent))
 
     def flush(self, timeout: float) -> None:
         """Wait until every goal was answered, at most so long [s]."""
@@ -76,16 +79,17 @@ class ActionLink:
         self._client.destroy()
         self._link.close()
 
-    def _answered(self, future: Any) -> None:
+    def _answered(self, number: int, future: Any) -> None:
         self._pending -= 1
         handle = future.result()
         if handle.accepted:
-            handle.get_result_async().add_done_callback(self._ended)
+            handle.get_result_async().add_done_callback(partial(self._ended, number))
         else:
             self._trouble = f"'{self._action}' refused the goal; does it have exactly these joints?"
 
-    def _ended(self, future: Any) -> None:
+    def _ended(self, number: int, future: Any) -> None:
         answer = future.result()
-        if answer.status == ABORTED:
+        # A goal that another one replaced ends in whatever way the controller calls that.
+        if answer.status == ABORTED and number == self._sent:
             why = answer.result.error_string or f"error code {answer.result.error_code}"
             self._trouble = f"'{self._action}' gave up: {why}."
