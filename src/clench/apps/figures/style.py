@@ -53,7 +53,7 @@ def save_figure(figure: Figure, path: Path) -> Path:
         FileError: the file cannot be written.
     """
     try:
-        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 1})
+        figure.savefig(path, dpi=DPI, format="png", pil_kwargs={"compress_level": 1})
     except OSError as error:
         raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
     return path

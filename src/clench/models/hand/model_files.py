@@ -14,6 +14,24 @@ from .named import find_named, how_to_get_more, known_names
 
 _BUILTIN = Path(__file__).parent / "builtin"
 _SUFFIXES = (".urdf", ".xml", ".mjcf")
+#: Attributes of MJCF that hold numbers which decide where things are.
+_NUMBERS = frozenset(
+    (
+        "pos",
+        "quat",
+        "euler",
+        "axisangle",
+        "xyaxes",
+        "zaxis",
+        "axis",
+        "range",
+        "size",
+        "fromto",
+        "ref",
+        "scale",
+        "polycoef",
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -56,6 +74,8 @@ def find_model(model: str | Path) -> tuple[Path, bool]:
         HandError: a name whose files cannot be had, see `find_named`.
     """
     path = Path(model)
+    if not str(model).strip():
+        raise UnknownNameError("hand", str(model), "the built-in hands", builtin_names())
     if path.is_file():
         if path.suffix.lower() not in _SUFFIXES:
             raise FileError(model, f"expected a hand model ({', '.join(_SUFFIXES)}), got a '{path.suffix}' file.")
@@ -122,6 +142,7 @@ def _parse(path: Path) -> ET.Element:
 def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:
     """Expand includes and rename every file of an MJCF tree to a key of the returned assets."""
     _expand_includes(root, path, depth=0)
+    _refuse_nan(root, path)
     _name_bodies(root)
     folders = _asset_folders(root)
     store = MeshStore(path)
@@ -139,6 +160,15 @@ def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:
         element.set("file", key)
         element.attrib.pop("content_type", None)
     return store.assets
+
+
+def _refuse_nan(root: ET.Element, path: Path) -> None:
+    """Refuse numbers that are none, which MuJoCo would take."""
+    for element in root.iter():
+        for key, text in element.attrib.items():
+            if key in _NUMBERS and any(word.lower().lstrip("+-") == "nan" for word in text.split()):
+                name = element.get("name", "")
+                raise FileError(path, f"<{element.tag}> '{name}': {key} '{text}'; expected finite numbers.")
 
 
 def _name_bodies(root: ET.Element) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from clench.base.errors import FileError
 
 from .mesh_files import MeshStore
+from .urdf_checks import check_urdf
 
 #: Keep every link and visual, accept the inertias that CAD exports leave.
 _COMPILER = {
@@ -23,16 +24,13 @@ _COMPILER = {
 }
 
 
-_JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-
-
 def prepare_urdf(root: ET.Element, path: Path) -> dict[str, bytes]:
     """Change a URDF tree in place so that MuJoCo reads it with the returned assets.
 
     Raises:
-        FileError: xacro left in it, a file missing, a joint of unknown type or without parent or child.
+        FileError: see `check_urdf`; or a file is missing.
     """
-    _check(root, path)
+    check_urdf(root, path)
     for link in root.iter("link"):
         for extra in link.findall("inertial")[1:]:
             link.remove(extra)
@@ -97,39 +95,6 @@ def _limit(joint: ET.Element, limit: ET.Element, key: str, path: Path) -> float:
     if not math.isfinite(value):
         raise FileError(path, f"joint '{joint.get('name')}': {key} limit '{text}'; expected a finite number [rad].")
     return value
-
-
-def _check_axis(joint: ET.Element, path: Path) -> None:
-    axis = joint.find("axis")
-    text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
-    try:
-        numbers = [float(x) for x in text.split()]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)) or not any(numbers):
-        name = joint.get("name")
-        raise FileError(path, f"joint '{name}': axis '{text}'; expected a direction, three numbers that are not all 0.")
-
-
-def _check(root: ET.Element, path: Path) -> None:
-    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
-        raise FileError(path, "is a xacro template; expected plain URDF (expand it with the xacro program first).")
-    names = {link.get("name") for link in root.findall("link")}
-    if not names:
-        raise FileError(path, "has no <link>; expected a URDF hand.")
-    for joint in root.findall("joint"):
-        for end in ("parent", "child"):
-            element = joint.find(end)
-            link = None if element is None else element.get("link")
-            if link not in names:
-                known = ", ".join(sorted(str(n) for n in names))
-                what = f"no {end} link" if link is None else f"the {end} link '{link}', which does not exist"
-                raise FileError(path, f"joint '{joint.get('name')}' names {what}. Links: {known}.")
-        if joint.get("type") not in _JOINT_TYPES:
-            expected = ", ".join(_JOINT_TYPES)
-            raise FileError(path, f"joint '{joint.get('name')}' has type '{joint.get('type')}'; expected {expected}.")
-        if joint.get("type") != "fixed":
-            _check_axis(joint, path)
 
 
 def _places(named: str, path: Path) -> list[Path]:
