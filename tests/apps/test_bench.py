@@ -201,3 +201,26 @@ def test_the_check_of_choices_sees_one_that_is_not_the_best(monkeypatch: pytest.
 
     monkeypatch.setattr(choosing, "choose", worst)
     assert len(choosing._wrong(groups, setting)) == 2
+
+
+def test_steadiness_checks_times_and_draws(capsys: pytest.CaptureFixture[str], tmp_path) -> None:
+    picture = tmp_path / "bound.png"
+    small = ["steadiness", "--contacts", "5", "--grasps", "6", "--passes", "1", "--plot", str(picture), "--json"]
+    assert main(small) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["errors"] == []
+    assert document["force_closure"] > 0
+    assert 0.0 < document["bound_of_exact_median"] <= 1.0
+    for part in ("epsilon", "bound", "volume", "least_torque", "squeeze"):
+        assert 0.0 < document[f"{part}_median_ms"] <= document[f"{part}_max_ms"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_steadiness_refuses_to_time_wrong_bounds(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from clench.apps.bench import steadiness
+
+    monkeypatch.setattr(steadiness, "epsilon_bound", lambda held: 2.0)
+    assert main(["steadiness", "--contacts", "4", "--grasps", "1", "--passes", "1"]) == 1
+    captured = capsys.readouterr()
+    assert "the lower bound 2.000000000 is above epsilon" in captured.err
+    assert "epsilon_median_ms" not in captured.out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from clench.apps.cli.parsing import parse_call
 from clench.apps.cli.results import print_json
@@ -28,7 +29,7 @@ def main(argv: Sequence[str]) -> int:
     """
     name, *rest = list(argv) or ["--help"]
     if name in ("-h", "--help"):
-        lines = [f"  {n:<8}{(b.__doc__ or '').splitlines()[0]}" for n, b in BENCHMARKS.items()]
+        lines = [f"  {n:<12}{(b.__doc__ or '').splitlines()[0]}" for n, b in BENCHMARKS.items()]
         sys.stdout.write("usage: clench bench NAME ...\n\nbenchmarks:\n" + "\n".join(lines) + "\n")
         return 0
     if name not in BENCHMARKS:
@@ -96,7 +97,34 @@ def choose(
     return _print(bench_choice(hand, object, alternatives, poses, passes, seed), json)
 
 
-BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose}
+def steadiness(
+    *,
+    contacts: int = 12,
+    grasps: int = 40,
+    passes: int = 3,
+    seed: int = 0,
+    plot: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Time epsilon, its fast lower bound and volume of random grasps, and the forces of a hand on a sphere.
+
+    Args:
+        contacts: of every grasp.
+        grasps: how many.
+        passes: how often each is timed.
+        seed: of the grasps.
+        plot: file (PNG) for a picture of the lower bound against the exact value, for 3 contacts and more.
+        json: print one JSON document on standard output.
+    """
+    from .steadiness import bench_steadiness
+
+    for key, count, least in (("contacts", contacts, 2), ("grasps", grasps, 1), ("passes", passes, 1)):
+        if count < least:
+            raise CommandError(f"--{key}: expected at least {least}, got {count}.")
+    return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
+
+
+BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose, "steadiness": steadiness}
 
 
 def _print(report: BenchReport, json: bool) -> int:

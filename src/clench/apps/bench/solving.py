@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.solution import GraspSolution
 
 from .checking import Checked, Surface, check_answer
-from .report import BenchReport, describe_place
+from .report import BenchReport, describe_place, timed
 
 #: Wrong answers told before the rest is only counted.
 _TOLD = 5
@@ -43,11 +42,11 @@ def bench_solve(
         the report; with errors, and without times of solves, when an answer is wrong.
     """
     report = BenchReport(values={"benchmark": "solve", **describe_place()})
-    hand, load_hand = _timed(lambda: clench.Hand.load(hand_model))
-    obj, load_object = _timed(lambda: clench.GraspObject.load(object_model, scale=scale))
-    poses, approach = _timed(lambda: clench.approach_poses(hand, obj, count, seed))
+    hand, load_hand = timed(lambda: clench.Hand.load(hand_model))
+    obj, load_object = timed(lambda: clench.GraspObject.load(object_model, scale=scale))
+    poses, approach = timed(lambda: clench.approach_poses(hand, obj, count, seed))
     commands = [GraspCommand(hand_pose=pose, planes=planes, seed=seed) for pose in poses]
-    _, first = _timed(lambda: clench.solve(hand, obj, commands[0]))
+    _, first = timed(lambda: clench.solve(hand, obj, commands[0]))
     _describe_problem(report, hand, obj, planes, count, passes, seed)
     _check(report, hand, obj, commands)
     if report.errors:
@@ -135,7 +134,7 @@ def _time_solves(
     whole: list[float] = []
     stages: dict[str, list[float]] = defaultdict(list)
     for command in [command for _ in range(passes) for command in commands]:
-        solution, seconds = _timed(lambda command=command: clench.solve(hand, obj, command))  # type: ignore[misc]
+        solution, seconds = timed(lambda command=command: clench.solve(hand, obj, command))  # type: ignore[misc]
         whole.append(seconds)
         for stage, taken in solution.timing.items():
             stages[stage].append(taken)
@@ -165,7 +164,7 @@ def _listening() -> Iterator[dict[str, list[float]]]:
 
     def watched(kernel: Callable[..., Any], times: list[float]) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:
-            result, seconds = _timed(lambda: kernel(*arguments))
+            result, seconds = timed(lambda: kernel(*arguments))
             times.append(seconds)
             return result
 
@@ -180,9 +179,3 @@ def _listening() -> Iterator[dict[str, list[float]]]:
     finally:
         for module, name, kernel in kept:
             setattr(module, name, kernel)
-
-
-def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    start = time.perf_counter()
-    result = call()
-    return result, time.perf_counter() - start

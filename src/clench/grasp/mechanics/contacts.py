@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -112,11 +112,9 @@ class ContactSet:
         Raises:
             CommandError: fewer than 3 edges.
         """
-        angles = edge_angles(count)
         edges = np.zeros((len(self), count + 2 * (self.width - 3), self.width))
         edges[:, :, 2] = 1.0
-        edges[:, :count, 0] = self.friction[:, None] * np.cos(angles)
-        edges[:, :count, 1] = self.friction[:, None] * np.sin(angles)
+        edges[:, :count, :2] = self.friction[:, None, None] * edge_directions(count)
         if self.torsion is not None:
             edges[:, count, 3], edges[:, count + 1, 3] = self.torsion, -self.torsion
         return edges
@@ -171,16 +169,22 @@ def contact_frames(normals: FloatArray) -> FloatArray:
     return np.stack([first, np.cross(normals, first), normals], axis=2)
 
 
-def edge_angles(count: int) -> FloatArray:
-    """Return the directions of a cone's edges in the tangent plane [rad], shape (count,).
+@lru_cache(maxsize=32)
+def edge_directions(count: int, turned: float = 0.0) -> FloatArray:
+    """Return unit directions of a cone's edges in the tangent plane, shape (count, 2).
+
+    Args:
+        count: of the edges. turned: by this part of the angle between two edges [-].
 
     Raises:
         CommandError: fewer than 3.
     """
     if count < 3:
         raise CommandError(f"edges: expected at least 3 edges of the friction cone, got {count}.")
-    angles: FloatArray = 2.0 * np.pi * np.arange(count) / count
-    return angles
+    angles = 2.0 * np.pi * (np.arange(count) + turned) / count
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    directions.flags.writeable = False
+    return directions
 
 
 def pair_friction(hand: Hand, link: int, body: Body, default: float = DEFAULT_FRICTION) -> float:

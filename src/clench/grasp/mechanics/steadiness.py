@@ -15,7 +15,7 @@ import numpy as np
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
 
-from .contacts import ContactSet, edge_angles
+from .contacts import ContactSet, edge_directions
 from .held import HeldObject
 from .wrench_space import Ball, WrenchNorm, epsilon_l1, epsilon_linf, largest_ball, spanned_dimensions
 
@@ -24,7 +24,7 @@ EDGES: Final = 8
 #: Largest normal force of a contact within torque limits [N]; binds only where joints have none, or stand still.
 MOST_NORMAL_FORCE: Final = 1e3
 #: Rounds of reweighting of the fast bound [-].
-_ROUNDS = 6
+_ROUNDS = 3
 #: Accuracy of the radius within torque limits, as a fraction of the largest wrench [-].
 _LIMITED_ACCURACY = 1e-7
 _LIMITED_BATCH = 6
@@ -76,11 +76,12 @@ class ConeParts(NamedTuple):
     """Hold what some contacts add to the bound of epsilon.
 
     Args:
-        grasp_map: shape (6, C * width). faces: of the cones, shape (C, F, width).
+        grasp_map: shape (6, C * width). edges, faces: of the cones, shapes (C, N, width) and (C, F, width).
         reach: semi-axes of the cones at unit normal force, 1 for the normal, shape (C, width).
     """
 
     grasp_map: FloatArray
+    edges: FloatArray
     faces: FloatArray
     reach: FloatArray
 
@@ -88,7 +89,9 @@ class ConeParts(NamedTuple):
 def cone_parts(held: HeldObject, edges: int = EDGES) -> ConeParts:
     """Return what the contacts of a grasp add to its bound."""
     contacts = held.contacts
-    return ConeParts(held.grasp_map, cone_faces(contacts, edges), np.insert(contacts.reach, 2, 1.0, axis=1))
+    reach = np.ones((len(contacts), contacts.width))
+    reach[:, :2], reach[:, 3:] = contacts.reach[:, :2], contacts.reach[:, 2:]
+    return ConeParts(held.grasp_map, contacts.cone_edges(edges), cone_faces(contacts, edges), reach)
 
 
 def epsilon_bound_of(parts: Sequence[ConeParts]) -> float:
@@ -96,18 +99,17 @@ def epsilon_bound_of(parts: Sequence[ConeParts]) -> float:
     from clench.kernels.wrench_bound import resisted_ball
 
     G = np.concatenate([p.grasp_map for p in parts], axis=1)
-    faces, reach = (np.concatenate([p[k] for p in parts]) for k in (1, 2))
+    edges, faces, reach = (np.concatenate([p[k] for p in parts]) for k in (1, 2, 3))
     sum_of_normals = np.zeros((1, G.shape[1]))
     sum_of_normals[0, 2 :: reach.shape[1]] = 1.0
-    return float(resisted_ball(G, faces, reach, sum_of_normals, np.ones(1), _ROUNDS))
+    return float(resisted_ball(G, edges, faces, reach, sum_of_normals, np.ones(1), _ROUNDS))
 
 
 def cone_faces(contacts: ContactSet, edges: int) -> FloatArray:
     """Return inward normals of the faces of the polyhedra of `ContactSet.cone_edges`, shape (C, F, width)."""
-    angles = edge_angles(edges) + np.pi / edges
-    inner = contacts.friction[:, None] * np.cos(np.pi / edges)
+    inner = contacts.friction * np.cos(np.pi / edges)
     faces = np.zeros((len(contacts), edges, contacts.width))
-    faces[:, :, 0], faces[:, :, 1] = -np.cos(angles) / inner, -np.sin(angles) / inner
+    faces[:, :, :2] = edge_directions(edges, 0.5) / -inner[:, None, None]
     faces[:, :, 2] = 1.0
     if contacts.torsion is None:
         return faces
@@ -119,10 +121,11 @@ def cone_faces(contacts: ContactSet, edges: int) -> FloatArray:
 def _caps(held: HeldObject, norm: WrenchNorm | str | None) -> tuple[FloatArray, FloatArray]:
     """Return what bounds the forces: rows c with `|c f| <= most`."""
     contacts = held.contacts
-    normal = np.zeros((len(contacts), len(contacts) * contacts.width))
-    normal[np.arange(len(contacts)), 2 + contacts.width * np.arange(len(contacts))] = 1.0
     if norm == WrenchNorm.L1:
-        return normal.sum(axis=0, keepdims=True), np.ones(1)
+        together = np.zeros((1, len(contacts) * contacts.width))
+        together[0, 2 :: contacts.width] = 1.0
+        return together, np.ones(1)
+    normal = np.eye(len(contacts) * contacts.width)[2 :: contacts.width]
     if norm == WrenchNorm.LINF:
         return normal, np.ones(len(contacts))
     limits = held.dofs.limits
