@@ -47,6 +47,17 @@ def test_a_finger_that_curls_into_itself_stops_there():
     assert solution.certified
 
 
+def test_a_finger_stopped_by_a_fine_link_of_its_own_near_a_coarse_object():
+    """A link has many more elements than the object has triangles."""
+    fine = Shape(ShapeKind.MESH, mesh=along_x(0.006, 0.04).to_mesh(1e-5))
+    shapes = [fine, along_x(0.006, 0.03), along_x(0.006, 0.04)]
+    hand = HandBuilder().finger("index", shapes, [0.04, 0.03, 0.04], upper=2.6).hand()
+    corners = np.array([[1.0, 0, 0], [1.01, 0, 0], [1.0, 0.01, 0], [1.0, 0, 0.01]])
+    obj = clench.GraspObject.from_meshes([(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])])
+    solution = clench.solve(hand, obj, command())
+    assert "index_link_0" in solution.fingers["index"].reason
+
+
 def far_ball():
     return clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
 

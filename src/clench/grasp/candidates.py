@@ -101,7 +101,7 @@ def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandi
     for candidate in chosen:
         own = list(candidate.plan.finger.joints)
         q[own] = candidate.q[own]
-    return hand.coupled(q)
+    return hand.tied(q)
 
 
 def read_candidates(
@@ -150,7 +150,9 @@ def _read_touches(
     offsets = plan.arrays.plane_offset[hits[:, HIT_PLANE]]
     across = np.stack([points[:, 0], offsets, points[:, 1]], axis=1)
     positions = (poses[:, :, :3] @ across[:, :, None])[:, :, 0] + poses[:, :, 3]
-    facets = packed.tree.normals[np.maximum(hits[:, HIT_SOURCE], 0)] if len(packed.tree.normals) else positions
+    # For an exact touch the column numbers an element of what is met, and the normal is read with it.
+    sources = np.where(hits[:, HIT_PLANE] < 0, 0, np.maximum(hits[:, HIT_SOURCE], 0))
+    facets = packed.tree.normals[sources] if len(packed.tree.normals) else positions
     normals = facets @ closed.T_palm_object[:3, :3].T
     touches: list[list[Touch]] = [[] for _ in contacts]
     for i, n, hit, point, position, normal, offset in zip(

@@ -56,15 +56,25 @@ def next_segment(
 
 
 @inner_kernel
+def first_member(chain: ChainArrays, begin: int, joint: int) -> int:
+    """Return the first joint of the finger that is in a joint's group; members need not stand side by side."""
+    first = begin
+    while chain.joint_group[first] != chain.joint_group[joint]:
+        first += 1
+    return first
+
+
+@inner_kernel
 def move_groups(
     chain: ChainArrays, joints: tuple[int, int], group: int, travel: Floats, locked: Ints, moved: float
 ) -> None:
     """Move every group on that has a joint which is not locked; bounds that are reached are reached exactly."""
-    for g in range(chain.joint_group[joints[0]], chain.joint_group[joints[1] - 1] + 1):
-        if group != ALL and g != group:
+    for first in range(joints[0], joints[1]):
+        g = chain.joint_group[first]
+        if (group != ALL and g != group) or first_member(chain, joints[0], first) != first:
             continue
         moves, bound = False, math.inf
-        for j in range(joints[0], joints[1]):
+        for j in range(first, joints[1]):
             if chain.joint_group[j] == g and not locked[j]:
                 moves, bound = True, min(bound, next_bound(chain, j, travel[g]))
         if moves and travel[g] < chain.group_length[g]:

@@ -1,0 +1,1 @@
+"""Closing all joints at once, compared with cases that GraspIt! computed."""
