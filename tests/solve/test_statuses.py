@@ -81,6 +81,7 @@ def test_nothing_is_certified_around_a_finger_that_rests_in_the_object(role):
     solution = clench.solve(hand, ball, command(fingers=("a",)))
     assert not solution.certified
     assert "b_link_0" in solution.certificate["text"]
+    assert (solution.certificate["code"], solution.certificate["links"]) == ("blocked_at_start", ["b_link_0"])
 
 
 def test_nothing_is_certified_where_resting_links_overlap():
@@ -90,6 +91,26 @@ def test_nothing_is_certified_where_resting_links_overlap():
     solution = clench.solve(hand, far_ball(), command(fingers=("a",)))
     assert not solution.certified
     assert "b_link_1 overlaps palm" in solution.certificate["text"]
+    assert (solution.certificate["code"], solution.certificate["links"]) == ("overlap_at_end", ["b_link_1", "palm"])
+
+
+def test_nothing_is_certified_for_links_that_overlap_before_they_move(tmp_path):
+    palm = Shape(ShapeKind.BOX, (0.01, 0.05, 0.01), Pose([0.06, 0, 0]))
+    hand = HandBuilder(palm).finger("a", [None, along_x(0.006, 0.07)], [0.01, 0.07]).hand()
+    solution = clench.solve(hand, far_ball(), command())
+    assert not solution.certified
+    assert solution.certificate["code"] == "self_collision_at_start"
+    assert sorted(solution.certificate["links"]) == ["a_link_1", "palm"]
+    assert solution.certificate["finger"] == "a"
+    solution.save(tmp_path / "s.json")
+    assert clench.GraspSolution.load(tmp_path / "s.json").certificate == solution.certificate
+
+
+@pytest.mark.parametrize(("full_width", "code"), [(True, "certified"), (False, "one_plane")])
+def test_the_certificate_says_what_it_is_about(full_width, code):
+    solution = clench.solve(three_links(upper=1.2), far_ball(), command(full_width=full_width))
+    assert solution.certificate["code"] == code
+    assert solution.certified == (code == "certified")
 
 
 def test_a_touch_of_joints_that_cancel_blocks():

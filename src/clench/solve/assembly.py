@@ -100,7 +100,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         joint_angles=dict(zip(names, answer.final.tolist(), strict=True)),
         open_angles=dict(zip(names, _opened(answer, problem).tolist(), strict=True)),
         certified=answer.certificate.holds,
-        certificate=asdict(answer.certificate),
+        certificate={**asdict(answer.certificate), "links": list(answer.certificate.links)},
         collision_source=str(problem.source),
         object_collision_source=str(problem.obj.collision_source),
         max_penetration=None if answer.at_end is None else max((d.depth for d in answer.at_end), default=0.0),

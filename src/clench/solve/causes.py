@@ -9,7 +9,7 @@ from clench.grasp.candidates import FingerCandidate, Touch
 from clench.grasp.plan import last_closing_joint
 from clench.grasp.reach import beside, beyond_reach, graspable_body, nearest_link
 from clench.grasp.surface import nearest_body
-from clench.models.hand.hand import Hand
+from clench.models.hand.hand import Hand, JointRole
 
 from .solution import FingerStatus
 
@@ -188,10 +188,13 @@ def _out_of_reach(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
     if max(ahead, aside) <= 0.0:
         return {}
     way, short = ("ahead", ahead) if ahead >= aside else ("aside", aside)
+    name, hand = c.plan.finger.name, problem.hand
     what = f"beyond its reach of {reach * 1e3:.0f} mm" if way == "ahead" else "to the side of the planes it closes in"
+    turning = [hand.joints[j].name for j in c.plan.finger.joints if hand.joints[j].role is JointRole.POSTURE]
+    turn = f"turn its posture joints in the preshape ({', '.join(turning)}), or " if turning and way == "aside" else ""
     return {
         "code": CauseCode.REACH.value,
-        "text": f"The object is {short * 1e3:.3g} mm {what}: {c.plan.finger.name} cannot get there by closing.",
+        "text": f"The object is {short * 1e3:.3g} mm {what}: {name} cannot get there by closing; {turn}move the hand.",
         "shortfall": short,
         "direction": way,
         "reach": reach,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,21 @@ if TYPE_CHECKING:
     from .controller import Problem
 
 
+class CertificateCode(StrEnum):
+    """Name what is promised, or why nothing is."""
+
+    CERTIFIED = "certified"
+    """no link overlaps what it must not, at the grasp or on the way"""
+    BLOCKED_AT_START = "blocked_at_start"
+    """a link overlaps the object or an obstacle before anything moves"""
+    ONE_PLANE = "one_plane"
+    """a set was computed on one plane, and nothing is known beside it"""
+    SELF_COLLISION_AT_START = "self_collision_at_start"
+    """links of the hand overlap, or one lies inside another, before anything moves"""
+    OVERLAP_AT_END = "overlap_at_end"
+    """links overlap something at the grasp"""
+
+
 @dataclass(frozen=True)
 class Certificate:
     """Promise that no link overlaps anything it must not, at the grasp and on the way to it; or say why not.
@@ -28,11 +44,19 @@ class Certificate:
     Args:
         holds: whether it is promised. text: a sentence.
         deviation: how far round shapes that are swept as polyhedra may lie outside of these [m].
+        code: see `CertificateCode`. links: names of those that overlap. finger: the one it is about, or None.
     """
 
     holds: bool
     text: str
     deviation: float = 0.0
+    code: CertificateCode = CertificateCode.CERTIFIED
+    links: tuple[str, ...] = ()
+    finger: str | None = None
+
+
+def _refused(code: CertificateCode, text: str, links: Sequence[str] = (), finger: str | None = None) -> Certificate:
+    return Certificate(False, text, code=code, links=tuple(links), finger=finger)
 
 
 def certify(
@@ -51,21 +75,28 @@ def certify(
     hand = problem.hand
     for found in at_start:
         if found.depth > ALLOWED_PENETRATION:
-            return Certificate(False, f"{hand.links[found.link].name} overlaps the object before anything moves.")
+            link = hand.links[found.link].name
+            text = f"{link} overlaps the object before anything moves."
+            return _refused(CertificateCode.BLOCKED_AT_START, text, [link])
     opened = problem.start.copy()
     for c in best:
         name = c.plan.finger.name
         if c.overlap is not None:
-            return Certificate(False, f"{name} overlaps the object before it moves.")
+            link = hand.links[c.overlap.link].name
+            text = f"{name} overlaps the object before it moves."
+            return _refused(CertificateCode.BLOCKED_AT_START, text, [link], name)
         if c.plane is not None:
-            return Certificate(False, f"The set of {name} was computed on one plane; between planes nothing is known.")
+            text = f"The set of {name} was computed on one plane; between planes nothing is known."
+            return _refused(CertificateCode.ONE_PLANE, text, finger=name)
         if not c.exact:
-            return Certificate(False, f"Links of {name} overlap other links of the hand before it moves.")
+            text = f"Links of {name} overlap other links of the hand before it moves."
+            links = _overlapping(problem, c.plan.posture, exact)
+            return _refused(CertificateCode.SELF_COLLISION_AT_START, text, links, name)
         own = list(c.plan.finger.joints)
         opened[own] = c.plan.posture[own]
     overlap = _overlap(problem, opened, final, exact)
-    if overlap:
-        return Certificate(False, overlap)
+    if overlap is not None:
+        return overlap
     deviation = swept_deviation(hand, problem.source, problem.packed)
     text = f"No link overlaps the object or, where it must not, the hand itself ({problem.source} geometry)"
     if deviation > 0.0:
@@ -73,26 +104,37 @@ def certify(
     return Certificate(True, f"{text}.")
 
 
-def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: ExactArrays) -> str:
-    """Return a sentence about links that overlap something at the end, or lie in the object at the start; else empty.
+def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: ExactArrays) -> Certificate | None:
+    """Refuse links that overlap something at the end, or lie in the object or in each other at the start.
 
     Surfaces that never cross on the way keep what is inside inside: it is enough that nothing is at the start.
     """
-    from clench.kernels.exact import find_link_overlap
-
     hand, T = problem.hand, problem.T_palm_object
     links = [link for finger in hand.fingers for link in finger.links]
     inside = contained_link(hand, opened, problem.packed, T, problem.source, links)
     if inside is not None:
-        return f"{hand.links[inside].name} overlaps the object before anything moves."
+        link = hand.links[inside].name
+        return _refused(CertificateCode.BLOCKED_AT_START, f"{link} overlaps the object before anything moves.", [link])
     checked = hand_bodies(hand, problem.source).across
     pair = link_within_link(hand, opened, problem.source, checked)
     if pair is not None:
-        return f"{hand.links[pair[0]].name} lies inside {hand.links[pair[1]].name} before anything moves."
+        names = [hand.links[i].name for i in pair]
+        text = f"{names[0]} lies inside {names[1]} before anything moves."
+        return _refused(CertificateCode.SELF_COLLISION_AT_START, text, names)
+    found = _overlapping(problem, final, exact)
+    if not found:
+        return None
+    text = f"{found[0]} overlaps {found[1] if len(found) > 1 else 'the object'} at the end."
+    return _refused(CertificateCode.OVERLAP_AT_END, text, found)
+
+
+def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[str]:
+    """Return the names of two links that overlap at a posture, or of one that overlaps the object; or nothing."""
+    from clench.kernels.exact import find_link_overlap
+
+    hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])
+    checked = hand_bodies(hand, problem.source).across
     everything = exact._replace(object=problem.packed.bodies, checked=checked)
-    poses = np.ascontiguousarray(hand.link_poses(final)[:, :3])
-    one, other = find_link_overlap(everything, poses, np.ascontiguousarray(T[:3]), ALLOWED_PENETRATION)
-    if one < 0:
-        return ""
-    what = hand.links[other].name if other < len(hand.links) else "the object"
-    return f"{hand.links[one].name} overlaps {what} at the end."
+    poses = np.ascontiguousarray(hand.link_poses(q)[:, :3])
+    pair = find_link_overlap(everything, poses, T, ALLOWED_PENETRATION)
+    return [hand.links[i].name for i in pair if 0 <= i < len(hand.links)]
