@@ -1,5 +1,7 @@
 """The controller: what the solution holds of the three inputs and of every alternative set."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -179,3 +181,18 @@ def test_solutions_are_recorded_when_asked(tmp_path):
         solution = clench.solve(three_links(), BALL, command(seed=5), record=record)
         assert solution.seed == 5
         assert len(record) == 1
+
+
+def test_touches_of_an_object_with_more_elements_than_triangles():
+    """A coin between two planes is swept as a polyhedron of many triangles; the tree has those of the box alone."""
+    lying = Pose([0.045, 0.00175, 0.035], wxyz=[np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
+    coin = clench.GraspObject.load("cylinder:r=0.02,h=0.001", pose=lying)
+    box = clench.GraspObject.load("box:x=0.01,y=0.01,z=0.01").bodies[0].moved(Pose([0.0, 0.0, 0.06]))
+    both = replace(coin, bodies=(*coin.bodies, replace(box, name="knob")))
+    solution = clench.solve(three_links(), both, command())
+    touching = [c for c in solution.contacts if c.plane is None]
+    assert touching
+    for contact in touching:
+        away = contact.position - lying.position
+        assert np.hypot(away[0], away[2]) == pytest.approx(0.02, abs=1e-5)
+        assert abs(away[1]) <= 0.0005 + 1e-9
