@@ -150,3 +150,16 @@ def test_the_hand_file_shown_is_read(tmp_path: Path) -> None:
     }
     assert read.joints["Y"].follows == "X"
     assert read.tendons is not None
+
+
+def test_the_forces_page_holds_a_ball_and_names_every_key() -> None:
+    text = page("forces.md")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(code, "forces.md", "exec"), names)
+    assert names["squeeze"].feasible
+    assert names["squeeze"].text in code
+    full = names["full"]
+    documented = set(re.findall(r"`(\w+)`", text))
+    for part in (full.quality, full.quality["actuation"], full.squeeze):
+        assert set(part) <= documented
