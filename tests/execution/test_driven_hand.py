@@ -130,6 +130,23 @@ def test_a_controller_that_fails_stops_the_hand(pincer: Hand, solution: GraspSol
     assert driver.stops == 1
 
 
+def test_drivers_may_raise_anything(pincer: Hand, solution: GraspSolution) -> None:
+    def fault(t: float) -> dict[str, object]:
+        if t > 0.2:
+            raise OSError("no such device")
+        return {}
+
+    driver = FakeDriver(OPEN, fault=fault)
+    driver.disconnect = lambda: 1 / 0  # type: ignore[method-assign]
+    report = run(driver, pincer, solution, speed=0.3)
+    assert report.reason.startswith("The driver failed (OSError: no such device). The hand was told to stop")
+    assert driver.stops == 1
+    driver = FakeDriver(OPEN)
+    driver.connect = lambda _: {}["port"]  # type: ignore[method-assign]
+    report = run(driver, pincer, solution)
+    assert report.reason == "Not carried out: The driver failed (KeyError: 'port')."
+
+
 def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution) -> None:
     driver = FakeDriver(OPEN)
     hand = DrivenHand(pincer, driver)

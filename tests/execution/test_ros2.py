@@ -114,9 +114,9 @@ class World:
         )
         return self.start("-c", program)
 
-    def wait_for_motion(self) -> None:
+    def wait_for(self, what: str) -> None:
         until = time.monotonic() + 30
-        while not (self.folder / "log.moving").exists() and time.monotonic() < until:
+        while not (self.folder / f"log.{what}").exists() and time.monotonic() < until:
             time.sleep(0.02)
 
     def report(self, driving: subprocess.Popen[Any]) -> dict[str, Any]:
@@ -165,6 +165,10 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
     assert report["actuator"] == f"ros2 ({SPOKEN[ours]})"
     assert log["refused"] == []
     assert log["accepted"] > 5
+    # One path goes on where the one before it is: they never pull the hand to and fro.
+    assert len(log["jumps"]) == log["accepted"]
+    assert np.median(log["jumps"]) < 0.01
+    assert max(log["jumps"]) < 0.05
     samples = np.array(log["samples"])
     np.testing.assert_allclose(samples[-1, 1:], targets(world.solution), atol=1e-6)
     rates = np.abs(np.diff(samples[:, 1:], axis=0)) / 0.01
@@ -199,7 +203,7 @@ def test_a_cut_connection_stops_the_hand_and_is_reported(world: World, theirs: s
 def test_killing_our_program_stops_the_hand(world: World, ours: str) -> None:
     node = world.node("cyclonedds" if installed("cyclonedds") else "rclpy")
     driving = world.drive(ours, 0.05)
-    world.wait_for_motion()
+    world.wait_for("moving")
     time.sleep(0.4)
     assert driving.poll() is None
     driving.kill()
@@ -260,6 +264,7 @@ def test_who_is_not_there(world: World, ours: str, monkeypatch: pytest.MonkeyPat
     driver.disconnect()
     assert time.monotonic() - begun < 5.0
     world.node("cyclonedds" if installed("cyclonedds") else "rclpy", "--silent")
+    world.wait_for("ready")
     with pytest.raises(ros2.DriverError, match=r"joint_states' is silent \(waited 2.5 s"):
         driver.connect(2.5)
     driver.disconnect()

@@ -21,6 +21,7 @@ class Joints:
         self.names, self.at = names, np.array(start)
         self.times, self.points = np.zeros(1), self.at[None]
         self.refused: list[str] = []
+        self.jumps: list[float] = []
         self.accepted = 0
 
     def take(self, names: list[str], times: list[float], points: list[list[float]]) -> None:
@@ -33,8 +34,12 @@ class Joints:
         else:
             order = [names.index(n) for n in self.names]
             now = time.monotonic()
-            self.points = np.vstack([self.now(), np.array(points)[:, order]])
-            self.times = np.concatenate([[now], now + np.array(times)])
+            told, times = np.array(points)[:, order], now + np.array(times)
+            if times[0] > now:  # from where it is, unless the trajectory says where it is by now
+                told, times = np.vstack([self.now(), told]), np.concatenate([[now], times])
+            else:
+                self.jumps.append(float(np.abs(told[0] - self.now()).max()))
+            self.points, self.times = told, times
             self.accepted += 1
 
     def now(self) -> np.ndarray:
@@ -174,6 +179,7 @@ def main() -> None:
     a = p.parse_args()
     joints = Joints(a.joints.split(","), [float(x) for x in a.start.split(",")])
     dds = {"cyclonedds": Cyclone, "rclpy": Rclpy, "action": Action}[a.interface](a.domain, a.topic, a.states)
+    a.log.with_suffix(".ready").touch()
     begun, moving, cut, samples = time.monotonic(), None, None, []
     ended: list[int] = []
     signal.signal(signal.SIGTERM, lambda *_: ended.append(1))
@@ -197,6 +203,7 @@ def main() -> None:
             dds.say([*joints.names, "elbow"], [*at.tolist(), 1.0], stamp)
         time.sleep(0.01)
     log = {"accepted": joints.accepted, "refused": joints.refused, "cut": cut, "samples": samples}
+    log["jumps"] = joints.jumps
     a.log.write_text(json.dumps(log))
     os._exit(0)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 
-from clench.base.errors import UnknownNameError
+from clench.base.errors import ClenchError, UnknownNameError
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -111,9 +112,15 @@ class DrivenHand:
             pulled = self._pull(solution) if followed.trouble is None else ""
         except DriverError as error:
             return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}")
+        except ClenchError:
+            raise
+        except Exception as error:  # drivers are others' code
+            reason = f"Not carried out: The driver failed ({type(error).__name__}: {error})."
+            return ExecutionReport(self.name, success=False, reason=reason)
         finally:
             if not self.stay_connected:
-                self.driver.disconnect()
+                with suppress(Exception):  # what the hand did is known, however the line closes
+                    self.driver.disconnect()
         return self._report(followed, mapped, computed, (_way(way), pulled))
 
     def _check_joints(self, mapped: Mapping[str, MappedJoint]) -> None:
@@ -157,7 +164,8 @@ class DrivenHand:
             check_tensions(tensions, self.hand.tendons)
             self.driver.pull(tensions)
         except DriverError as error:
-            self.driver.stop()
+            with suppress(Exception):  # the sentence says what went wrong first
+                self.driver.stop()
             return f"The tendons were not pulled: {error}"
         return f"The tendons were told the tensions of the squeeze plan, up to {tensions.max():.3g} N."
 

@@ -154,14 +154,20 @@ class Ros2Driver:
     def command(self, path: JointPath) -> None:
         """Send the path; it replaces what the controller is doing.
 
+        It begins with where the joints were told to be by now: else the controller would go on from where they are
+        measured, which is behind, and step back at every command.
+
         Raises:
             DriverError: nobody listens any more.
         """
         link = self._connected()
         if not link.listeners():
             raise DriverError(f"Nobody listens on '{self.topic}' any more.")
-        link.publish(path.joints, path.times.tolist(), path.positions.tolist())
-        self._sent = (time.monotonic(), path)
+        now = time.monotonic()
+        at = self._positions if self._sent is None else self._sent[1].at(now - self._sent[0])
+        first = [at[name] for name in path.joints]
+        link.publish(path.joints, [0.0, *path.times.tolist()], [first, *path.positions.tolist()])
+        self._sent = (now, path)
 
     def stop(self) -> None:
         """Tell the controller to hold where the joints were measured last, or were told to be by now.
