@@ -17,7 +17,7 @@ command = clench.GraspCommand(
     opposition_grid=(0.0, 0.2, -0.2),
     criteria={"range_of_motion": 1.0},
 )
-weights = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0]
+weights = [0.03, 0.1, 0.3, 1.0, 3.0]
 solutions = sweep_weight(hand, mug, command, "steadiness", weights)
 steadiness = [solution.choice["hand_scores"]["steadiness"] for solution in solutions]
 for weight, steady, solution in zip(weights, steadiness, solutions, strict=True):

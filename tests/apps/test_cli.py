@@ -234,6 +234,7 @@ CHOICE = {
     "text": "The chosen sets lead.",
     "total": -0.3,
     "hand_scores": {},
+    "final_hand_scores": {},
     "combinations_tried": 0,
     "runner_up": None,
     "fingers": {

@@ -164,6 +164,17 @@ def test_weight_on_steadiness_never_makes_the_grip_less_steady():
     assert bounds[1:] == sorted(bounds[1:])
 
 
+def test_scores_of_the_hand_are_also_told_as_it_is_at_last():
+    """With yaw alternatives some finger meets another and is closed again: what was compared stays beside what is."""
+    hand = clench.Hand.load("robonaut2")
+    pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
+    grids = {"yaw_grid": (0.0, 0.1, -0.1, 0.2, -0.2), "opposition_grid": (0.0, 0.2, -0.2), "planes": 1}
+    command = clench.GraspCommand(hand_pose=pose, criteria={"range_of_motion": 1.0, "steadiness": 10.0}, **grids)
+    choice = clench.solve(hand, MUG, command).choice
+    again = [f["closed_again"] for f in choice["fingers"].values()]
+    assert (choice["final_hand_scores"] != choice["hand_scores"]) == any(again)
+
+
 def test_clearance_is_the_gap_to_obstacles_alone():
     hand = pincer(0.06)
     ball = clench.GraspObject.load("sphere:r=0.02")

@@ -34,7 +34,7 @@ def scores(motion: float, links: float = 1.0) -> dict[str, Any]:
 def record(tmp_path: Path) -> Path:
     path = tmp_path / "r.sqlite"
     with Record(path) as made:
-        made.append(make_solution(choice={"hand_scores": {"steadiness": 0.2}}))
+        made.append(make_solution(choice={"final_hand_scores": {"steadiness": 0.2}}))
         made.append(make_solution())
     return path
 

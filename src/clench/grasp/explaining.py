@@ -33,6 +33,7 @@ def explain_choice(choice: HandChoice, groups: Groups) -> dict[str, Any]:
         "text": _hand_text(choice, groups, names),
         "total": choice.total,
         "hand_scores": dict(choice.hand_scores),
+        "final_hand_scores": dict(choice.hand_scores),
         "combinations_tried": choice.tried,
         "runner_up": None
         if second is None

@@ -36,7 +36,7 @@ class Steadiness:
     larger_is_better: ClassVar[bool] = True
 
     def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
-        """Return the bound [N per N of normal force]; 0 where none was found."""
+        """Return the bound [N per N of normal force]."""
         if setting.obj is None:
             return None
         parts = [p for p in (_parts(c, setting) for c in chosen) if p is not None]

@@ -111,7 +111,7 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
             best[k] = fingers[k][chosen[k]] = replace(new, clear=old.clear)
             score_sets([best[k]], choice.used, setting)
             explained["fingers"][new.plan.finger.name]["closed_again"] = True
-            explained["hand_scores"] = score_hand(best, choice.used, setting)
+            explained["final_hand_scores"] = score_hand(best, choice.used, setting)
     clock.lap("sequence")
     answer = judge_answer(problem, fingers, chosen, best, exact, explained)
     clock.lap("judge")

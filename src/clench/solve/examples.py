@@ -137,7 +137,7 @@ def solve_scores(solution: GraspSolution) -> dict[str, float]:
     chosen = [f.candidates[f.chosen].scores for f in solution.fingers.values() if f.candidates]
     names = dict.fromkeys(name for scores in chosen for name in scores)
     sums = {n: float(sum(s[n] for s in chosen)) for n in names if all(n in s for s in chosen)}
-    return {**sums, **(solution.choice or {}).get("hand_scores", {})}
+    return {**sums, **(solution.choice or {}).get("final_hand_scores", {})}
 
 
 def _existing(path: Path) -> Record:

@@ -163,7 +163,7 @@ def print_choice(solution: GraspSolution) -> None:
             out.print(_plain(f"{name}: {choice['fingers'][name]['text']}"))
             if choice["fingers"][name]["closed_again"]:
                 out.print(_plain(f"{name} met another finger and was closed again; its sum is that of before."))
-    for name, value in choice["hand_scores"].items():
+    for name, value in choice["final_hand_scores"].items():
         out.print(_plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
     out.print(f"[bold]{_plain(choice['text'])}[/bold]")
 
