@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from clench.base.errors import CommandError, FileError
 
@@ -97,6 +97,7 @@ def solve(
 
     import clench
     from clench.kernels.warming import warm_up
+    from clench.solve.pareto import hand_front
 
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
@@ -128,7 +129,10 @@ def solve(
         shift, turn = pose_error
         error = clench.pose_error(the_hand, the_object, the_command, shift, radians(turn), solution=solution)
     if json:
-        print_json(solution.to_dict() | ({} if error is None else {"pose_error": error.to_dict()}))
+        more: dict[str, Any] = {} if error is None else {"pose_error": error.to_dict()}
+        if explain:
+            more["pareto_front"] = [entry.to_dict() for entry in hand_front(solution)]
+        print_json(solution.to_dict() | more)
     else:
         print_solution(solution, [*the_hand.warnings, *the_object.warnings], files)
         if error is not None:

@@ -14,9 +14,13 @@ if TYPE_CHECKING:
 
     from clench.execution.report import ExecutionReport
     from clench.models.hand.report import HandReport
+    from clench.solve.pareto import HandSets
     from clench.solve.pose_error import PoseErrorReport
     from clench.solve.record import RecordEntry
     from clench.solve.solution import Candidate, FingerResult, GraspSolution
+
+#: Rows of a table that may be long.
+_MOST_ROWS = 10
 
 
 def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequence[Path]) -> None:
@@ -150,6 +154,8 @@ def print_report(report: ExecutionReport) -> None:
 
 def print_choice(solution: GraspSolution) -> None:
     """Print what counted, the sets of every finger, and the sentences; nothing where the solution does not say."""
+    from clench.solve.pareto import hand_front
+
     out, choice = _console(), solution.choice
     if choice is None:
         out.print("The solution does not say how its sets were chosen.")
@@ -163,6 +169,9 @@ def print_choice(solution: GraspSolution) -> None:
             out.print(_plain(f"{name}: {choice['fingers'][name]['text']}"))
             if choice["fingers"][name]["closed_again"]:
                 out.print(_plain(f"{name} met another finger and was closed again; its sum is that of before."))
+    front = hand_front(solution)
+    if len(front) > 1:
+        out.print(_front_table(front))
     for name, value in choice["final_hand_scores"].items():
         out.print(_plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
     out.print(f"[bold]{_plain(choice['text'])}[/bold]")
@@ -232,6 +241,18 @@ def _finger_table(finger: FingerResult, choice: Mapping[str, Any]) -> Table:
         where = "full" if candidate.plane is None else f"plane {candidate.plane + 1}"
         scores = [_score(candidate, name) for name in names]
         row = (mark, where, str(candidate.posture), *scores, f"{said['totals'][i]:.4f}", candidate.status.value)
+        result.add_row(*map(_plain, row))
+    return result
+
+
+def _front_table(front: Sequence[HandSets]) -> Table:
+    """List combinations over all fingers that no other beats in every criterion, by the numbers of their sets."""
+    title = f"Pareto front of the hand, {len(front)} combinations by weighted sum (* chosen; sets from 0)"
+    names = [n.replace("_", " ") for n in front[0].scores]
+    result = _table(title, "", *front[0].sets, *names, "sum")
+    for entry in front[:_MOST_ROWS]:
+        scores = [f"{v:.4g}" for v in entry.scores.values()]
+        row = ("*" if entry.chosen else "", *map(str, entry.sets.values()), *scores, f"{entry.total:.4f}")
         result.add_row(*map(_plain, row))
     return result
 
