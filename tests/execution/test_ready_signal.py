@@ -117,7 +117,7 @@ def test_a_topic(
     while not texts and time.monotonic() < until:
         texts = [s.data for s in reader.take(10) if s.sample_info.valid_data]
         time.sleep(0.01)
-    assert len(texts) == 1
+    assert len(set(texts)) == 1  # the same, up to three times
     check(json.loads(texts[0]), tmp_path, pinch)
 
 

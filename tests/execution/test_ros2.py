@@ -262,7 +262,7 @@ def test_who_is_not_there(world: World, ours: str, monkeypatch: pytest.MonkeyPat
     ):
         driver.connect(0.5)
     driver.disconnect()
-    assert time.monotonic() - begun < 5.0
+    assert time.monotonic() - begun < 15.0
     world.node("cyclonedds" if installed("cyclonedds") else "rclpy", "--silent")
     world.wait_for("ready")
     with pytest.raises(ros2.DriverError, match=r"joint_states' is silent \(waited 2.5 s"):
