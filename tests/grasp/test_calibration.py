@@ -125,10 +125,20 @@ def test_malformed_files(tmp_path, text, message):
 def test_a_missing_file_and_a_folder(tmp_path):
     with pytest.raises(FileError, match="no such calibration file; presets, by name alone: balanced"):
         load_calibration(tmp_path / "none.toml")
-    with pytest.raises(FileError, match="not a calibration file"):
+    with pytest.raises(FileError, match="it is a folder, expected a file"):
         load_calibration(tmp_path)
 
 
 def test_negative_weights_of_a_command_are_refused():
     with pytest.raises(CommandError, match=r"criteria\.limit_distance.*at least 0, got -1"):
         calibration_of({"limit_distance": -1.0})
+
+
+@pytest.mark.parametrize(("table", "number"), [("weights", "1e308"), ("scales", "1e-320"), ("limits", "-1e300")])
+def test_numbers_whose_sums_would_overflow_are_refused(tmp_path, table, number):
+    path = tmp_path / "calibration.toml"
+    path.write_text(f"[{table}]\nrange_of_motion = {number}\n")
+    with pytest.raises(
+        FileError, match=rf"{table}\.range_of_motion: expected a .*number.*, between 1e-12 and 1e\+12 in size"
+    ):
+        load_calibration(path)

@@ -178,3 +178,8 @@ def test_many_appends_are_quick(tmp_path: Path) -> None:
         assert len(record.find(seed=1999, geometry_hash="0123abcd")) == 1
         assert time.perf_counter() - start < 0.5
     assert seconds < 5.0
+
+
+def test_a_seed_that_the_file_cannot_hold_is_said(tmp_path):
+    with Record(tmp_path / "a.sqlite") as record, pytest.raises(FileError, match="the record cannot hold this"):
+        record.append(make_solution(seed=10**30))

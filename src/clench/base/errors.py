@@ -8,9 +8,25 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+#: Longest message; what is longer has a name or a list in it that nobody reads.
+_LONGEST = 2000
+
 
 class ClenchError(ValueError):
-    """Say what was wrong with an input, in one sentence (command line: exit code 2)."""
+    """Say what was wrong with an input, in one sentence (command line: exit code 2).
+
+    Args:
+        sentence: one line; what cannot be printed is escaped, and what is too long is cut in its middle.
+    """
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(_printable(sentence))
+
+
+def _printable(text: str) -> str:
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    half = _LONGEST // 2
+    return line if len(line) <= _LONGEST else f"{line[:half]} ... {line[-half:]}"
 
 
 class FileError(ClenchError):
@@ -50,7 +66,8 @@ class UnknownNameError(ClenchError):
 
     def __init__(self, kind: str, name: str, owner: str, names: Iterable[str]) -> None:
         known = list(names)
-        close = difflib.get_close_matches(name, known, n=1)
+        # A mapping given from Python may have keys of any kind.
+        close = difflib.get_close_matches(str(name), known, n=1)
         guess = f" Did you mean '{close[0]}'?" if close else ""
         many = {"criterion": "criteria"}.get(kind, f"{kind}s")
         listed = f" {many.capitalize()}: {', '.join(known)}." if known else f" It has no {many}."

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from .errors import ClenchError, FileError
+from .files import read_file
 
 
 def non_finite_path(value: Any, key: str = "") -> str | None:
@@ -47,12 +48,8 @@ def read_json(path: str | Path) -> Any:
         FileError: missing, unreadable or not JSON.
     """
     try:
-        return msgspec.json.decode(Path(path).read_bytes())
-    except FileNotFoundError:
-        raise FileError(path, "no such file.") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        return msgspec.json.decode(read_file(path))
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise FileError(path, f"not JSON ({error}).") from None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import CommandError
-from .tolerances import QUATERNION_NORM
+from .tolerances import LARGEST_LENGTH, QUATERNION_NORM
 
 FloatArray = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ class Pose:
         wxyz: unit quaternion, scalar first, shape (4,); normalised when off by less than 1e-3.
 
     Raises:
-        CommandError: wrong length, not finite, or a norm off by more than 1e-3.
+        CommandError: wrong length, not finite, farther than 1e9 m, or a norm off by more than 1e-3.
     """
 
     wxyz_xyz: FloatArray
@@ -39,9 +40,11 @@ class Pose:
     ) -> None:
         xyz = _vector(position, 3, f"{key}.position", "[x, y, z] in metres")
         quaternion = _vector(wxyz, 4, f"{key}.wxyz", "[w, x, y, z]")
-        norm = float(np.linalg.norm(quaternion))
+        norm = math.hypot(*quaternion)
         if abs(norm - 1.0) > QUATERNION_NORM:
             raise CommandError(f"{key}.wxyz: expected a unit quaternion [w, x, y, z], got norm {norm:.6g}.")
+        if np.abs(xyz).max() > LARGEST_LENGTH:
+            raise CommandError(f"{key}.position: expected metres up to {LARGEST_LENGTH:g}, got {xyz.tolist()}.")
         if abs(norm - 1.0) > 4e-16:  # a pose read back stays the same to the bit
             quaternion = quaternion / norm
         data = np.concatenate([quaternion, xyz])

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.base.files import read_text
 from clench.models.hand.hand import Hand
 
 #: Units of a controller by name: how many of them one radian is.
@@ -64,12 +65,8 @@ class JointMap:
             FileError: missing, not TOML, or a malformed key, which the message names.
         """
         try:
-            data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise FileError(path, "no such file.") from None
-        except OSError as error:
-            raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            data = tomllib.loads(read_text(path))
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise FileError(path, f"not TOML ({error}).") from None
         return joint_map_from_dict(data, str(path))
 

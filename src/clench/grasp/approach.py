@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from numbers import Real
 from typing import Final
 
 import numpy as np
@@ -47,7 +48,7 @@ def approach_poses(
     """
     if count < 0 or seed < 0:
         raise CommandError(f"approach poses: expected a count and a seed of 0 or more, got {count} and {seed}.")
-    q = _open_posture(hand, preshape or {})
+    q = _open_posture(hand, {} if preshape is None else preshape)
     packed = pack_object(obj)
     surface = _Surface(obj, packed)
     T_world_object = obj.pose.matrix
@@ -84,8 +85,10 @@ class _Surface:
 def _open_posture(hand: Hand, preshape: Mapping[str, float]) -> FloatArray:
     """Return the open posture with the angles of a preshape, followers coupled, shape (J,) [rad]."""
     joints = list(hand.joints)
+    if not isinstance(preshape, Mapping):
+        raise CommandError(f"preshape: expected angles in radians by joint name, got {type(preshape).__name__}.")
     for name, angle in preshape.items():
-        if not np.isfinite(angle):
+        if not (isinstance(angle, Real) and np.isfinite(angle)):
             raise CommandError(f"preshape.{name}: expected a finite angle in radians, got {angle!r}.")
         index = hand.joint_index(name)
         joints[index] = replace(joints[index], open_value=float(angle))

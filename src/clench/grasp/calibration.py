@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from clench.base.errors import ClenchError, FileError, UnknownNameError
+from clench.base.files import read_text
 
 from .criterion_registry import check_numbers, find_criterion
 
@@ -105,11 +106,9 @@ def load_calibration(path: Path, name: str | None = None) -> Calibration:
         FileError: missing, not TOML, or with other keys.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
         presets = ", ".join(preset_names())
-        raise FileError(path, f"no such calibration file; presets, by name alone: {presets}.") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        data = tomllib.loads(read_text(path, f"no such calibration file; presets, by name alone: {presets}."))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise FileError(path, f"not a calibration file in TOML: {error}.") from None
     unknown = sorted(set(data) - set(_TABLES))
     if unknown:

@@ -153,6 +153,10 @@ def checked_value(criterion: Criterion | HandCriterion, value: float) -> float:
     return number
 
 
+#: Weights, scales and limits are at most this, and scales at least its inverse, so that no sum of them overflows [-].
+LARGEST = 1e12
+
+
 def check_numbers(values: Mapping[str, float], source: str, least: float, above: bool) -> dict[str, float]:
     """Return numbers by criterion whose names exist and which are finite and not too small.
 
@@ -164,9 +168,11 @@ def check_numbers(values: Mapping[str, float], source: str, least: float, above:
     """
     for name, value in values.items():
         find_criterion(name, source)
-        if not math.isfinite(value) or value < least or (above and value == least):
+        if not abs(value) <= LARGEST or value < least or (above and value < 1.0 / LARGEST):
             expected = (
                 "a finite number" if math.isinf(least) else f"a number {'above' if above else 'of at least'} {least:g}"
             )
+            if math.isfinite(value) and value > least:
+                expected += f", between {1.0 / LARGEST:g} and {LARGEST:g} in size"
             raise CommandError(f"{source}.{name}: expected {expected}, got {value!r}.")
     return {name: float(value) for name, value in values.items()}

@@ -219,14 +219,30 @@ def body_gap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: flo
         a, b = stack[waiting, 0], stack[waiting, 1]
         if ball_gap(moving, a, resting, b, work) >= best:
             continue
-        if a < 0 and b < 0:
+        if a < 0 or b < 0:
+            # An element itself, not only its ball: that of a long thin triangle reaches far.
             gap = element_gap(moving, a, resting, b, work)
-            if gap < best:
+            if gap >= best:
+                continue
+            if a < 0 and b < 0:
                 best = gap
                 work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
-        else:
-            waiting = split_pair(moving, a, resting, b, stack, waiting)
+                continue
+        before = waiting
+        waiting = split_pair(moving, a, resting, b, stack, waiting)
+        if waiting == before + 2:
+            put_nearer_last(moving, resting, stack, waiting, work)
     return best
+
+
+@inner_kernel
+def put_nearer_last(moving: BodyArrays, resting: BodyArrays, stack: Ints, waiting: int, work: SweepWork) -> None:
+    """Exchange the last two pairs that wait where the lower one is nearer: looking there first saves most."""
+    last, other = waiting - 1, waiting - 2
+    near = ball_gap(moving, stack[last, 0], resting, stack[last, 1], work)
+    if ball_gap(moving, stack[other, 0], resting, stack[other, 1], work) < near:
+        for k in range(2):
+            stack[last, k], stack[other, k] = stack[other, k], stack[last, k]
 
 
 @inner_kernel

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from clench.base.errors import CommandError, FileError
+from clench.base.files import expanded, read_file
 from clench.base.pose import Pose
 
 from .command import ClosingOrder, GraspCommand
@@ -39,13 +40,11 @@ def load_command(path: str | Path) -> GraspCommand:
     Raises:
         FileError: missing, unreadable or not JSON. CommandError: unknown, missing or malformed key.
     """
-    file = Path(path).expanduser()
+    file = expanded(path)
     try:
-        data = json.loads(file.read_bytes(), object_pairs_hook=_without_repeats)
-    except FileNotFoundError:
-        raise FileError(path, "no such file.") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
+        data = json.loads(read_file(file), object_pairs_hook=_without_repeats)
+    except FileError:
+        raise
     except CommandError as error:
         raise CommandError(f"{path}: {error}") from None
     except (ValueError, RecursionError) as error:
@@ -117,8 +116,12 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
         _check_step(hand, step, f"next_steps[{i}]")
     if command.collision_source is not None:
         _choice(command.collision_source, CollisionSource, "collision_source")
-    if isinstance(command.criteria, Mapping):
-        _weights(command.criteria, "criteria", "a weight")
+    for key in ("full_width", "check_sets", "measure"):
+        _flag(getattr(command, key), key)
+    if command.seed is not None:
+        _whole(command.seed, "seed")
+    if command.criteria is not None and not isinstance(command.criteria, Path):
+        _criteria(command.criteria, "criteria", None)
 
 
 def _check_speeds(hand: Hand, command: GraspCommand) -> None:
@@ -290,7 +293,7 @@ def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | P
     if isinstance(value, str):
         if not set(_text(value, key)) & set("./\\~"):
             return value  # the name of a preset, not a file
-        path = Path(value).expanduser()
+        path = expanded(value)
         return path if folder is None else folder / path
     return _weights(value, key, "a weight")
 

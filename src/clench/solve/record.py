@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import msgspec
 
@@ -89,7 +90,9 @@ class Record:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        if not self.path.parent.is_dir():
+        if os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path):
+            raise FileError(path, "cannot be opened (no regular file).")
+        if not os.path.isdir(self.path.parent):
             raise FileError(path, f"cannot be opened (no folder '{self.path.parent}').")
         with self._clear_errors():
             self._connection = sqlite3.connect(self.path, timeout=30.0, isolation_level=None)
@@ -132,7 +135,7 @@ class Record:
         source = f"{self.path}, solve {entry_id}"
         try:
             data = msgspec.json.decode(row[0])
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError, TypeError) as error:
             raise FileError(source, f"the document is damaged ({error}).") from None
         return solution_from_dict(data, source)
 
@@ -160,9 +163,7 @@ class Record:
         values = [*(str(v) if isinstance(v, str) else v for v in given.values()), -1 if limit is None else limit]
         with self._clear_errors():
             rows = self._connection.execute(query, values).fetchall()
-        return [
-            RecordEntry(**{**dict(zip(_COLUMNS, row, strict=True)), "status": SolutionStatus(row[4])}) for row in rows
-        ]
+        return [self._entry(row) for row in rows]
 
     def note_outcome(self, entry_id: int, *, held: bool) -> None:
         """Note what came of executing a solve: the object was held, or dropped.
@@ -184,6 +185,13 @@ class Record:
     def __len__(self) -> int:
         with self._clear_errors():
             return int(self._connection.execute("SELECT count(*) FROM solves").fetchone()[0])
+
+    def _entry(self, row: tuple[Any, ...]) -> RecordEntry:
+        """Return a row of the table as an entry; a damaged file may have anything there."""
+        try:
+            return msgspec.convert(dict(zip(_COLUMNS, row, strict=True)), RecordEntry)
+        except msgspec.ValidationError as error:
+            raise FileError(f"{self.path}, solve {row[0]!r}", f"the entry is damaged ({error}).") from None
 
     def close(self) -> None:
         """Close the file; the record cannot be used any more."""
@@ -242,6 +250,8 @@ class Record:
         """Turn the database's errors into one sentence that names the file."""
         try:
             yield
+        except (OverflowError, UnicodeDecodeError) as error:
+            raise FileError(self.path, f"the record cannot hold this ({error}).") from None
         except sqlite3.DatabaseError as error:
             text = str(error)
             if "not a database" in text:

@@ -102,6 +102,10 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
     packed = pack_object(obj)
     _check_same(solution, hand, packed, source)
     names = hand.joint_names
+    for key, given in (("open_angles", solution.open_angles), ("joint_angles", solution.joint_angles)):
+        for name in names:
+            if name not in given:
+                raise ClenchError(f"{key}: the solution has no angle of joint '{name}'.")
     opened = np.array([solution.open_angles[name] for name in names])
     final = np.array([solution.joint_angles[name] for name in names])
     closed = [hand.finger(name) for name, f in solution.fingers.items() if f.status is not FingerStatus.NO_MOTION]

@@ -109,7 +109,7 @@ def test_files_that_are_no_meshes(tmp_path, name, content, words):
 
 
 def test_a_folder_is_no_mesh(tmp_path):
-    with pytest.raises(FileError, match="is a directory"):
+    with pytest.raises(FileError, match="it is a folder, expected a file"):
         GraspObject.load(tmp_path)
 
 

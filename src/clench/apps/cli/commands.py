@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -215,7 +216,7 @@ def record(
     from .printing import print_entries, print_solution
     from .results import print_json
 
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise FileError(path, "no such record.")
     if outcome is not None and id is None:
         raise CommandError("record: --outcome belongs to a solve; give its --id.")
@@ -277,4 +278,4 @@ def first_approach(hand: Hand, obj: GraspObject, seed: int) -> Pose:
 
 def loadable(model: str) -> str:
     """Return a model's name, or the whole path when it is a file, so that it loads from anywhere."""
-    return str(Path(model).resolve()) if Path(model).is_file() else model
+    return str(Path(model).resolve()) if os.path.isfile(model) else model

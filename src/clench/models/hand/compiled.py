@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -171,7 +172,7 @@ def _stated(spec: Any, text: ModelText) -> StatedJoints:
             continue
         unit = np.deg2rad(1.0) if spec.compiler.degree else 1.0
         low, high = (float(x) for x in joint.range)
-        lengths[joint.name] = float(np.linalg.norm(joint.axis))
+        lengths[joint.name] = math.hypot(*joint.axis)
         if low > high:
             reversed_limits[joint.name] = (low * unit, high * unit)
             joint.range = (high, low)

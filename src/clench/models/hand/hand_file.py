@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from clench.base.errors import FileError, HandError
+from clench.base.files import read_text
 from clench.models.shapes import CollisionSource
 
 from .hand import JointRole
@@ -90,10 +91,8 @@ def read_hand_file(path: Path) -> HandFile:
         FileError: missing, not TOML, an unknown key or a value of another kind, with the key.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(path, f"no hand file can be read here ({error.strerror}).") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        data = tomllib.loads(read_text(path, "no hand file can be read here."))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise FileError(path, f"not TOML: {error}.") from None
     top = _Table(path, "", data)
     top.allow("palm", "collision_source", "fingers", "joints", "links", "allowed_pairs", "tendons")

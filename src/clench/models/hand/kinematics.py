@@ -205,7 +205,8 @@ def _stiffness(model: Any, joint: int) -> float | None:
         if model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT and int(model.actuator_trnid[a, 0]) == joint:
             gain, bias = float(model.actuator_gainprm[a, 0]), float(model.actuator_biasprm[a, 1])
             if model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE and gain > 0.0 and bias == -gain:
-                return gain * float(model.actuator_gear[a, 0]) ** 2
+                stiffness = gain * float(model.actuator_gear[a, 0]) ** 2
+                return stiffness if np.isfinite(stiffness) else None
     return None
 
 

@@ -16,6 +16,7 @@ from .allowed import allowed_pairs, with_given_pairs
 from .checks import check_understood
 from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
 from .coupling import FoundCouplings, Relation, find_couplings, flatten
+from .extremes import refuse_extremes
 from .findings import Finding, FindingCode, Severity, quoted
 from .finger_geometry import finger_line, tip_motion
 from .fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
@@ -79,6 +80,7 @@ def load_hand(
 def _hand_alone(text: ModelText, palm: str | None) -> tuple[CompiledModel, int, list[Finding]]:
     """Compile a model, find its palm, leave out other limbs, and give bare links something to collide with."""
     compiled = compile_model(text)
+    refuse_extremes(compiled)
     if palm is None:
         refuse_loops(compiled, None)
     body = find_palm(compiled, palm)

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from clench.base.errors import FileError
+from clench.base.files import read_file
 
 _NATIVE = (".obj", ".stl", ".msh")
 #: MuJoCo refuses larger STL files; OBJ has no such limit.
@@ -45,7 +46,7 @@ class MeshStore:
             raise FileError(self.model, f"{kind} '{named}' of {owner} is missing; looked for {looked}.")
         file = file.resolve()
         if file not in self._keys:
-            data = file.read_bytes()
+            data = read_file(file)
             suffix = file.suffix.lower()
             if is_mesh:
                 data, suffix = self._native(data, suffix, file, owner)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from clench.base.errors import FileError, UnknownNameError
+from clench.base.files import read_file
 
 from .mesh_files import MeshStore
 from .named import find_named, how_to_get_more, known_names
@@ -76,11 +78,11 @@ def find_model(model: str | Path) -> tuple[Path, bool]:
     path = Path(model)
     if not str(model).strip():
         raise UnknownNameError("hand", str(model), "the built-in hands", builtin_names())
-    if path.is_file():
+    if os.path.isfile(path):
         if path.suffix.lower() not in _SUFFIXES:
             raise FileError(model, f"expected a hand model ({', '.join(_SUFFIXES)}), got a '{path.suffix}' file.")
         return path, False
-    if path.is_dir():
+    if os.path.isdir(path):
         raise FileError(model, f"is a folder; expected a hand model file ({', '.join(_SUFFIXES)}).")
     if isinstance(model, str) and model in builtin_names():
         return _BUILTIN / f"{model}.xml", True
@@ -132,11 +134,11 @@ def read_model(model: str | Path) -> ModelText:
 
 def _parse(path: Path) -> ET.Element:
     try:
-        return ET.fromstring(path.read_bytes())
-    except ET.ParseError as error:
+        return ET.fromstring(read_file(path))
+    except FileError:
+        raise
+    except (ET.ParseError, ValueError, LookupError) as error:
         raise FileError(path, f"not well-formed XML ({error}); expected URDF or MJCF.") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror}).") from None
 
 
 def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:

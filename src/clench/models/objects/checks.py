@@ -10,13 +10,17 @@ from numpy.typing import ArrayLike
 
 from clench.base.errors import ObjectError
 from clench.base.pose import FloatArray
+from clench.base.tolerances import LARGEST_LENGTH, SMALLEST_LENGTH
 from clench.models.mesh import IntArray, TriangleMesh
+from clench.models.shapes import Shape
 
 from .topology import components, edge_defects, parted, winding_number, without_flaps
 
 #: Objects larger than this probably have units of millimetres [m]; smaller than `SMALL`, something else is wrong.
 LARGE: Final = 2.0
 SMALL: Final = 1e-3
+#: Coordinates of meshes are below this before they are scaled to metres, whatever their units are [-].
+LARGEST_COORDINATE: Final = 1e15
 #: A triangle is degenerate when its height is below this fraction of its longest side [-].
 DEGENERATE_HEIGHT: Final = 1e-10
 #: A component encloses nothing when its volume is below this fraction of its size cubed [-].
@@ -68,6 +72,23 @@ def unit_warnings(vertices: FloatArray, name: str) -> tuple[str, ...]:
     return ()
 
 
+def check_size(shape: Shape, name: str) -> None:
+    """Check that a shape has the size of a thing, in metres.
+
+    Raises:
+        ObjectError: with its size and what is expected.
+    """
+    if shape.mesh is not None:
+        sizes = [float(np.ptp(shape.mesh.vertices, axis=0).max())]
+    else:
+        sizes = [size for size in shape.size if size != 0.0]
+    if not sizes or min(sizes) < SMALLEST_LENGTH or max(sizes) > LARGEST_LENGTH:
+        raise ObjectError(
+            f"{name}: expected lengths from {SMALLEST_LENGTH:g} to {LARGEST_LENGTH:g} m, "
+            f"got {', '.join(f'{size:.4g}' for size in sizes) or 'none'}."
+        )
+
+
 def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[FloatArray, IntArray]:
     """Return vertices (V, 3) and triangles (T, 3) as arrays of the right kind.
 
@@ -78,7 +99,7 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
         points = np.asarray(vertices, dtype=np.float64)
         indices = np.asarray(triangles)
         faces = indices.astype(np.int64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ObjectError(f"{name}: expected arrays of numbers for vertices (V, 3) and triangles (T, 3).") from None
     if points.size == 0 or faces.size == 0:
         missing = "vertices" if points.size == 0 else "triangles"
@@ -92,6 +113,9 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
         raise ObjectError(
             f"{name}: {bad} of {len(points)} vertices are NaN or infinite; expected finite numbers in metres."
         )
+    largest = float(np.abs(points).max())
+    if largest > LARGEST_COORDINATE:
+        raise ObjectError(f"{name}: expected coordinates up to {LARGEST_COORDINATE:g}, got {largest:.4g}.")
     if not np.array_equal(indices, faces):
         raise ObjectError(f"{name}: expected whole numbers as vertex indices of triangles.")
     outside = (faces < 0) | (faces >= len(points))
@@ -142,8 +166,8 @@ def _manifold(faces: IntArray, vertices: int, name: str, warnings: list[str]) ->
     defects = edge_defects(faces)
     if defects.crowded:
         flat = without_flaps(faces)
-        for repaired in (flat, parted(faces, vertices), parted(flat, vertices)):
-            if len(repaired) and edge_defects(repaired).none:
+        for repaired in (flat, parted(faces, vertices), parted(flat, vertices)) if len(flat) else ():
+            if edge_defects(repaired).none:
                 if len(repaired) < len(faces):
                     dropped = _count(len(faces) - len(repaired), "triangle")
                     warnings.append(f"{name}: dropped {dropped} lying back to back.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,11 +12,12 @@ from typing import Any, Final
 import numpy as np
 
 from clench.base.errors import ObjectError, UnknownNameError
+from clench.base.files import expanded
 from clench.base.pose import Pose
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.models.tessellation import convex_hull
 
-from .checks import check_mesh, mesh_arrays, unit_warnings
+from .checks import check_mesh, check_size, mesh_arrays, unit_warnings
 from .grasp_object import Body, BodyRole, GraspObject, MeshPart
 from .mesh_file import merged, read_mesh
 from .shape_text import is_shape_text, parse_shape
@@ -68,17 +70,20 @@ def load_object(
     path: Path | None = None
     if isinstance(model, str) and model in BUILTIN:
         name, body = model, BUILTIN[model]()
-    elif isinstance(model, str) and is_shape_text(model) and not Path(model).exists():
+    elif isinstance(model, str) and is_shape_text(model) and not os.path.exists(model):
         name, body = model, shape_body(parse_shape(model))
     else:
-        path = Path(model).expanduser()
+        path = expanded(model)
         _refuse_bare_name(model, path)
         name = path.stem
         vertices, triangles = read_mesh(path)
         checked = check_mesh(vertices, triangles, path.name)
         body = Body(name, (Shape(ShapeKind.MESH, mesh=checked.mesh, name=name),), closed=checked.closed)
         warnings = checked.warnings
-    body = in_source(scaled_body(body, factor), source)
+    body = scaled_body(body, factor)
+    for shape in body.shapes:
+        check_size(shape, path.name if path else name)
+    body = in_source(body, source)
     warnings += unit_warnings(_body_points(body), path.name if path else name)
     return GraspObject(name, (body,), pose or Pose.identity(), source, warnings, path)
 
@@ -90,6 +95,7 @@ def object_from_shape(
     source = collision_source_named(collision_source)
     made = parse_shape(shape) if isinstance(shape, str) else shape
     body, warnings = _checked_shape(made, name or made.name or str(made.kind), role_named(role))
+    check_size(made, body.name)
     body = in_source(body, source)
     warnings += unit_warnings(_body_points(body), body.name)
     return GraspObject(body.name, (body,), pose or Pose.identity(), source, warnings)
@@ -111,6 +117,7 @@ def object_from_meshes(
         label = part.name or f"{name}[{i}]"
         checked = check_mesh(*merged(*mesh_arrays(part.vertices, part.triangles, label)), label)
         shape = Shape(ShapeKind.MESH, pose=part.pose or Pose.identity(), mesh=checked.mesh, name=label)
+        check_size(shape, label)
         bodies.append(in_source(Body(label, (shape,), role_named(part.role), closed=checked.closed), source))
         warnings.extend(checked.warnings)
     if not bodies:
@@ -218,7 +225,7 @@ def _scale(scale: float) -> float:
 
 def _refuse_bare_name(model: str | Path, path: Path) -> None:
     """Take a word without suffix or folder for a misspelt built-in name rather than for a missing file."""
-    if isinstance(model, str) and not path.suffix and len(path.parts) <= 1 and not path.exists():
+    if isinstance(model, str) and not path.suffix and len(path.parts) <= 1 and not os.path.exists(path):
         raise UnknownNameError("object", model, "the built-in objects, and there is no such file", BUILTIN)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,9 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.base.errors import FileError
+from clench.base.files import read_file
 from clench.base.pose import FloatArray
 from clench.models.mesh import IntArray
 
+#: Below this there is nothing to merge by: the check of sizes will refuse it [-].
+SMALLEST_COORDINATE: Final = 1e-100
 SUFFIXES: Final = (".obj", ".stl", ".ply", ".off", ".glb")
 
 
@@ -24,13 +28,9 @@ def read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
         FileError: missing, a directory, not one of `SUFFIXES`, not a mesh.
     """
     suffix = path.suffix.lower()
-    if path.is_dir():
-        raise FileError(path, "is a directory; expected a mesh file.")
-    if not path.exists():
-        raise FileError(path, "no such file.")
-    if suffix not in SUFFIXES:
+    if os.path.exists(path) and not os.path.isdir(path) and suffix not in SUFFIXES:
         raise FileError(path, f"cannot read '{suffix or path.name}'; expected one of {', '.join(SUFFIXES)}.")
-    if path.stat().st_size == 0:
+    if not read_file(path):
         raise FileError(path, "the file is empty.")
     loaded = _parse(path, suffix[1:])
     vertices, triangles = np.asarray(loaded.vertices), np.asarray(getattr(loaded, "faces", ()))
@@ -52,6 +52,8 @@ def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntAr
     if not np.isfinite(points).all() or faces.size == 0 or faces.min() < 0 or faces.max() >= len(points):
         return points, faces
     largest = float(np.abs(points).max(initial=0.0))
+    if largest < SMALLEST_COORDINATE:
+        return points, faces
     mesh = trimesh.Trimesh(points, faces, process=False, validate=False)
     digits = 8 - int(np.floor(np.log10(largest))) if largest > 0 else 8
     mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=digits)

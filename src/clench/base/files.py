@@ -1,0 +1,56 @@
+"""Read files whole: whatever is no readable file becomes one sentence."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from .errors import FileError
+
+
+def read_file(path: str | Path, missing: str = "no such file.") -> bytes:
+    """Return what a file has.
+
+    Args:
+        path: the file. missing: what to say where there is none.
+
+    Raises:
+        FileError: missing, a folder, a pipe or a device, or unreadable.
+    """
+    try:
+        mode = os.stat(path).st_mode
+        if stat.S_ISDIR(mode):
+            raise FileError(path, "cannot be read: it is a folder, expected a file.")
+        if not stat.S_ISREG(mode):
+            # Reading a pipe or a device may never end.
+            raise FileError(path, "cannot be read: it is a pipe or a device, expected a file.")
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise FileError(path, missing) from None
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
+    except FileError:
+        raise
+    except ValueError as error:
+        raise FileError(path, f"is no path of a file ({error}).") from None
+
+
+def expanded(path: str | Path) -> Path:
+    """Return a path with the home folder in place of its `~`, where that is known."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
+
+
+def read_text(path: str | Path, missing: str = "no such file.") -> str:
+    """Return the text of a file in UTF-8; see `read_file`.
+
+    Raises:
+        FileError: as `read_file`, or not UTF-8.
+    """
+    try:
+        return read_file(path, missing).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileError(path, f"not text in UTF-8 ({error.reason} at byte {error.start}).") from None

@@ -1,0 +1,52 @@
+"""Refuse numbers in a hand model that are no hand's, by the name of the joint or link that has them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clench.base.errors import HandError
+from clench.base.tolerances import LARGEST_LENGTH
+
+from .compiled import CompiledModel
+
+#: No joint turns farther, whatever its limits are placeholders for [rad].
+LARGEST_ANGLE = 1e6
+
+
+def refuse_extremes(compiled: CompiledModel) -> None:
+    """Check that lengths and angles of a model are finite and of a size that can be computed with.
+
+    Raises:
+        HandError: with the joint or link.
+    """
+    m = compiled.model
+    for j in range(m.njnt):
+        angles = (*m.jnt_range[j], m.qpos0[m.jnt_qposadr[j]])
+        if not np.abs(angles).max() <= LARGEST_ANGLE:
+            name = compiled.joint_name(j)
+            raise HandError(
+                f"{compiled.label}: joint '{name}' has limits {angles[0]:.6g} to {angles[1]:.6g} rad; "
+                f"expected angles up to {LARGEST_ANGLE:g} rad."
+            )
+        _check(compiled, int(m.jnt_bodyid[j]), m.jnt_pos[j], "a joint")
+    for body in range(m.nbody):
+        _check(compiled, body, m.body_pos[body], "its place")
+    for geom in range(m.ngeom):
+        mesh = int(m.geom_dataid[geom]) if m.geom_type[geom] == _mesh_type() else -1
+        first = int(m.mesh_vertadr[mesh]) if mesh >= 0 else 0
+        points = m.mesh_vert[first : first + int(m.mesh_vertnum[mesh])] if mesh >= 0 else m.geom_size[geom]
+        _check(compiled, int(m.geom_bodyid[geom]), np.append(m.geom_pos[geom], points), "a shape")
+
+
+def _mesh_type() -> int:
+    import mujoco
+
+    return int(mujoco.mjtGeom.mjGEOM_MESH)
+
+
+def _check(compiled: CompiledModel, body: int, lengths: np.ndarray, what: str) -> None:
+    if not np.abs(lengths).max(initial=0.0) <= LARGEST_LENGTH:
+        raise HandError(
+            f"{compiled.label}: {what} of link '{compiled.body_name(body)}' has lengths that are not finite, "
+            f"or above {LARGEST_LENGTH:g} m."
+        )

@@ -1,0 +1,32 @@
+"""Numbers that are no hand's are refused by name."""
+
+import pytest
+
+import clench
+from fuzz.originals import MJCF, URDF, link_stl
+
+
+def load(folder, text, suffix=".urdf"):
+    (folder / "link.stl").write_bytes(link_stl())
+    model = folder / f"pincer{suffix}"
+    model.write_text(text)
+    return clench.Hand.load(model)
+
+
+def test_what_they_start_from_loads(tmp_path):
+    assert [f.name for f in load(tmp_path, URDF).fingers] == ["index", "thumb"]
+    assert len(load(tmp_path, MJCF, ".xml").fingers) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('lower="-0.2" upper="1.5"', 'lower="-0.2" upper="1e300"', r"joint 'thumb_a' has limits -0.2 to 1e\+300 rad"),
+        ('xyz="0.04 0 0"', 'xyz="1e12 0 0"', "its place of link 'index_distal' has lengths that are not finite"),
+        ('sphere radius="0.01"', 'sphere radius="1e10"', "a shape of link 'thumb' has lengths"),
+    ],
+)
+def test_extreme_numbers(tmp_path, old, new, message):
+    assert old in URDF
+    with pytest.raises(clench.HandError, match=message):
+        load(tmp_path, URDF.replace(old, new))
