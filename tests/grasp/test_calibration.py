@@ -138,7 +138,5 @@ def test_negative_weights_of_a_command_are_refused():
 def test_numbers_whose_sums_would_overflow_are_refused(tmp_path, table, number):
     path = tmp_path / "calibration.toml"
     path.write_text(f"[{table}]\nrange_of_motion = {number}\n")
-    with pytest.raises(
-        FileError, match=rf"{table}\.range_of_motion: expected a .*number.*, between 1e-12 and 1e\+12 in size"
-    ):
+    with pytest.raises(FileError, match=rf"{table}\.range_of_motion: .*, between 1e-12 and 1e\+12 in size"):
         load_calibration(path)
