@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import clench
-from chain_hands import HandBuilder, along_x, mount, three_links, turned
+from chain_hands import HandBuilder, along_x, mount, one_link, three_links, turned
 from clench.base.errors import CommandError, HandError, UnknownNameError
 from clench.base.pose import Pose
 
@@ -196,3 +196,22 @@ def test_touches_of_an_object_with_more_elements_than_triangles():
         away = contact.position - lying.position
         assert np.hypot(away[0], away[2]) == pytest.approx(0.02, abs=1e-5)
         assert abs(away[1]) <= 0.0005 + 1e-9
+
+
+def test_the_pose_sensitivity_of_a_set_is_that_of_the_solution():
+    solution = clench.solve(three_links(), BALL, command(criteria={"pose_sensitivity": 1.0}))
+    index = solution.fingers["index"]
+    linear = clench.sensitivity(solution, three_links(), BALL)
+    expected = np.linalg.norm(linear.translation, axis=1).max()
+    assert np.isfinite(expected)
+    assert index.candidates[index.chosen].scores["pose_sensitivity"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_pose_sensitivity_of_one_link_on_a_ball_is_the_closed_form():
+    """A link that turns onto a ball at distance D moves by 1 / sqrt(D² - (R + w)²) per shift across it."""
+    hand, distance = one_link(), 0.06
+    ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([distance * np.cos(1.2), 0.0, distance * np.sin(1.2)]))
+    solution = clench.solve(hand, ball, command(criteria={"pose_sensitivity": 1.0}))
+    (finger,) = solution.fingers.values()
+    found = finger.candidates[finger.chosen].scores["pose_sensitivity"]
+    assert found == pytest.approx(1.0 / np.sqrt(distance**2 - 0.028**2), rel=1e-6)

@@ -30,6 +30,7 @@ class Setting:
         joint_weights: of the joints in the range of motion, shape (J,); None is 1 for all.
         obj: the object, its friction and mass; None where only its surface counts.
         gravity: its direction in the palm frame, unit, shape (3,).
+        in_stages: fingers close proximal first, once, so that what stopped a joint can be found again.
         kept: what a criterion wants to keep from one set to the next; emptied with every solve.
     """
 
@@ -42,6 +43,7 @@ class Setting:
     joint_weights: FloatArray | None = None
     obj: GraspObject | None = None
     gravity: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
+    in_stages: bool = True
     kept: dict[Any, Any] = field(default_factory=dict)
 
 

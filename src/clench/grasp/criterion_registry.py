@@ -17,6 +17,7 @@ from .finger_criteria import (
     NextStepDistance,
     NextStepTime,
     PadIndentation,
+    PoseSensitivity,
     RangeOfMotion,
     TouchingLinks,
 )
@@ -38,6 +39,7 @@ _registry: dict[str, Criterion | HandCriterion] = {
         NextStepDistance(),
         PadIndentation(),
         Clearance(),
+        PoseSensitivity(),
         Steadiness(),
         ActuationForce(),
         ActuationForceAnyWay(),

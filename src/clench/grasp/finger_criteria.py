@@ -6,12 +6,15 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from clench.base.pose import Pose
 from clench.models.hand.hand import DEFAULT_SPEED
 from clench.models.objects.grasp_object import BodyRole
 
 from .candidates import FingerCandidate
 from .criteria import Setting, own_angles
+from .pose_change import PoseChange
 from .reach import nearest_link, obstacle_body
+from .stages import closing_stages
 
 #: More clearance than this is no better [m].
 MOST_CLEARANCE: Final = 0.05
@@ -134,6 +137,30 @@ class Clearance:
         body = obstacle_body(setting.obj)
         gap, _ = nearest_link(setting.hand, candidate.q, links, setting.source, body, there)
         return min(gap, MOST_CLEARANCE)
+
+
+class PoseSensitivity:
+    """Largest change of a closing joint when the object is shifted, in the worst direction: errors of a camera."""
+
+    name: ClassVar[str] = "pose_sensitivity"
+    unit: ClassVar[str] = "rad/m"
+    source: ClassVar[str] = "METHOD.md section 5: sensitivity"
+    scale: ClassVar[float] = 50.0
+    larger_is_better: ClassVar[bool] = False
+
+    def score(self, candidate: FingerCandidate, setting: Setting) -> float | None:
+        """Return max |dq/dx| [rad/m]; None where a joint's is not known, and for other closing orders."""
+        s = setting
+        if s.packed is None or s.T_palm_object is None or s.source is None or not s.in_stages or candidate.overlap:
+            return None
+        opened = candidate.plan.posture
+        stages = closing_stages(s.hand, [candidate.plan.finger], opened, candidate.q)
+        rows = PoseChange(s.hand, s.packed, s.source, Pose.identity(), Pose.from_matrix(s.T_palm_object), stages)
+        for number, stage in enumerate(stages):
+            rows.add(number, stage, opened[stage.leader])
+        if not rows.known[:, :3].all():
+            return None
+        return float(np.linalg.norm(rows.change[:, :3], axis=1).max())
 
 
 class PadIndentation:

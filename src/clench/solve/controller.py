@@ -173,6 +173,7 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         weights if calibration.joints else None,
         problem.obj,
         problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
+        problem.command.order is ClosingOrder.PROXIMAL_FIRST and problem.command.rounds == 1,
     )
 
 
