@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from clench.base.pose import FloatArray
+from clench.base.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
@@ -127,3 +128,21 @@ def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -
         max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)
         for sizes in ([(s.kind, s.size) for s in shapes], packed.round_sizes)
     )
+
+
+def tilt_deviation(hand: Hand, plan: FingerPlan) -> float:
+    """Return how far links of a finger may get from where they are swept [m]: 0 but for coupled joints out of parallel.
+
+    Coupled joints turn about their family's axis `a'`, tilted by δ from their own `a`. With `R' = Q R Qᵀ`, Q the tilt,
+    `‖R' - R‖ ≤ 2 ‖Q - I‖ ‖R - I‖ ≤ 4 δ sin(θ/2)` for a turn of θ; that many lengths of the finger, joint by joint.
+    """
+    poses = hand.link_poses(plan.posture)
+    mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
+    total = 0.0
+    for p in plan.joints:
+        own = poses[mover[p.joint]][:3, :3] @ hand.joints[p.joint].axis
+        tilt = float(np.linalg.norm(np.cross(own, plan.families[p.family].T_palm_family[:3, 1])))
+        if tilt > PARALLEL_ANGLE:
+            turn = min(abs(p.rate) * (p.stop - p.start), np.pi)
+            total += 4.0 * tilt * float(np.sin(0.5 * turn)) * plan.length
+    return total
