@@ -137,6 +137,12 @@ def test_no_contacts_are_an_answer_not_an_error(grip) -> None:
     assert json.loads(json.dumps(plan.to_dict()))["forces"] == []
 
 
+def test_nothing_to_hold_takes_no_torque(grip) -> None:
+    effort = clench.grasp_quality(grip[2], grip[0], grip[1], mass=0.0).effort
+    assert effort.worst_torque == pytest.approx(0.0, abs=1e-9)
+    assert effort.worst_tension == pytest.approx(5.0, abs=1e-6)  # taut
+
+
 def test_passed_contacts_and_obstacles_do_not_hold(grip) -> None:
     hand, ball, solution = grip
     first, *rest = solution.contacts

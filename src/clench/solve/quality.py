@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.grasp.mechanics.actuation import Actuation, Effort, actuation
@@ -113,14 +112,15 @@ def grasp_quality(
         center_of_mass=center_of_mass,
     )
     held = grasp.held
+    ball = epsilon(held, norm, edges)
     least = Effort.TORQUE if held.drive is None else Effort.TENSION
     return GraspQuality(
         grasp=grasp,
-        norm=WrenchNorm(norm) if norm in list(WrenchNorm) else WrenchNorm.L1,
+        norm=WrenchNorm(norm),
         edges=edges,
-        epsilon=epsilon(held, norm, edges),
+        epsilon=ball,
         volume=volume_l1(held.edge_wrenches(edges)) if len(held.contacts) else 0.0,
         within_torques=epsilon_within_torques(held, edges) if within_torques else None,
         mass=float(mass),
-        effort=actuation(held, loads, least) if np.any(loads) else actuation(held, np.zeros((1, 6)), least),
+        effort=actuation(held, loads, least),
     )

@@ -25,6 +25,7 @@ from clench.grasp.mechanics.loads import (
     weight,
 )
 from clench.grasp.mechanics.squeeze import squeeze_forces
+from clench.grasp.mechanics.tendons import TendonDrive
 
 from .held_cases import around_the_equator, directions, random_held, with_joints
 
@@ -265,3 +266,26 @@ def test_malformed_loads_are_refused_in_one_sentence() -> None:
     for margin in (0.0, -1.0, np.nan):
         with pytest.raises(CommandError, match=r"margin: expected a finite number above 0"):
             squeeze_forces(pinch(), weight(0.1, [0, 0, -1]), six_pulls(1.0), enough=margin)
+
+
+def test_an_effort_that_the_hand_does_not_have_is_refused() -> None:
+    load = weight(0.1, [0.0, 0.0, -1.0])
+    with pytest.raises(CommandError, match=r"effort: the hand has no tendons"):
+        actuation(pinch(), load, "tension")
+    with pytest.raises(CommandError, match=r"effort: expected one of torque, tension, got 'energy'"):
+        actuation(pinch(), load, "energy")
+
+
+def test_least_tension_of_a_pinch_in_closed_form() -> None:
+    """Each finger needs 1.96 N of normal force at an arm of 5 cm; its flexor pulls at 1 cm, against a taut extensor."""
+    arms = np.array([[0.01, -0.008, 0.0, 0.0], [0.0, 0.0, 0.01, -0.008]])
+    drive = TendonDrive(("joint_0", "joint_1"), (0, 1), arms, np.full(4, 2.0), np.full(4, 50.0))
+    load = weight(0.2, [0.0, 0.0, -1.0])
+    answer = actuation(replace(pinch(), drive=drive), load, "tension")
+    torque = 0.2 * GRAVITY / 2.0 / 0.5 * 0.05
+    assert answer.worst_tension == pytest.approx((torque + 0.008 * 2.0) / 0.01, rel=1e-6)
+    assert answer.plans[0].tensions[[1, 3]] == pytest.approx([2.0, 2.0], abs=1e-6)
+    weak = replace(pinch(), drive=replace(drive, t_max=np.full(4, 10.0)))
+    assert actuation(weak, load, "tension").reason == (
+        "Tendons bind: no tensions within their limits give the torques of 'joint_0', 'joint_1'."
+    )
