@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_driver import FakeDriver
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from clench.base.errors import CommandError, UnknownNameError
@@ -287,6 +287,7 @@ def test_wrong_commands_are_refused(sent: JointPath, message: str) -> None:
         CHECK.command(sent, {"a": 0.0, "b": 0.0})
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-3, 3), st.floats(-100, 200)), min_size=1, max_size=6),
     st.floats(-1, 1),
@@ -319,6 +320,7 @@ def test_states_are_checked() -> None:
         CHECK.state(HandState({"a": 0.0, "b": 20.0}), {"a": 0.0, "b": 0.0})
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.floats(-2, 2), min_size=2, max_size=8), st.floats(0.1, 5))
 def test_slowing_down_keeps_the_path_and_the_limit(angles: list[float], speed: float) -> None:
     times = np.arange(len(angles)) * 0.1
@@ -337,6 +339,7 @@ def test_way_points_that_are_next_to_each_other_are_one() -> None:
     assert plan.positions[:, 0].tolist() == [0.0, 2.0, 4.0, 6.0]
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.floats(0, 2), st.floats(0.05, 1))
 def test_a_window_is_the_plan_seen_from_now(moment: float, horizon: float) -> None:
     plan = TimedPlan(("a",), np.array([0.0, 0.5, 0.7, 1.5]), np.array([[0.0], [1.0], [0.2], [0.4]]))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
@@ -51,6 +51,7 @@ def test_without_a_map_followers_are_left_to_the_mechanism(pincer: Hand) -> None
     assert list(joint_map_from_dict({"joints": {"index": {}, "thumb": {}}}).of(pincer)) == ["thumb", "index"]
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.floats(-4, 4), st.floats(0.1, 1000), st.sampled_from([1, -1]), st.floats(-500, 500))
 def test_there_and_back(angle: float, scale: float, direction: int, offset: float) -> None:
     joint = joint_map_from_dict({"joints": {"a": {"scale": scale, "direction": direction, "offset": offset}}}).joints

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import clench
@@ -98,6 +98,7 @@ def test_moveit_grasp_has_the_fields_of_the_message(placed: GraspSolution, tmp_p
     assert set(grasp["grasp_posture"]["points"][0]) == set(point)
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7), st.lists(st.floats(-3, 3), min_size=2, max_size=2))
 def test_any_numbers_come_back_to_the_bit(tmp_path_factory: Any, numbers: list[float], angles: list[float]) -> None:
     folder = tmp_path_factory.mktemp("g")
