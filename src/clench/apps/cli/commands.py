@@ -36,7 +36,7 @@ def demo(
 
     Args:
         out: folder for the files.
-        hand: built-in name, or path to a .urdf or .xml file.
+        hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         seed: try the approach poses of this seed instead of the kept pose of the built-in hand on the mug.
         json: print the solution as one JSON document, and nothing else, on standard output.
@@ -72,7 +72,7 @@ def solve(
     """Compute contacts and joint angles for one hand, object and command.
 
     Args:
-        hand: built-in name, or path to a .urdf or .xml file.
+        hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         command: command file (JSON); without it the hand is placed at the first approach pose of --seed.
         hand_file: TOML file that overrides what was found in the hand's model.
@@ -158,7 +158,7 @@ def hand(
     """Show what was understood of a hand, check it, and say what to do: fingers, roles, coupling, findings.
 
     Args:
-        model: built-in name, or path to a .urdf or .xml file.
+        model: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         hand_file: TOML file that overrides what was found in the model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         collision_source: geometry to use.
