@@ -114,7 +114,7 @@ def test_a_hand_that_need_not_move(pincer: Hand, pinch: GraspSolution) -> None:
     assert trajectory.to_dict()["points"] == [{"time": 0.0, "phase": "touch", "positions": [0.0, 0.0, 0.0]}]
 
 
-@pytest.mark.parametrize("speed", [0.0, -1.0, 1.5, np.nan])
+@pytest.mark.parametrize("speed", [0.0, -1.0, 1.5, np.nan, 5e-324])
 def test_bad_speed(pincer: Hand, pinch: GraspSolution, speed: float) -> None:
     with pytest.raises(CommandError, match="speed: expected a fraction above 0 and up to 1"):
         plan_trajectory(pinch, pincer, speed=speed)

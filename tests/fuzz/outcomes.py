@@ -16,7 +16,7 @@ import numpy as np
 from clench.base.errors import ClenchError
 
 #: No input may take longer [s].
-SLOW = 10.0
+SLOW = 60.0
 #: No sentence may be longer; lists of names are cut to this.
 LONG = 3000
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 #: A trial that has not ended after this long never will [s].
-PATIENCE = 20.0
+PATIENCE = 120.0
 #: The first trial of a process may have to compile kernels [s].
 FIRST_PATIENCE = 400.0
 

@@ -72,7 +72,7 @@ def hand_model(rng: Rng, folder: Path) -> Trial:
         hand = clench.Hand.load(model)
         return [hand, solved(hand, good()[1], rng) if solves else None]
 
-    return Trial("hand model", run, ("pincer", "palm", "index", "thumb", "link", "joint"))
+    return Trial("hand model", run, ("pincer", "palm", "index", "thumb", "link", "joint", "tendons"))
 
 
 def hand_file(rng: Rng, folder: Path) -> Trial:

@@ -19,6 +19,8 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 SCHEMA = "clench.trajectory/1"
+#: No smaller fraction of the velocity limits makes sense, or can be computed with [-].
+SLOWEST = 1e-6
 #: Way-points per stage; speed rises from zero and falls to zero within each.
 STAGE_STEPS = 8
 #: Joints that move less than this stand still [rad].
@@ -104,8 +106,8 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
     Raises:
         CommandError: the solution is of another hand, lacks a joint, or `speed` is out of range.
     """
-    if not 0.0 < speed <= 1.0:
-        raise CommandError(f"speed: expected a fraction above 0 and up to 1, got {speed}.")
+    if not SLOWEST <= speed <= 1.0:
+        raise CommandError(f"speed: expected a fraction above 0 and up to 1, at least {SLOWEST:g}, got {speed}.")
     start, end = (
         posture(solution.open_angles, hand, "open_angles"),
         posture(solution.joint_angles, hand, "joint_angles"),

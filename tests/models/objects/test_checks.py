@@ -182,3 +182,11 @@ def test_the_winding_number_is_one_inside_and_zero_outside(point):
         assert winding_number(np.array(point), mesh.vertices, mesh.triangles) == pytest.approx(
             float(reach < 1.0), abs=1e-6
         )
+
+
+@pytest.mark.parametrize("triangles", [[[0.0, 1.0, float("nan")]], [[0, 1, 10**30]], [[0.5, 1.0, 2.0]]])
+def test_indices_that_are_no_whole_numbers(triangles):
+    with pytest.raises(
+        ObjectError, match=r"thing: (expected whole numbers|expected arrays of numbers|a triangle names)"
+    ):
+        check_mesh(np.eye(3), triangles, "thing")

@@ -16,6 +16,8 @@ from .kinematics import Skeleton, fixed_tendon
 
 _NONLINEAR = 1e-12
 _CONTRADICTION = 1e-9
+#: Ratios [-], their inverses, and offsets [rad] are at most this.
+_LARGEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,7 @@ def flatten(relations: list[Relation], names: list[str], label: str) -> tuple[Co
         known[root] = (root, 1.0, 0.0)
         pending = _spread(known, reasons, pending)
     for r in relations:
+        _check_size(r, names, label)
         _check(r, known, names, label)
     return tuple(
         Coupling(leader, joint, ratio, offset, reasons[joint].breakaway, reasons[joint].reason)
@@ -128,6 +131,15 @@ def _spread(
             progress = True
         pending = rest
     return pending
+
+
+def _check_size(r: Relation, names: list[str], label: str) -> None:
+    """Refuse a ratio or an offset that cannot be computed with."""
+    if not (r.ratio == 0.0 or 1.0 / _LARGEST <= abs(r.ratio) <= _LARGEST) or not abs(r.offset) <= _LARGEST:
+        raise HandError(
+            f"{label}: joint '{names[r.follower]}' is coupled by a ratio of {r.ratio:g} and an offset of {r.offset:g} "
+            f"rad; expected a ratio of 0 or of {1.0 / _LARGEST:g} to {_LARGEST:g}, and no larger offset ({r.reason})."
+        )
 
 
 def _check(r: Relation, known: Mapping[int, tuple[int, float, float]], names: list[str], label: str) -> None:

@@ -28,6 +28,8 @@ def refuse_extremes(compiled: CompiledModel) -> None:
                 f"{compiled.label}: joint '{name}' has limits {angles[0]:.6g} to {angles[1]:.6g} rad; "
                 f"expected angles up to {LARGEST_ANGLE:g} rad."
             )
+        if not np.isfinite(m.jnt_axis[j]).all():
+            raise HandError(f"{compiled.label}: joint '{compiled.joint_name(j)}' has an axis that is not finite.")
         _check(compiled, int(m.jnt_bodyid[j]), m.jnt_pos[j], "a joint")
     for body in range(m.nbody):
         _check(compiled, body, m.body_pos[body], "its place")

@@ -98,7 +98,8 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
     try:
         points = np.asarray(vertices, dtype=np.float64)
         indices = np.asarray(triangles)
-        faces = indices.astype(np.int64)
+        with np.errstate(invalid="ignore"):  # what is no number is refused below
+            faces = indices.astype(np.int64)
     except (TypeError, ValueError, OverflowError):
         raise ObjectError(f"{name}: expected arrays of numbers for vertices (V, 3) and triangles (T, 3).") from None
     if points.size == 0 or faces.size == 0:
