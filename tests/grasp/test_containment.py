@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import clench
-from chain_hands import HandBuilder, along_x
+from chain_hands import HandBuilder, along_x, mount
 from clench.base.pose import Pose
-from clench.grasp.containment import contained_link
+from clench.grasp.containment import contained_link, link_within_link
+from clench.grasp.exact import hand_bodies
 from clench.grasp.parts import part_points
 from clench.grasp.scene import pack_object
 from clench.kernels.tree import build_tree
@@ -61,3 +62,19 @@ def test_a_point_of_every_part():
     points = part_points(build_tree(vertices, triangles))
     assert sorted(np.round(points[:, 0] / 10.0)) == [0.0, 1.0, 2.0]
     assert part_points(build_tree(np.empty((0, 3)), np.empty((0, 3)))).shape == (0, 3)
+
+
+@pytest.mark.parametrize(("away", "found"), [(0.0, True), (0.02, True), (0.2, False)])
+def test_a_link_within_another_is_found_from_either_side(away, found):
+    for first in (True, False):
+        builder = HandBuilder()
+        thick = ("thick", [along_x(0.04, 0.05)], [0.05])
+        thin = ("thin", [along_x(0.004, 0.03)], [0.03])
+        for name, shapes, lengths in (thick, thin) if first else (thin, thick):
+            builder.finger(name, shapes, lengths, base=mount((0.0, away if name == "thin" else 0.0, 0.0)))
+        hand = builder.hand()
+        links = {name: hand.link_index(f"{name}_link_0") for name in ("thick", "thin")}
+        across = hand_bodies(hand, CollisionSource.ENGINE).across
+        pair = link_within_link(hand, np.zeros(2), CollisionSource.ENGINE, across)
+        assert pair == ((links["thin"], links["thick"]) if found else None)
+        assert link_within_link(hand, np.zeros(2), CollisionSource.ENGINE, np.zeros_like(across)) is None

@@ -73,17 +73,21 @@ def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked
     """
     from clench.kernels.distance import is_inside
 
-    poses = hand.link_poses(q)
     meshes = link_meshes(hand, source)
-    for outer in meshes:
-        T = poses[outer.link]
-        for inner in meshes:
-            if checked[inner.link, outer.link]:
-                points = inner.points @ poses[inner.link][:3, :3].T + poses[inner.link][:3, 3]
-                points = (points - T[:3, 3]) @ T[:3, :3]
-                for p in points[np.linalg.norm(points - outer.center, axis=1) <= outer.radius]:
-                    if is_inside(outer.tree, (p[0], p[1], p[2]), outer.closed):
-                        return inner.link, outer.link
+    links = np.array([mesh.link for mesh in meshes], dtype=np.int64)
+    poses = hand.link_poses(q)[links]
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.points) for mesh in meshes])
+    centers = np.einsum("mij,mj->mi", poses[:, :3, :3], np.reshape([m.center for m in meshes], (-1, 3)))
+    centers += poses[:, :3, 3]
+    points = np.concatenate([np.empty((0, 3)), *(mesh.points for mesh in meshes)])
+    points = np.einsum("pij,pj->pi", poses[owner, :3, :3], points) + poses[owner, :3, 3]
+    # Most points are outside of the balls around the other links.
+    near = np.linalg.norm(centers[:, None] - points, axis=2) <= np.reshape([m.radius for m in meshes], (-1, 1))
+    near &= checked[np.ix_(links[owner], links)].T != 0
+    for m, k in zip(*np.nonzero(near), strict=True):
+        p = (points[k] - poses[m, :3, 3]) @ poses[m, :3, :3]
+        if is_inside(meshes[m].tree, (p[0], p[1], p[2]), meshes[m].closed):
+            return int(links[owner[k]]), int(links[m])
     return None
 
 
