@@ -24,6 +24,11 @@ def test_what_they_start_from_loads(tmp_path):
         ('lower="-0.2" upper="1.5"', 'lower="-0.2" upper="1e300"', r"joint 'thumb_a' has limits -0.2 to 1e\+300 rad"),
         ('xyz="0.04 0 0"', 'xyz="1e12 0 0"', "its place of link 'index_distal' has lengths that are not finite"),
         ('multiplier="0.8"', 'multiplier="5e-324"', "joint 'index_b' is coupled by a ratio of 4.94066e-324"),
+        (
+            '<axis xyz="0 -1 0"/><limit lower="-0.2"',
+            '<axis xyz="0 1e308 0"/><limit lower="-0.2"',
+            "'thumb_a' has an axis",
+        ),
         ('sphere radius="0.01"', 'sphere radius="1e10"', "a shape of link 'thumb' has lengths"),
     ],
 )

@@ -186,5 +186,5 @@ def test_the_winding_number_is_one_inside_and_zero_outside(point):
 
 @pytest.mark.parametrize("triangles", [[[0.0, 1.0, float("nan")]], [[0, 1, 10**30]], [[0.5, 1.0, 2.0]]])
 def test_indices_that_are_no_whole_numbers(triangles):
-    with pytest.raises(ObjectError, match="thing: (expected whole|expected arrays|a triangle names)"):
+    with pytest.raises(ObjectError, match=r"thing: (expected whole|expected arrays|a triangle names)"):
         check_mesh(np.eye(3), triangles, "thing")

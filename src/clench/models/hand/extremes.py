@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from clench.base.errors import HandError
@@ -11,6 +13,7 @@ from .compiled import CompiledModel
 
 #: No joint turns farther, whatever its limits are placeholders for [rad].
 LARGEST_ANGLE = 1e6
+_UNIT = 1e-6
 
 
 def refuse_extremes(compiled: CompiledModel) -> None:
@@ -28,8 +31,9 @@ def refuse_extremes(compiled: CompiledModel) -> None:
                 f"{compiled.label}: joint '{name}' has limits {angles[0]:.6g} to {angles[1]:.6g} rad; "
                 f"expected angles up to {LARGEST_ANGLE:g} rad."
             )
-        if not np.isfinite(m.jnt_axis[j]).all():
-            raise HandError(f"{compiled.label}: joint '{compiled.joint_name(j)}' has an axis that is not finite.")
+        # MuJoCo makes axes unit, but for numbers that overflow on the way.
+        if not abs(math.hypot(*m.jnt_axis[j]) - 1.0) < _UNIT:
+            raise HandError(f"{compiled.label}: joint '{compiled.joint_name(j)}' has an axis that has no direction.")
         _check(compiled, int(m.jnt_bodyid[j]), m.jnt_pos[j], "a joint")
     for body in range(m.nbody):
         _check(compiled, body, m.body_pos[body], "its place")
