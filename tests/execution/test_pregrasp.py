@@ -30,12 +30,26 @@ def gaps(hand, ball, solution, angles) -> dict[str, float]:
     return {f.name: nearest_link(hand, q, f.links, source, body, T)[0] for f in hand.fingers}
 
 
+def least_lift(hand, solution, angles, finger: str) -> float:
+    """How far the touching points of a finger came off the tangent planes, from the poses of its links."""
+    before, after = (
+        hand.link_poses(np.array([a[name] for name in hand.joint_names])) for a in (solution.joint_angles, angles)
+    )
+    lifts = []
+    for c in solution.contacts:
+        if c.finger == finger and not c.passed:
+            link = hand.link_index(c.link)
+            T = solution.hand_pose.matrix @ after[link] @ invert(before[link]) @ invert(solution.hand_pose.matrix)
+            lifts.append((T @ np.append(c.position, 1.0))[:3] @ c.normal - c.position @ c.normal)
+    return min(lifts)
+
+
 @pytest.mark.parametrize("clearance", [0.001, 0.005])
 def test_touching_fingers_stand_off_by_the_clearance(grip, clearance: float) -> None:
     hand, ball, solution = grip
     touching = {c.finger for c in solution.contacts if not c.passed}
     assert touching
-    before, after = solution.joint_angles, clench.plan_pregrasp(solution, hand, ball, clearance=clearance)
+    before, after = solution.joint_angles, clench.plan_pregrasp(solution, hand, clearance=clearance)
     at_touch, off = gaps(hand, ball, solution, before), gaps(hand, ball, solution, after)
     for finger in hand.fingers:
         own = [hand.joints[j].name for j in finger.joints]
@@ -43,7 +57,8 @@ def test_touching_fingers_stand_off_by_the_clearance(grip, clearance: float) -> 
             assert [after[n] for n in own] == [before[n] for n in own]
             continue
         assert at_touch[finger.name] < 1e-8
-        assert off[finger.name] == pytest.approx(clearance, abs=1e-8)
+        assert off[finger.name] > 0.5 * clearance
+        assert least_lift(hand, solution, after, finger.name) == pytest.approx(clearance, abs=1e-8)
         # Backed off: every joint lies between the open and the closed angle.
         for n in own:
             low, high = sorted((solution.open_angles[n], before[n]))
@@ -51,8 +66,8 @@ def test_touching_fingers_stand_off_by_the_clearance(grip, clearance: float) -> 
 
 
 def test_a_finger_that_cannot_get_so_far_opens_as_far_as_it_may(grip) -> None:
-    hand, ball, solution = grip
-    after = clench.plan_pregrasp(solution, hand, ball, clearance=10.0)
+    hand, _, solution = grip
+    after = clench.plan_pregrasp(solution, hand, clearance=10.0)
     touching = {c.finger for c in solution.contacts if not c.passed}
     for finger in hand.fingers:
         expected = solution.open_angles if finger.name in touching else solution.joint_angles
@@ -74,7 +89,7 @@ def test_a_completed_solution_is_read_back_equal(grip, tmp_path) -> None:
 def test_bad_clearance_is_refused(grip) -> None:
     for clearance in (0.0, -0.001, np.nan):
         with pytest.raises(CommandError, match=r"clearance: expected a finite number above 0 m"):
-            clench.plan_pregrasp(grip[2], grip[0], grip[1], clearance=clearance)
+            clench.plan_pregrasp(grip[2], grip[0], clearance=clearance)
 
 
 def run(capsys, *arguments: str) -> tuple[int, str, str]:

@@ -38,5 +38,5 @@ def complete(
     """
     quality = grasp_quality(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
     squeeze = plan_squeeze(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
-    pregrasp = plan_pregrasp(solution, hand, obj, clearance=clearance)
+    pregrasp = plan_pregrasp(solution, hand, clearance=clearance)
     return replace(solution, quality=quality.to_dict(), squeeze=squeeze.to_dict(), pregrasp=pregrasp)

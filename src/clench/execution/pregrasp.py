@@ -10,11 +10,7 @@ import numpy as np
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, invert
-from clench.grasp.reach import nearest_link
-from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Finger, Hand
-from clench.models.objects.grasp_object import GraspObject
-from clench.models.shapes import CollisionSource
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
@@ -27,17 +23,15 @@ _STEPS = 100
 _HALVINGS = 30
 
 
-def plan_pregrasp(
-    solution: GraspSolution, hand: Hand, obj: GraspObject, *, clearance: float = CLEARANCE
-) -> dict[str, float]:
+def plan_pregrasp(solution: GraspSolution, hand: Hand, *, clearance: float = CLEARANCE) -> dict[str, float]:
     """Return the posture in which every touching finger is backed off along its closing path to a clearance [rad].
 
-    The clearance is the smallest gap of the finger's moving links to object and obstacles. A finger that does not get
-    so far is taken back to where it starts; one that does not touch stays where the solution has it.
+    The clearance is measured at the contacts: every point of a link that touches is that far off the object's tangent
+    plane, which for a convex object is at most its distance from it. A finger that does not get so far is taken back to
+    where it starts; one that does not touch stays where the solution has it.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for.
-        clearance: [m].
+        solution: the solution. hand: what it was computed for. clearance: [m].
 
     Raises:
         CommandError: a clearance that is not finite and above 0; the solution is of another hand.
@@ -46,18 +40,31 @@ def plan_pregrasp(
         raise CommandError(f"clearance: expected a finite number above 0 m, got {clearance!r}.")
     trajectory = plan_trajectory(solution, hand)
     q = posture(solution.joint_angles, hand, "joint_angles")
-    T_palm_object = invert(solution.hand_pose.matrix) @ solution.object_pose.matrix
-    target, source = pack_object(obj).bodies, CollisionSource(solution.collision_source)
-    touching = {c.finger for c in solution.contacts if not c.passed}
+    poses, T_palm_world = hand.link_poses(q), solution.hand_pose.inverse()
     for finger in hand.fingers:
-        if finger.name not in touching:
+        own, moving = list(finger.joints), _moving_links(hand, finger, trajectory)
+        contacts = [c for c in solution.contacts if c.finger == finger.name and not c.passed]
+        links = [hand.link_index(c.link) for c in contacts]
+        touching = [(k, c) for k, c in zip(links, contacts, strict=True) if k in moving]
+        if not touching:
             continue
-        own, links = list(finger.joints), _moving_links(hand, finger, trajectory)
+        places = np.array([T_palm_world.apply(c.position) for _, c in touching])
+        normals = np.array([T_palm_world.rotation @ c.normal for _, c in touching])
+        local = np.array([(invert(poses[k]) @ np.append(p, 1.0)) for (k, _), p in zip(touching, places, strict=True)])
+        numbers = [k for k, _ in touching]
 
-        def gap(time: float, own: list[int] = own, links: tuple[int, ...] = links) -> float:
+        def gap(
+            time: float,
+            own: list[int] = own,
+            numbers: list[int] = numbers,
+            local: FloatArray = local,
+            places: FloatArray = places,
+            normals: FloatArray = normals,
+        ) -> float:
             there = q.copy()
             there[own] = trajectory.at(time)[own]
-            return nearest_link(hand, there, links, source, target, T_palm_object)[0]
+            moved = np.einsum("kij,kj->ki", hand.link_poses(there)[numbers], local)[:, :3]
+            return float(((moved - places) * normals).sum(axis=1).min())
 
         back = _latest_clear(gap, trajectory, clearance)
         q[own] = trajectory.at(back)[own]
