@@ -183,3 +183,8 @@ def test_many_appends_are_quick(tmp_path: Path) -> None:
 def test_a_seed_that_the_file_cannot_hold_is_said(tmp_path):
     with Record(tmp_path / "a.sqlite") as record, pytest.raises(FileError, match="the record cannot hold this"):
         record.append(make_solution(seed=10**30))
+
+
+def test_a_path_that_is_none_is_said(tmp_path):
+    with pytest.raises(FileError, match="the record cannot hold this"):
+        Record(f"{tmp_path}/a\0b.sqlite")

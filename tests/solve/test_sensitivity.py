@@ -267,3 +267,12 @@ def test_an_error_that_is_none_is_refused(translation, rotation, what):
     case = make_case(12)
     with pytest.raises(clench.CommandError, match=f"pose error: expected a {what} of 0 or more"):
         clench.pose_error(case.hand, case.obj, clench.GraspCommand(Pose.identity()), translation, rotation)
+
+
+def test_a_solution_that_was_tampered_with_is_refused_in_a_sentence():
+    hand, ball = three_links(), GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.0, 0.05]))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))
+    with pytest.raises(clench.ClenchError, match="Collision source 'x' is not in clench"):
+        clench.sensitivity(replace(solution, collision_source="x"), hand, ball)
+    with pytest.raises(clench.ClenchError, match="joint_angles: the solution has no angle of joint 'index_0'"):
+        clench.sensitivity(replace(solution, joint_angles={}), hand, ball)

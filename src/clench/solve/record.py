@@ -14,7 +14,7 @@ from typing import Any, Self
 
 import msgspec
 
-from clench.base.errors import FileError, UnknownNameError
+from clench.base.errors import ClenchError, FileError, UnknownNameError
 
 from .documents import solution_from_dict, solution_to_json
 from .solution import FingerStatus, GraspSolution, SolutionStatus
@@ -250,7 +250,9 @@ class Record:
         """Turn the database's errors into one sentence that names the file."""
         try:
             yield
-        except (OverflowError, UnicodeDecodeError) as error:
+        except ClenchError:
+            raise
+        except (OverflowError, ValueError) as error:
             raise FileError(self.path, f"the record cannot hold this ({error}).") from None
         except sqlite3.DatabaseError as error:
             text = str(error)

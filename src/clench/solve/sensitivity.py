@@ -16,6 +16,7 @@ from clench.grasp.scene import PackedObject, hash_hand, pack_object
 from clench.grasp.stages import closing_stages
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.objects.loading import collision_source_named
 from clench.models.shapes import CollisionSource
 
 from .solution import FingerStatus, GraspSolution
@@ -90,7 +91,7 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
     Raises:
         ClenchError: another hand or object.
     """
-    source = CollisionSource(solution.collision_source)
+    source = collision_source_named(solution.collision_source)
     packed = pack_object(obj)
     _check_same(solution, hand, packed, source)
     names = hand.joint_names

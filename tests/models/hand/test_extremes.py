@@ -36,3 +36,8 @@ def test_extreme_numbers(tmp_path, old, new, message):
     assert old in URDF
     with pytest.raises(clench.HandError, match=message):
         load(tmp_path, URDF.replace(old, new))
+
+
+def test_an_infinite_velocity_is_no_limit(tmp_path):
+    hand = load(tmp_path, URDF.replace('velocity="3"', 'velocity="inf"'))
+    assert [j.velocity for j in hand.joints] == [None] * 3

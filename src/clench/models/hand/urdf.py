@@ -63,7 +63,7 @@ def velocity_limits(root: ET.Element) -> dict[str, float]:
             value = float(text) if text is not None else 0.0
         except ValueError:
             value = 0.0
-        if value > 0.0:
+        if 0.0 < value < math.inf:
             limits[joint.get("name", "")] = value
     return limits
 
