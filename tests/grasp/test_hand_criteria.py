@@ -69,6 +69,16 @@ def test_steadiness_is_the_bound_of_all_contacts_and_below_epsilon(chosen):
     assert score("steadiness", [], setting) == 0.0
 
 
+def test_what_is_prepared_at_once_is_what_is_found_one_by_one(chosen):
+    sets, setting, _ = chosen(clench.Hand.load("robonaut2"), MUG, mug_command())
+    alone = score("steadiness", sets, setting)
+    setting.kept.clear()
+    find_criterion("steadiness", "test").prepare([replace(sets[0], touches=()), *sets], setting)
+    kept = set(setting.kept)
+    assert score("steadiness", sets, setting) == pytest.approx(alone, rel=1e-12)
+    assert set(setting.kept) == kept
+
+
 def pincer(height=0.035, **changes):
     """Return two fingers that close on what is between them, along z, links 80 mm long."""
     builder = HandBuilder().finger(

@@ -9,7 +9,7 @@ from .calibration import Calibration
 from .candidates import FingerCandidate
 from .combinations import Combination, best_combination
 from .criteria import Setting
-from .criterion_registry import find_criterion, is_of_finger, is_of_hand, score_hand, score_sets
+from .criterion_registry import find_criterion, is_of_finger, is_of_hand, prepare_hand, score_hand, score_sets
 
 #: What puts one set before another, whatever their scores, strongest first; as `tier` lists them.
 TIERS = (
@@ -152,12 +152,15 @@ class _HandJudge:
     ) -> None:
         self._groups, self._fingers, self._criteria = groups, fingers, criteria
         self._calibration, self._setting = calibration, setting
+        self._worth = {name: calibration.worth(name, 1.0) for name in criteria}
+        among = [group[i] for group, finger in zip(groups, fingers, strict=True) for i in finger.equals]
+        prepare_hand(among, criteria, setting)
 
     def __call__(self, sets: tuple[int, ...]) -> Combination:
         """Return a combination with its scores and total."""
         chosen = [group[i] for group, i in zip(self._groups, sets, strict=True)]
         scores = score_hand(chosen, self._criteria, self._setting)
         total = sum(f.totals[i] for f, i in zip(self._fingers, sets, strict=True))
-        total += sum(self._calibration.worth(name, value) for name, value in scores.items())
+        total += sum(self._worth[name] * value for name, value in scores.items())
         allowed = all(self._calibration.allows(name, scores.get(name)) for name in self._criteria)
         return Combination(sets, scores, allowed, total)

@@ -18,7 +18,7 @@ EXHAUSTIVE: Final = 128
 #: Starts of the ascent besides the best of every finger; they are drawn from a fixed seed.
 RESTARTS: Final = 12
 #: No other start is taken once so many combinations were tried.
-MOST_TRIED: Final = 220
+MOST_TRIED: Final = 200
 _SEED: Final = 0
 
 

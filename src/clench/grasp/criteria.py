@@ -69,7 +69,10 @@ class Criterion(Protocol):
 
 @runtime_checkable
 class HandCriterion(Protocol):
-    """Judge the sets of all fingers together; otherwise like `Criterion`."""
+    """Judge the sets of all fingers together; otherwise like `Criterion`.
+
+    A method `prepare(candidates, setting)`, where there is one, is given all sets before any combination is judged.
+    """
 
     name: ClassVar[str]
     unit: ClassVar[str]

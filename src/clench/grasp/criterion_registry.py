@@ -128,6 +128,14 @@ def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], sett
                 candidate.scores[criterion.name] = checked_value(criterion, value)
 
 
+def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: Setting) -> None:
+    """Give all sets to those of the named criteria that want them before they judge combinations."""
+    for name in names:
+        prepare = getattr(_registry[name], "prepare", None)
+        if prepare is not None:
+            prepare(candidates, setting)
+
+
 def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting: Setting) -> dict[str, float]:
     """Return the values that those of the named criteria which are about the whole hand give one set per finger.
 

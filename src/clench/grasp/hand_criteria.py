@@ -42,6 +42,11 @@ class Steadiness:
         parts = [p for p in (_parts(c, setting) for c in chosen) if p is not None]
         return epsilon_bound_of(parts) if parts else 0.0
 
+    def prepare(self, candidates: Sequence[FingerCandidate], setting: Setting) -> None:
+        """Find what every set adds to the bound, all at once, which takes a tenth of the time of one by one."""
+        if setting.obj is not None:
+            _keep_parts(candidates, setting)
+
 
 class ActuationForce:
     """Smallest worst joint torque that holds the object against gravity, per newton of its weight."""
@@ -105,15 +110,29 @@ def _held(chosen: Sequence[FingerCandidate], setting: Setting) -> HeldObject | N
 
 
 def _parts(candidate: FingerCandidate, setting: Setting) -> ConeParts | None:
-    """Return what a set adds to the bound of epsilon; found once per set."""
+    """Return what a set adds to the bound of epsilon, None when it does not touch; found once per set."""
     key = ("cones", id(candidate))
     if key not in setting.kept:
-        parts = None
-        if candidate.holding:
-            parts = cone_parts(held_by_contacts(_contacts([candidate], setting), *_mass(setting)))
-        setting.kept[key] = (candidate, parts)
+        _keep_parts([candidate], setting)
     found: ConeParts | None = setting.kept[key][1]
     return found
+
+
+def _keep_parts(candidates: Sequence[FingerCandidate], setting: Setting) -> None:
+    """Find the parts of several sets at once; the sets are kept with them, so that their identities stay their own."""
+    for c in candidates:
+        setting.kept["cones", id(c)] = (c, None)
+    holding = [c for c in candidates if c.holding]
+    if not holding:
+        return
+    whole = cone_parts(held_by_contacts(_contacts(holding, setting), *_mass(setting)))
+    width, first = whole.reach.shape[1], 0
+    for c in holding:
+        last = first + len(c.holding)
+        own = whole.grasp_map[:, width * first : width * last]
+        rest = (array[first:last] for array in whole[1:])
+        setting.kept["cones", id(c)] = (c, ConeParts(own, *rest))
+        first = last
 
 
 def _contacts(chosen: Sequence[FingerCandidate], setting: Setting) -> ContactSet:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.base.errors import CommandError, HandError, ObjectError
+from clench.base.errors import CommandError, HandError, ObjectError, UnknownNameError
 from clench.base.pose import FloatArray, Pose, invert
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration, calibration_of
@@ -162,6 +162,10 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
     hand = problem.hand
     weights = np.ones(len(hand.joints))
     for name, weight in calibration.joints.items():
+        if name not in hand.joint_names:
+            raise UnknownNameError(
+                "joint", name, f"hand '{hand.name}', though {calibration.name} names it", hand.joint_names
+            )
         weights[hand.joint_index(name)] = weight
     return Setting(
         hand,
