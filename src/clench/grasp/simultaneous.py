@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from heapq import heapify, heappop, heappush
 from itertools import combinations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.base.tolerances import TOUCH_FRACTION
 from clench.models.hand.hand import Hand
 
 from .candidates import FingerCandidate, Touch, read_candidates
@@ -26,6 +26,14 @@ if TYPE_CHECKING:
 _LOOKS: Final = 20_000
 #: The kind of a touch of two links' surfaces that lie on no plane.
 _FACE: Final = 5
+#: How far off the gap of two links may be while they are apart [-].
+_SLACK: Final = 2.0
+#: They are no longer below this gap [m].
+_NEAR: Final = 1e-4
+#: Gap at which they meet [m].
+_TOUCH: Final = 1e-9
+#: Places of the motion that differ by less are one [-].
+_ROUNDING: Final = 1e-12
 
 
 class Meeting(NamedTuple):
@@ -64,17 +72,23 @@ def close_together(
     until = {c.item: plan.items.until[c.item].copy() for c in sets}
     held: dict[int, list[Touch]] = {c.item: [] for c in sets}
     apart = bodies.across - bodies.within
+    moving = [k for k, c in enumerate(sets) if c.plane is None and c.overlap is None]
+    meetings: dict[tuple[int, int], Meeting | None] = {}
+    overlapping: set[int] = set()
     while True:
-        moving = [k for k, c in enumerate(sets) if c.plane is None and c.overlap is None]
-        meetings = [(_meeting(hand, sets[a], sets[b], bodies, apart), a, b) for a, b in combinations(moving, 2)]
-        found = [(m, a, b) for m, a, b in meetings if m is not None]
-        for m, a, b in found:
-            if m.at == 0.0:
-                sets[a], sets[b] = replace(sets[a], exact=False), replace(sets[b], exact=False)
+        for a, b in combinations(moving, 2):
+            if (a, b) not in meetings:
+                meetings[a, b] = _meeting(hand, sets[a], sets[b], bodies, apart)
+        found = [(m, a, b) for (a, b), m in meetings.items() if m is not None]
+        overlapping |= {k for m, a, b in found if m.at == 0.0 for k in (a, b)}
         later = [row for row in found if row[0].at > 0.0]
         if not later:
-            return [replace(c, touches=(*c.touches, *held[c.item])) for c in sets]
+            return [
+                replace(c, exact=c.exact and k not in overlapping, touches=(*c.touches, *held[c.item]))
+                for k, c in enumerate(sets)
+            ]
         first, a, b = min(later, key=lambda row: (row[0].at, row[0].links))
+        meetings = {pair: m for pair, m in meetings.items() if not {a, b} & set(pair)}
         for k, own, other, sign in ((a, 0, 1, 1.0), (b, 1, 0, -1.0)):
             c = sets[k]
             joint = _hold(hand, plan, c, first.links[own], first.at, until[c.item])
@@ -114,48 +128,63 @@ def _meeting(
 ) -> Meeting | None:
     """Return where two fingers first meet that were free of each other, or that they overlap at the start.
 
-    Steps as long as the gap allows at the fastest that any two points can approach each other cannot pass a meeting.
+    Steps as long as the gap of two links allows, at the fastest that any of their points approach each other, cannot
+    pass a meeting. The pair that has come least far is looked at next.
     """
-    pairs = [(m, r) for m in one.plan.finger.links for r in other.plan.finger.links if apart[m, r]]
-    ends = max(_duration(one), _duration(other))
-    touch = TOUCH_FRACTION * min(one.plan.length, other.plan.length)
-    at, meeting = 0.0, None
-    for _ in range(_LOOKS):
-        meeting = _closest(hand, one, other, bodies, pairs, at)
-        if meeting is None:
-            return None
-        if meeting.gap <= touch:
-            still = _still(one, at) and _still(other, at)
-            return None if still else meeting
-        at += meeting.gap / (_speed(one, at) + _speed(other, at) + 1e-300)
-        if at >= ends:
-            return None
-    return meeting
-
-
-def _closest(
-    hand: Hand,
-    one: FingerCandidate,
-    other: FingerCandidate,
-    bodies: HandBodies,
-    pairs: list[tuple[int, int]],
-    at: float,
-) -> Meeting | None:
-    """Return the closest pair of links where both fingers are after so much motion."""
     from clench.kernels.nearness import link_gap
 
+    speeds = [_link_speeds(hand, c, bodies) for c in (one, other)]
+    ends = [_link_ends(hand, c) for c in (one, other)]
+    waiting = [(0.0, m, r, np.inf) for m in speeds[0] for r in speeds[1] if apart[m, r]]
+    heapify(waiting)
+    out = np.empty(6)
+    for looks in range(_LOOKS):
+        if not waiting:
+            return None
+        at, m, r, away = heappop(waiting)
+        speed, end = speeds[0][m] + speeds[1][r], max(ends[0].get(m, 0.0), ends[1].get(r, 0.0))
+        slack = _SLACK if away > _NEAR else 1.0
+        gap = link_gap(bodies.links, m, r, _poses(hand, one, other, at), (end - at) * speed + _TOUCH, slack, out)
+        if gap <= _TOUCH or looks == _LOOKS - 1:
+            return Meeting(at, (m, r), out[:3].copy(), out[3:].copy(), gap)
+        # Links that are held where they met touch at the end of their motion.
+        step = gap / (slack * speed)
+        if at + step < (1.0 - _ROUNDING) * end:
+            heappush(waiting, (at + step, m, r, gap))
+    return None
+
+
+def _poses(hand: Hand, one: FingerCandidate, other: FingerCandidate, at: float) -> FloatArray:
+    """Return `T_palm_link` of every link after so much motion of two fingers, shape (L, 3, 4)."""
     q = one.plan.posture.copy()
     for c in (one, other):
         own = [p.joint for p in c.plan.joints]
         q[own] = c.plan.turned(hand, _turn(c, at))[own]
-    poses = np.ascontiguousarray(hand.link_poses(q)[:, :3])
-    best, found = np.inf, None
-    out = np.empty(6)
-    for m, r in pairs:
-        gap = link_gap(bodies.links, m, r, poses, best, out)
-        if gap < best:
-            best, found = gap, Meeting(at, (m, r), out[:3].copy(), out[3:].copy(), gap)
-    return found
+    return np.ascontiguousarray(hand.link_poses(q)[:, :3])
+
+
+def _link_speeds(hand: Hand, c: FingerCandidate, bodies: HandBodies) -> dict[int, float]:
+    """Return a bound on the speed of the points of a finger's links that can touch [m per motion]."""
+    moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
+    poses = hand.link_poses(c.plan.posture)
+    T = c.plan.families[0].T_palm_family
+    pivots = [T[:3, 3] + T[:3, 0] * p.pivot[0] + T[:3, 2] * p.pivot[1] for p in c.plan.joints]
+    rates = [abs(p.rate) * c.plan.speeds[p.group] for p in c.plan.joints]
+    order = [p.joint for p in c.plan.joints]
+    speeds = {}
+    for link in c.plan.finger.links:
+        if bodies.links.root[link] < 0:
+            continue
+        ball = bodies.links.node[bodies.links.root[link]]
+        speeds[link] = 0.0
+        if link in moved_by:
+            last = order.index(moved_by[link])
+            middle = poses[link][:3, :3] @ ball[:3] + poses[link][:3, 3]
+            reach = float(np.linalg.norm(middle - pivots[last])) + ball[3]
+            for j in range(last, -1, -1):
+                speeds[link] += rates[j] * reach
+                reach += float(np.linalg.norm(pivots[j] - pivots[j - 1])) if j else 0.0
+    return speeds
 
 
 def _turn(c: FingerCandidate, at: float) -> FloatArray:
@@ -168,25 +197,17 @@ def _turn(c: FingerCandidate, at: float) -> FloatArray:
     return np.array(turns)
 
 
-def _still(c: FingerCandidate, at: float) -> bool:
-    return bool(np.array_equal(_turn(c, at), _turn(c, np.inf)))
-
-
-def _speed(c: FingerCandidate, at: float) -> float:
-    """Return a bound on the speed of a finger's points from here on [m per motion]."""
-    left = _turn(c, np.inf) != _turn(c, at)
-    rates = [abs(p.rate) * c.plan.speeds[p.group] for p in c.plan.joints]
-    return c.plan.length * float(np.sum(np.array(rates)[left]))
-
-
-def _duration(c: FingerCandidate) -> float:
-    """Return how long a finger moves."""
+def _link_ends(hand: Hand, c: FingerCandidate) -> dict[int, float]:
+    """Return after how much motion each of a finger's links that closing moves is at rest."""
+    moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
     ends = [
         (p.start + abs(c.q[p.joint] - c.plan.posture[p.joint]) / abs(p.rate)) / c.plan.speeds[p.group]
-        for p in c.plan.joints
         if p.rate != 0.0
+        else 0.0
+        for p in c.plan.joints
     ]
-    return max(ends, default=0.0)
+    order = [p.joint for p in c.plan.joints]
+    return {link: max(ends[: order.index(joint) + 1]) for link, joint in moved_by.items()}
 
 
 def _touch(meeting: Meeting, link: int, met: int, joint: int, sign: float) -> Touch:

@@ -337,6 +337,6 @@ def settle_pair(
     on_object = met == exact.checked.shape[0]
     sweep.moving[:] = sweep.poses[m]
     sweep.resting[:] = T_palm_object if on_object else sweep.poses[met]
-    body_gap(exact.links, m, exact.object if on_object else exact.links, 0 if on_object else met, math.inf, sweep)
+    body_gap(exact.links, m, exact.object if on_object else exact.links, 0 if on_object else met, math.inf, 1.0, sweep)
     keep_pair(sweep)
     describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)

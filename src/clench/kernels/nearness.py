@@ -30,23 +30,24 @@ def smallest_gap(
     best, nearest = np.inf, -1
     for m in wanted:
         work.moving[:] = poses[m]
-        gap = body_gap(links, m, target, 0, best, work)
+        gap = body_gap(links, m, target, 0, best, 1.0, work)
         if gap < best:
             best, nearest = gap, m
     return best, nearest
 
 
 @kernel
-def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, out: Floats) -> float:
+def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, slack: float, out: Floats) -> float:
     """Return the gap of two links if it is below `bound`, else `bound`; where, and the direction to `m`, go to `out`.
 
     Args:
-        links: every link in its frame. m, r: which. poses: `T_palm_link` of every link, (L, 3, 4). out: (6,).
+        links: every link in its frame. m, r: which. poses: `T_palm_link` of every link, (L, 3, 4).
+        slack: see `body_gap`. out: (6,).
     """
     sweep = make_sweep_work(np.empty((1, 3)), 0)
     sweep.moving[:] = poses[m]
     sweep.resting[:] = poses[r]
-    gap = body_gap(links, m, links, r, bound, sweep)
+    gap = body_gap(links, m, links, r, bound, slack, sweep)
     if gap < bound:
         i, k = sweep.pair[0], sweep.pair[1]
         put_core(links, i, sweep.moving, sweep.core)

@@ -205,11 +205,14 @@ def sweep_body(
 
 
 @inner_kernel
-def body_gap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, work: SweepWork) -> float:
+def body_gap(
+    moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, slack: float, work: SweepWork
+) -> float:
     """Return the gap between two bodies if it is below `bound`, else `bound`; writes the closest pair.
 
     Args:
-        work: has `moving` and `resting`, the bodies' poses in one frame.
+        slack: what is found may be larger than the gap by up to this factor, which saves most of the work where
+            many pairs are about as close [-]. work: has `moving` and `resting`, the bodies' poses in one frame.
     """
     stack, best = work.stack, bound
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
@@ -217,32 +220,37 @@ def body_gap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: flo
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        if ball_gap(moving, a, resting, b, work) >= best:
+        if slack * ball_gap(moving, a, resting, b, work) >= best:
             continue
         if a < 0 or b < 0:
-            # An element itself, not only its ball: that of a long thin triangle reaches far.
+            # The ball around a long element tells little.
             gap = element_gap(moving, a, resting, b, work)
-            if gap >= best:
+            if gap >= best or (slack * gap >= best and (a >= 0 or b >= 0)):
                 continue
             if a < 0 and b < 0:
                 best = gap
                 work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
                 continue
-        before = waiting
-        waiting = split_pair(moving, a, resting, b, stack, waiting)
-        if waiting == before + 2:
-            put_nearer_last(moving, resting, stack, waiting, work)
+        height = split_pair(moving, a, resting, b, stack, waiting)
+        put_nearest_last(moving, resting, stack, waiting, height, work)
+        waiting = height
     return best
 
 
 @inner_kernel
-def put_nearer_last(moving: BodyArrays, resting: BodyArrays, stack: Ints, waiting: int, work: SweepWork) -> None:
-    """Exchange the last two pairs that wait where the lower one is nearer: looking there first saves most."""
-    last, other = waiting - 1, waiting - 2
-    near = ball_gap(moving, stack[last, 0], resting, stack[last, 1], work)
-    if ball_gap(moving, stack[other, 0], resting, stack[other, 1], work) < near:
-        for k in range(2):
-            stack[last, k], stack[other, k] = stack[other, k], stack[last, k]
+def put_nearest_last(
+    moving: BodyArrays, resting: BodyArrays, stack: Ints, low: int, high: int, work: SweepWork
+) -> None:
+    """Swap the nearest of the pairs from `low` on to the top of the stack, so that it is looked at next."""
+    nearest, least = low, math.inf
+    for k in range(low, high):
+        gap = ball_gap(moving, stack[k, 0], resting, stack[k, 1], work)
+        if gap < least:
+            nearest, least = k, gap
+    for column in range(2):
+        top = stack[high - 1, column]
+        stack[high - 1, column] = stack[nearest, column]
+        stack[nearest, column] = top
 
 
 @inner_kernel
