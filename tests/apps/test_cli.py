@@ -52,6 +52,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     monkeypatch.setitem(vars(clench), "solve", fake.solve)
     poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
     monkeypatch.setitem(vars(clench), "approach_poses", lambda *_: poses)
+    monkeypatch.setitem(vars(clench), "complete", lambda solution, *_, **__: solution)
     return fake
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
 Source = Literal["engine", "raw", "visual"]
-Order = Literal["proximal-first"]
+Order = Literal["proximal-first", "together", "fingertip"]
 Status = Literal["grasp", "partial", "no_contact", "blocked"]
 
 
