@@ -6,6 +6,7 @@ import pytest
 import clench
 from chain_hands import HandBuilder, along_x, mount, three_links
 from clench.base.pose import Pose
+from clench.execution.trajectory import plan_trajectory
 
 RADIUS = 0.007
 
@@ -161,3 +162,19 @@ def test_joints_that_are_not_parallel_cannot_close_together():
     hand = HandBuilder().finger("index", shapes, [0.05, 0.04], axes=axes).hand()
     with pytest.raises(clench.ClenchError, match="not parallel"):
         solve(hand, bar(0.03, 0.02), order="together")
+
+
+@pytest.mark.parametrize("speeds", [{}, {"index_0": 2.0, "thumb_1": 0.5}])
+def test_the_trajectory_moves_as_it_was_closed(speeds):
+    """Between way-points joints go in proportion to their speeds, and each stops where it was held."""
+    hand = facing(0.1)
+    solution = solve(hand, bar(0.03, 0.05, 0.01), order="together", speeds=speeds)
+    positions = plan_trajectory(solution, hand).positions
+    rate = np.array([speeds.get(name, 1.0) for name in hand.joint_names])
+    ends = np.array(list(solution.joint_angles.values()))
+    place = (positions / rate).max(axis=1)
+    expected = np.minimum(place[:, None] * rate, ends)
+    assert positions == pytest.approx(expected, abs=1e-12)
+    assert positions[-1] == pytest.approx(ends, abs=0.0)
+    assert len(set(np.round(ends / rate, 6))) > 1
+    assert clench.GraspSolution.from_dict(solution.to_dict()).speeds == speeds

@@ -23,6 +23,8 @@ SCHEMA = "clench.trajectory/1"
 SLOWEST = 1e-6
 #: Way-points per stage; speed rises from zero and falls to zero within each.
 STAGE_STEPS = 8
+#: Way-points of a path on which all joints move at once, besides those at which one stops.
+AT_ONCE_STEPS = 32
 #: Joints that move less than this stand still [rad].
 STILL = 1e-9
 
@@ -95,8 +97,8 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
 
     Every finger goes through its closing path joint by joint, as computed: a straight line in joint space could meet
     the object before the contacts do. The slowest finger sets the duration, the others are slowed down to it. Posture
-    joints that differ between the open hand and the solution move first. Paths of other closing orders than
-    proximal-first are straight lines.
+    joints that differ between the open hand and the solution move first. Where all joints closed at once, they do so
+    here, each until it was held: fingers that move at the same time may be in each other's way otherwise.
 
     Args:
         solution: the solution.
@@ -114,9 +116,11 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
     )
     limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
     turned, opening = _preparation(hand, start, end)
-    timed = [
-        (_timed(list(_stages(solution, hand, f.name, f.joints, turned, end)), limits * speed)) for f in hand.fingers
-    ]
+    if _closed_at_once(solution):
+        stages = [[_path_at_once(solution, hand, turned, end)]] * len(hand.fingers)
+    else:
+        stages = [list(_stages(hand, f.joints, turned, end)) for f in hand.fingers]
+    timed = [_timed(found, limits * speed) for found in stages]
     duration = max((times[-1] for times, _ in timed), default=0.0)
     grid = np.unique(np.concatenate([np.zeros(1), *(_stretched(times, duration) for times, _ in timed)]))
     positions = np.tile(turned, (len(grid), 1))
@@ -149,18 +153,32 @@ def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatA
     return turned, [_eased(start, turned)] if first else [start[None]]
 
 
-def _stages(
-    solution: GraspSolution, hand: Hand, finger: str, joints: tuple[int, ...], start: FloatArray, end: FloatArray
-) -> Iterator[FloatArray]:
+def _closed_at_once(solution: GraspSolution) -> bool:
+    orders = [c.order for name in solution.fingers for c in _chosen(solution, name)]
+    return any(order != ClosingOrder.PROXIMAL_FIRST for order in orders)
+
+
+def _path_at_once(solution: GraspSolution, hand: Hand, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return way-points on which all joints move, each at its speed and until its end, shape (n, J).
+
+    Every place at which a joint stops is a way-point; between two of them the path is a straight line.
+    """
+    speed = np.array([solution.speeds.get(name, 1.0) for name in hand.joint_names])
+    for c in hand.couplings:
+        speed[c.follower] = abs(c.ratio) * speed[c.leader]
+    away = end - start
+    stops = np.abs(away) / np.maximum(speed, STILL)
+    s = np.linspace(0.0, 1.0, AT_ONCE_STEPS + 1)
+    places = np.unique(np.concatenate([stops, stops.max() * s * s * (3.0 - 2.0 * s)]))
+    path: FloatArray = start + np.sign(away) * np.minimum(places[:, None] * speed, np.abs(away))
+    path[-1] = end
+    return path
+
+
+def _stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatArray) -> Iterator[FloatArray]:
     """Yield the stages of a finger: way-points of all joints, shape (n, J), of which only the finger's move."""
     q = start.copy()
     yield q[None].copy()
-    order = next((c.order for c in _chosen(solution, finger)), ClosingOrder.PROXIMAL_FIRST)
-    if order != ClosingOrder.PROXIMAL_FIRST:
-        target = q.copy()
-        target[list(joints)] = end[list(joints)]
-        yield _eased(q, target)
-        return
     followers = {c.follower for c in hand.couplings}
     for leader in joints:
         if leader in followers:

@@ -108,6 +108,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         contacts=tuple(c for r in results.values() if r.candidates for c in r.candidates[r.chosen].contacts),
         choice=answer.choice,
         timing=dict(timing),
+        speeds=dict(command.speeds),
         joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
     )
 

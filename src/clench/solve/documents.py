@@ -99,6 +99,7 @@ class _SolutionForm(msgspec.Struct):
     joint_limits: _Map = {}
     certificate: dict[str, Any] | None = None
     choice: dict[str, Any] | None = None
+    speeds: _Map = {}
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -121,6 +122,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "joint_angles": _numbers(s.joint_angles),
         "open_angles": _numbers(s.open_angles),
         "joint_limits": {name: [float(low), float(high)] for name, (low, high) in s.joint_limits.items()},
+        "speeds": _numbers(s.speeds),
         "certified": bool(s.certified),
         "collision_source": str(s.collision_source),
         "object_collision_source": str(s.object_collision_source),
@@ -187,6 +189,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         pregrasp=None if form.pregrasp is None else angles(form.pregrasp, "pregrasp"),
         choice=form.choice,
         timing=angles(form.timing, "timing"),
+        speeds=angles(form.speeds, "speeds"),
         joint_limits={
             name: _convert(v, tuple[float, float], source, f"joint_limits.{name}")
             for name, v in form.joint_limits.items()

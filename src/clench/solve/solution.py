@@ -153,6 +153,7 @@ class GraspSolution:
             ``"deviation"`` of what is swept as polyhedra [m].
         choice: why these sets: what counted, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the whole width and all links [m], None when not computed.
+        speeds: how fast free joints closed relative to each other in an order where all move at once; 1 if not named.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
 
@@ -183,6 +184,7 @@ class GraspSolution:
     choice: Mapping[str, Any] | None = None
     timing: Mapping[str, float] = field(default_factory=dict)
     joint_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    speeds: Mapping[str, float] = field(default_factory=dict)
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""
