@@ -23,7 +23,7 @@ EDGE_INSET: Final = 1e-4
 #: Round shapes cut obliquely become outlines that deviate by at most this [m] (section 2).
 OUTLINE_DEVIATION: Final = 1e-6
 #: Lengths and coordinates outside of these are no hand's, no object's and no place's [m].
-SMALLEST_LENGTH: Final = 1e-9
+SMALLEST_LENGTH: Final = 1e-13
 LARGEST_LENGTH: Final = 1e9
 #: Quaternions whose norm is off by more than this are refused [-].
 QUATERNION_NORM: Final = 1e-3
