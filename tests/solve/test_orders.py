@@ -7,6 +7,7 @@ import clench
 from chain_hands import HandBuilder, along_x, mount, three_links
 from clench.base.pose import Pose
 from clench.execution.trajectory import plan_trajectory
+from clench.models.hand.hand import JointRole
 
 RADIUS = 0.007
 
@@ -178,3 +179,19 @@ def test_the_trajectory_moves_as_it_was_closed(speeds):
     assert positions[-1] == pytest.approx(ends, abs=0.0)
     assert len(set(np.round(ends / rate, 6))) > 1
     assert clench.GraspSolution.from_dict(solution.to_dict()).speeds == speeds
+
+
+def test_links_that_rest_do_not_keep_fingers_from_meeting():
+    """Fingers whose first links only the posture moves meet as those without such links do."""
+    shapes, lengths = [along_x(RADIUS, 0.02), along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)], [0.02, 0.05, 0.04]
+    roles = [JointRole.POSTURE, JointRole.CLOSING, JointRole.CLOSING]
+    builder = HandBuilder().finger("index", shapes, lengths, upper=1.5, roles=roles)
+    down = [np.array([0.0, 1.0, 0.0])] * 3
+    base = mount((0, 0, 0.1))
+    hand = builder.finger("thumb", shapes, lengths, base=base, axes=down, upper=1.5, roles=roles, thumb=True).hand()
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = solve(hand, free, order="together")
+    q = solution.joint_angles["index_1"]
+    assert q == pytest.approx(solution.joint_angles["thumb_2"], abs=1e-6)
+    assert 0.05 * np.sin(q) + 0.04 * np.sin(2.0 * q) + RADIUS == pytest.approx(0.05, abs=1e-8)
+    assert solution.certified

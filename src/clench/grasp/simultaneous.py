@@ -135,16 +135,20 @@ def _meeting(
 
     speeds = [_link_speeds(hand, c, bodies) for c in (one, other)]
     ends = [_link_ends(hand, c) for c in (one, other)]
-    waiting = [(0.0, m, r, np.inf) for m in speeds[0] for r in speeds[1] if apart[m, r]]
+    # What rests on both sides is judged with the whole hand.
+    moves = {(m, r): max(ends[0].get(m, 0.0), ends[1].get(r, 0.0)) for m in speeds[0] for r in speeds[1]}
+    waiting = [(0.0, m, r, np.inf) for (m, r), end in moves.items() if apart[m, r] and end > 0.0]
     heapify(waiting)
     out = np.empty(6)
     for looks in range(_LOOKS):
         if not waiting:
             return None
         at, m, r, away = heappop(waiting)
-        speed, end = speeds[0][m] + speeds[1][r], max(ends[0].get(m, 0.0), ends[1].get(r, 0.0))
+        speed, end = speeds[0][m] + speeds[1][r], moves[m, r]
         slack = _SLACK if away > _NEAR else 1.0
-        gap = link_gap(bodies.links, m, r, _poses(hand, one, other, at), (end - at) * speed + _TOUCH, slack, out)
+        # A gap that is not below the bound is the bound itself, which has to be none of a touch.
+        bound = (end - at) * speed + 2.0 * _TOUCH
+        gap = link_gap(bodies.links, m, r, _poses(hand, one, other, at), bound, slack, out)
         if gap <= _TOUCH or looks == _LOOKS - 1:
             return Meeting(at, (m, r), out[:3].copy(), out[3:].copy(), gap)
         # Links that are held where they met touch at the end of their motion.
