@@ -85,3 +85,20 @@ def test_the_same_examples_give_the_same_fit():
     one, again = fit_weights(made), fit_weights(made)
     assert one.weights.tobytes() == again.weights.tobytes()
     assert one.held_out == again.held_out
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_outcomes_that_are_all_the_same_tell_nothing(held):
+    many = [[float(n)] for n in range(3, 11)]
+    with pytest.raises(CommandError, match="all 8 outcomes are " + ("held" if held else "dropped")):
+        fit_weights(examples([], [], many, [held] * 8))
+    pairs = [[2.0]] * 3, [[1.0]] * 3
+    alone, _ = likeliest(examples(*pairs), 0.01)
+    weights, intercept = likeliest(examples(*pairs, many, [held] * 8), 0.01)
+    assert weights.tobytes() == alone.tobytes()
+    assert intercept == (np.inf if held else -np.inf)
+
+
+def test_no_criterion_in_common_is_said():
+    with pytest.raises(CommandError, match="no criterion has a score on every side"):
+        fit_weights(Examples((), np.empty((5, 0)), np.empty((5, 0)), np.empty((0, 0)), np.empty(0, dtype=bool)))

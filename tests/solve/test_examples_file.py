@@ -114,6 +114,14 @@ def test_a_record_of_the_first_version_is_carried_over(tmp_path: Path) -> None:
             r"outcomes\[0\]\.of: set: expected 0 to 2, got 3",
         ),
         ({"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "set": 0}, "held": True}]}, "expected 'scores'"),
+        (
+            {"outcomes": [{"of": {"scores": {"rang": 1.0}}, "held": True}]},
+            r"outcomes\[0\]\.of: Criterion 'rang' is not in scores\.",
+        ),
+        (
+            {"outcomes": [{"of": {"scores": {"range_of_motion": 1e300}}, "held": True}]},
+            r"outcomes\[0\]\.of: scores.range_of_motion: expected a finite number, between 1e-12 and 1e\+12 in size",
+        ),
     ],
 )
 def test_malformed_examples(tmp_path: Path, record: Path, content: dict[str, Any], message: str) -> None:

@@ -119,6 +119,15 @@ def test_gravity_in_any_direction_asks_for_more(grip) -> None:
     assert np.abs(plan.forces.sum(axis=0)).max() < 1e-9
 
 
+@pytest.mark.parametrize("margin", [0.5, 1.0, 2.0])
+def test_what_is_held_whichever_way_is_held_with_any_margin_asked_for(grip, margin: float) -> None:
+    hand, ball, solution = grip
+    plan = clench.plan_squeeze(solution, hand, ball, mass=0.05, gravity=None, margin=margin)
+    assert plan.feasible
+    assert plan.margin == max(margin, 1.0)
+    assert "Holds 0.05 kg in every direction" in plan.text
+
+
 def test_torque_limited_epsilon_is_a_force(grip) -> None:
     hand, ball, solution = grip
     quality = clench.grasp_quality(solution, hand, ball, within_torques=True)
@@ -168,7 +177,25 @@ def test_bad_input_gets_one_sentence(grip) -> None:
         clench.grasp_quality(solution, hand, ball, norm="L3")
     with pytest.raises(CommandError, match=r"contact_model: expected one of point, soft, got 'glue'"):
         clench.plan_squeeze(solution, hand, ball, contact_model="glue")
-    with pytest.raises(CommandError, match=r"centre of mass: expected three finite numbers"):
+    with pytest.raises(CommandError, match=r"center_of_mass: expected finite numbers .* got \[0.0, 0.0, nan\]"):
         clench.grasp_quality(solution, hand, ball, center_of_mass=[0.0, 0.0, np.nan])
+    for values, message in (
+        ({"friction": "slippery"}, r"friction: expected a finite number above 0, got 'slippery'"),
+        ({"friction": [0.5] * 99}, r"friction: expected one number, or one for each of \d+ contacts"),
+        ({"mass": "light"}, r"mass: expected a finite number of at least 0 kg, got 'light'"),
+        ({"edges": 2.5}, r"edges: expected a whole number of at least 3 edges of the friction cone, got 2.5"),
+        ({"edges": "8"}, r"edges: expected a whole number of at least 3"),
+        ({"center_of_mass": [0.0, 0.0]}, r"center_of_mass: expected 3 numbers \[x, y, z\] in metres"),
+    ):
+        with pytest.raises(CommandError, match=message):
+            clench.grasp_quality(solution, hand, ball, **values)
+    for values, message in (
+        ({"gravity": [0.0, -1.0]}, r"gravity: expected 3 numbers \[x, y, z\], got \[0.0, -1.0\]"),
+        ({"gravity": "down"}, r"gravity: expected \[x, y, z\], got 'down'"),
+        ({"gravity": [np.nan, 0.0, 0.0]}, r"gravity: expected finite numbers \[x, y, z\]"),
+        ({"disturbances": [[1.0] * 6, [1.0]]}, r"loads: expected rows of six numbers"),
+    ):
+        with pytest.raises(CommandError, match=message):
+            clench.plan_squeeze(solution, hand, ball, **values)
     with pytest.raises(CommandError, match=r"the solution does not fit hand 'patent15'"):
         clench.grasp_quality(solution, clench.Hand.load("patent15"), ball)

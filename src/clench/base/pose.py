@@ -38,8 +38,8 @@ class Pose:
         *,
         key: str = "pose",
     ) -> None:
-        xyz = _vector(position, 3, f"{key}.position", "[x, y, z] in metres")
-        quaternion = _vector(wxyz, 4, f"{key}.wxyz", "[w, x, y, z]")
+        xyz = checked_vector(position, 3, f"{key}.position", "[x, y, z] in metres")
+        quaternion = checked_vector(wxyz, 4, f"{key}.wxyz", "[w, x, y, z]")
         norm = math.hypot(*quaternion)
         if abs(norm - 1.0) > QUATERNION_NORM:
             raise CommandError(f"{key}.wxyz: expected a unit quaternion [w, x, y, z], got norm {norm:.6g}.")
@@ -172,7 +172,15 @@ def quaternion_from_rotation(rotation: FloatArray) -> FloatArray:
     return -q if q[0] < 0 else q
 
 
-def _vector(value: ArrayLike | Sequence[object], length: int, key: str, expected: str) -> FloatArray:
+def checked_vector(value: ArrayLike | Sequence[object], length: int, key: str, expected: str) -> FloatArray:
+    """Return finite numbers as an array, shape (length,).
+
+    Args:
+        value: to check. length: how many. key: names it in messages. expected: says what it is.
+
+    Raises:
+        CommandError: something else.
+    """
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):

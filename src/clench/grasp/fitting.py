@@ -7,7 +7,7 @@ with probability 1 / (1 + exp(-(w·x + b))). Weights are at least 0: directions 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -76,10 +76,16 @@ def fit_weights(examples: Examples, penalty: float = PENALTY) -> Fit:
         examples: at least four. penalty: see `PENALTY`.
 
     Raises:
-        CommandError: too few examples, or no criterion that tells them apart in its own direction.
+        CommandError: too few examples, outcomes that are all the same, no criterion that all have, or none that tells
+            better from worse in its own direction.
     """
     if examples.count < FEWEST:
         raise CommandError(f"examples: expected at least {FEWEST} pairs and outcomes, got {examples.count}.")
+    if not examples.names:
+        raise CommandError("examples: no criterion has a score on every side of every example.")
+    if _one_kind(examples.held):
+        what, other = ("held", "dropped") if examples.held[0] else ("dropped", "held")
+        raise CommandError(f"examples: all {len(examples.held)} outcomes are {what}; expected some {other}, too.")
     raw, intercept = likeliest(examples, penalty)
     if raw.max(initial=0.0) <= 0.0:
         listed = ", ".join(examples.names)
@@ -102,9 +108,15 @@ def fit_weights(examples: Examples, penalty: float = PENALTY) -> Fit:
 
 
 def likeliest(examples: Examples, penalty: float) -> tuple[FloatArray, float]:
-    """Return the likeliest weights, as fitted, shape (M,), and the intercept of the outcomes."""
+    """Return the likeliest weights, as fitted, shape (M,), and the intercept of the outcomes.
+
+    Outcomes that are all the same say nothing about weights: their intercept is infinite, and pairs alone are fitted.
+    """
     from scipy.optimize import minimize
 
+    if _one_kind(examples.held):
+        pairs = replace(examples, outcomes=examples.outcomes[:0], held=examples.held[:0])
+        return likeliest(pairs, penalty)[0], np.inf if examples.held[0] else -np.inf
     size = len(examples.names)
     signs = np.where(examples.held, 1.0, -1.0)
     rows = np.vstack(
@@ -134,3 +146,8 @@ def told_right(examples: Examples, weights: FloatArray, intercept: float | None)
         right.append(said * np.where(examples.held, 1.0, -1.0) / 2.0 + 0.5)
     each = np.concatenate(right)
     return float(each.mean()) if len(each) else 0.0
+
+
+def _one_kind(held: NDArray[np.bool_]) -> bool:
+    """Say whether there are outcomes, and all of them are the same."""
+    return len(held) > 0 and bool(held.all() or not held.any())

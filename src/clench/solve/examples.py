@@ -16,11 +16,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from clench.base.errors import FileError
+from clench.base.errors import ClenchError, FileError
 from clench.base.json_files import non_finite_path, read_json
 from clench.base.pose import FloatArray
 from clench.grasp.calibration import Calibration
-from clench.grasp.criterion_registry import find_criterion
+from clench.grasp.criterion_registry import check_numbers, find_criterion
 from clench.grasp.fitting import Examples
 
 from .record import Record
@@ -162,7 +162,10 @@ def _scores(side: _Side, solves: Mapping[int, GraspSolution], where: str, record
         expected = "'scores' by criterion, or a 'solve' of the record, of which 'finger' and 'set' may be told"
         raise FileError(where, f"expected {expected}.")
     if side.scores is not None:
-        return side.scores
+        try:
+            return check_numbers(side.scores, "scores", float("-inf"), above=False)
+        except ClenchError as error:
+            raise FileError(where, str(error)) from None
     assert side.solve is not None
     if record is None:
         raise FileError(where, "names a solve, but the file has no 'record'.")

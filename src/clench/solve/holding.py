@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.base.pose import FloatArray, Pose
+from clench.base.pose import FloatArray, Pose, checked_vector
 from clench.grasp.mechanics.contacts import (
     DEFAULT_TORSION,
     ContactModel,
@@ -47,7 +47,7 @@ class HeldSolution:
 
     def palm_direction(self, direction: ArrayLike) -> FloatArray:
         """Return a direction of the world in the palm frame, shape (3,)."""
-        return np.asarray(self.T_world_palm.rotation.T @ np.asarray(direction, dtype=np.float64))
+        return np.asarray(self.T_world_palm.rotation.T @ checked_vector(direction, 3, "gravity", "[x, y, z]"))
 
     def conventions(self) -> dict[str, Any]:
         """Return what numbers about forces depend on, in plain values."""
@@ -101,6 +101,7 @@ def hold(
         links=links,
     )
     mass = mass_properties(obj)
-    center = solution.object_pose.apply(mass.center if center_of_mass is None else center_of_mass)
+    own = mass.center if center_of_mass is None else center_of_mass
+    center = solution.object_pose.apply(checked_vector(own, 3, "center_of_mass", "[x, y, z] in metres"))
     held = held_by_hand(hand, q, made, T_palm_world.apply(center), mass.length)
     return HeldSolution(held, contacts, solution.hand_pose, ContactModel(contact_model), center)

@@ -118,7 +118,9 @@ def plan_squeeze(
         center_of_mass=center_of_mass,
     )
     nominal = np.zeros((1, 6)) if gravity is None else weight(mass, grasp.palm_direction(gravity))
-    found = squeeze_forces(grasp.held, nominal, _disturbances(grasp, mass, gravity, disturbances), enough=margin)
+    # Any direction is held where the margin over the weight is 1: no less than that is looked for.
+    enough = margin if gravity is not None or not margin > 0.0 else max(margin, 1.0)
+    found = squeeze_forces(grasp.held, nominal, _disturbances(grasp, mass, gravity, disturbances), enough=enough)
     held_any_way = gravity is not None or found.margin >= 1.0
     feasible = found.plan is not None and held_any_way
     text = _sentence(found, mass, feasible, grasp, gravity is None)

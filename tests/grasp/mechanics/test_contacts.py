@@ -82,7 +82,7 @@ def test_malformed_contacts_are_refused_in_one_sentence() -> None:
     with pytest.raises(CommandError, match=r"contacts.torsion: expected numbers above 0 m, got 0"):
         make_contacts(place, n, model="soft", torsion=0.0)
     contacts = make_contacts(place, n)
-    with pytest.raises(CommandError, match=r"edges: expected at least 3"):
+    with pytest.raises(CommandError, match=r"edges: expected a whole number of at least 3"):
         contacts.cone_edges(2)
     for length in (0.0, np.nan, -1.0):
         with pytest.raises(CommandError, match=r"length scale: expected a number above 0 m"):

@@ -195,6 +195,25 @@ def test_friction_that_would_do_is_found() -> None:
     assert sentence.startswith("Friction binds: 1.67 times as much would do (at least 0.5")
 
 
+def test_little_more_friction_than_needed_always_holds() -> None:
+    """The solver's long steps go in circles for some of these, which is no proof that nothing holds."""
+    ends = np.array([[-0.03, 0.0, 0.0], [0.03, 0.0, 0.0]])
+    load = weight(0.1, [0.0, 0.0, -1.0])[0]
+    for friction in np.linspace(0.5015, 0.56, 300)[78:90]:
+        contacts = make_contacts(ends, -ends / 0.03 - [0.0, 0.0, 0.5], friction)
+        assert least_effort(held_by_contacts(contacts, np.zeros(3), 0.03), load) is not None
+
+
+@pytest.mark.parametrize("friction", [1e-6, 1e-3, 0.3])
+def test_friction_is_what_lacks_however_little_there_is(friction: float) -> None:
+    """Two fingers that push a little downwards hold with friction 0.5 and a little more, from whatever they have."""
+    ends = np.array([[-0.03, 0.0, 0.0], [0.03, 0.0, 0.0]])
+    held = held_by_contacts(make_contacts(ends, -ends / 0.03 - [0.0, 0.0, 0.5], friction), np.zeros(3), 0.03)
+    sentence = why_not(held, weight(0.1, [0.0, 0.0, -1.0])[0])
+    assert sentence.startswith("Friction binds:")
+    assert "at least 0.5" in sentence
+
+
 def test_squeeze_has_the_margin_that_limits_allow() -> None:
     held, load = pinch(0.5, 0.05, limit=0.2), weight(0.2, [0.0, 0.0, -1.0])
     pulls = six_pulls(0.2 * GRAVITY)

@@ -97,12 +97,17 @@ def solve(
     from math import radians
 
     import clench
+    from clench.grasp.mechanics.contacts import check_friction
+    from clench.grasp.mechanics.loads import check_mass
     from clench.kernels.warming import warm_up
     from clench.solve.pareto import hand_front
 
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
+    check_mass(mass)
+    if friction is not None:
+        check_friction(friction)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     if command is not None:

@@ -12,7 +12,7 @@ from clench.base.pose import FloatArray
 from .actuation import HoldingForces, least_effort
 from .held import HeldObject
 
-#: Friction is raised up to this factor to see whether it is what lacks [-].
+#: Friction is raised up to this factor, and at least to this friction, to see whether it is what lacks [-].
 MOST_FRICTION: Final = 100.0
 #: Joints whose use of their limit is this close to the largest bind, too [-].
 _AS_MUCH = 1e-4
@@ -44,13 +44,14 @@ def _friction(held: HeldObject, load: FloatArray) -> str:
     def holds(factor: float) -> bool:
         return least_effort(held.with_friction(held.contacts.friction * factor), load) is not None
 
-    if not holds(MOST_FRICTION):
+    least = float(held.contacts.friction.min())
+    most = MOST_FRICTION * max(1.0, 1.0 / least)
+    if not holds(most):
         return "No friction would do: the contacts can only push, and not against this load."
-    low, high = 1.0, MOST_FRICTION
+    low, high = 1.0, most
     for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if holds(middle) else (middle, high)
-    least = float(held.contacts.friction.min())
     return f"Friction binds: {high:.3g} times as much would do (at least {least * high:.3g} instead of {least:.3g})."
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
+from numbers import Integral
 from typing import Final
 
 import numpy as np
@@ -112,9 +113,10 @@ class ContactSet:
         Raises:
             CommandError: fewer than 3 edges.
         """
+        around = edge_directions(count)
         edges = np.zeros((len(self), count + 2 * (self.width - 3), self.width))
         edges[:, :, 2] = 1.0
-        edges[:, :count, :2] = self.friction[:, None, None] * edge_directions(count)
+        edges[:, :count, :2] = self.friction[:, None, None] * around
         if self.torsion is not None:
             edges[:, count, 3], edges[:, count + 1, 3] = self.torsion, -self.torsion
         return edges
@@ -146,14 +148,17 @@ def make_contacts(
     if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
         raise CommandError("contacts.normals: expected finite vectors of some length.")
 
-    def each(value: ArrayLike) -> FloatArray:
-        return np.broadcast_to(np.asarray(value, dtype=np.float64), (len(p),)).copy()
+    def each(value: ArrayLike, key: str) -> FloatArray:
+        try:
+            return np.broadcast_to(np.asarray(value, dtype=np.float64), (len(p),)).copy()
+        except (TypeError, ValueError):
+            raise CommandError(f"{key}: expected one number, or one for each of {len(p)} contacts.") from None
 
     return ContactSet(
         positions=p,
         normals=n / lengths,
-        friction=each(friction),
-        torsion=each(torsion) if model == ContactModel.SOFT else None,
+        friction=each(friction, "friction"),
+        torsion=each(torsion, "torsion") if model == ContactModel.SOFT else None,
         links=None if links is None else np.array(links, dtype=np.int64).reshape(-1),
     )
 
@@ -179,8 +184,8 @@ def edge_directions(count: int, turned: float = 0.0) -> FloatArray:
     Raises:
         CommandError: fewer than 3.
     """
-    if count < 3:
-        raise CommandError(f"edges: expected at least 3 edges of the friction cone, got {count}.")
+    if not isinstance(count, Integral) or count < 3:
+        raise CommandError(f"edges: expected a whole number of at least 3 edges of the friction cone, got {count!r}.")
     angles = 2.0 * np.pi * (np.arange(count) + turned) / count
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     directions.flags.writeable = False
@@ -202,7 +207,10 @@ def check_friction(friction: ArrayLike, key: str = "friction") -> None:
     Raises:
         CommandError: with the first such value.
     """
-    values = np.atleast_1d(np.asarray(friction, dtype=np.float64))
+    try:
+        values = np.atleast_1d(np.asarray(friction, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise CommandError(f"{key}: expected a finite number above 0, got {friction!r}.") from None
     bad = values[~(np.isfinite(values) & (values > 0.0))]
     if bad.size:
         raise CommandError(f"{key}: expected a finite number above 0, got {bad.flat[0]:g}; nothing holds without it.")

@@ -6,13 +6,14 @@ What contacts can resist is convex: whoever holds the corners of a set holds eve
 from __future__ import annotations
 
 from functools import cache
+from numbers import Real
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.base.errors import CommandError
-from clench.base.pose import FloatArray
+from clench.base.pose import FloatArray, checked_vector
 
 #: Standard acceleration of gravity [m/s²].
 GRAVITY: Final = 9.80665
@@ -24,10 +25,10 @@ def weight(mass: float, direction: ArrayLike) -> FloatArray:
     Raises:
         CommandError: a mass that is not finite and at least 0, a direction of no length.
     """
-    d = np.asarray(direction, dtype=np.float64)
-    norm = float(np.linalg.norm(d)) if d.shape == (3,) else 0.0
+    d = checked_vector(direction, 3, "gravity", "[x, y, z]")
+    norm = float(np.linalg.norm(d))
     if not (np.isfinite(norm) and norm > 0.0):
-        raise CommandError(f"gravity: expected a direction [x, y, z] of some length, got {direction!r}.")
+        raise CommandError(f"gravity: expected a direction [x, y, z] of some length, got {d.tolist()}.")
     load = np.zeros((1, 6))
     load[0, :3] = check_mass(mass) * GRAVITY * d / norm
     return load
@@ -80,7 +81,10 @@ def check_loads(loads: ArrayLike) -> FloatArray:
     Raises:
         CommandError: none, another shape, or numbers that are not finite.
     """
-    rows = np.atleast_2d(np.asarray(loads, dtype=np.float64))
+    try:
+        rows = np.atleast_2d(np.asarray(loads, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise CommandError(f"loads: expected rows of six numbers (force, torque / length), got {loads!r}.") from None
     if rows.size == 0:
         raise CommandError("loads: the set is empty; expected at least one wrench to hold.")
     if rows.ndim != 2 or rows.shape[1] != 6:
@@ -96,7 +100,7 @@ def check_mass(mass: float) -> float:
     Raises:
         CommandError: not finite, or below 0.
     """
-    if not (np.isfinite(mass) and mass >= 0.0):
+    if not (isinstance(mass, Real) and np.isfinite(mass) and mass >= 0.0):
         raise CommandError(f"mass: expected a finite number of at least 0 kg, got {mass!r}.")
     return float(mass)
 

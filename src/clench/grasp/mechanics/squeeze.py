@@ -72,9 +72,10 @@ def squeeze_forces(
     best = _largest_margin(held, nominal, unit, changes, enough)
     if best is None:
         return SqueezeForces(None, 0.0, unresisted, why_not(held, nominal))
-    gentle = _least_torque(held, nominal, unit, changes, best[1] * (1.0 - _GIVEN_UP))
+    # A margin that is enough is reached to the last digit; only one that falls short gives up a part.
+    gentle = _least_torque(held, nominal, unit, changes, min(enough, best[1] * (1.0 - _GIVEN_UP)))
     plan, margin = gentle if gentle is not None else best
-    return SqueezeForces(plan, margin, unresisted, "")
+    return SqueezeForces(plan, min(enough, margin), unresisted, "")
 
 
 def _largest_margin(
@@ -87,7 +88,7 @@ def _largest_margin(
         program = HoldingProgram(held, load, unit, extra=1, tendons=tendons)
         spread = np.eye(program.cone.size)[place]
         program.cone.cost[place] = -1.0
-        program.cone.at_most(np.vstack([spread, -spread]), np.array([enough, 0.0]))
+        program.cone.at_most(np.vstack([spread, -spread]), np.array([enough * (1.0 + 2.0 * _GIVEN_UP), 0.0]))
         _demand_spread(program, changes / unit, spread)
         return program
 
