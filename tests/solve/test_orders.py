@@ -195,3 +195,59 @@ def test_links_that_rest_do_not_keep_fingers_from_meeting():
     assert q == pytest.approx(solution.joint_angles["thumb_2"], abs=1e-6)
     assert 0.05 * np.sin(q) + 0.04 * np.sin(2.0 * q) + RADIUS == pytest.approx(0.05, abs=1e-8)
     assert solution.certified
+
+
+def test_followers_that_are_held_before_they_start_end_the_search_for_meetings():
+    """A joint that breaks away from its coupling starts late, and its finger meets another one before."""
+    shapes, lengths = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)], [0.05, 0.04]
+    builder = HandBuilder().finger("index", shapes, lengths, upper=1.5)
+    builder.couple("index_0", "index_1", 1.0, -0.8, breakaway=True)
+    down = [np.array([0.0, 1.0, 0.0])] * 2
+    base = mount((0, 0, 0.06))
+    hand = builder.finger("thumb", shapes, lengths, base=base, axes=down, upper=1.5, thumb=True).hand()
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = solve(hand, free, order="together")
+    assert solution.joint_angles["index_0"] < 0.8
+    assert solution.joint_angles["index_1"] == 0.0
+    assert solution.certified
+
+
+def test_the_trajectory_lets_a_follower_wait_where_it_was_computed_to_wait():
+    """A follower whose coupled angle lies below its limit stands still until the leader has brought it there."""
+    shapes, lengths = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)], [0.05, 0.04]
+    hand = HandBuilder().finger("index", shapes, lengths, upper=1.5).couple("index_0", "index_1", 1.0, -0.8).hand()
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    positions = plan_trajectory(solve(hand, free, order="together"), hand).positions
+    assert positions[:, 1] == pytest.approx(np.maximum(positions[:, 0] - 0.8, 0.0), abs=1e-12)
+    assert positions[-1] == pytest.approx([1.5, 0.7])
+
+
+def test_the_trajectory_does_not_take_a_joint_past_where_it_broke_away():
+    """The distal joint leads, and goes on when the proximal one, which follows it, is blocked."""
+    shapes, lengths = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.04)], [0.05, 0.04]
+    builder = HandBuilder().finger("index", shapes, lengths, upper=1.5)
+    hand = builder.couple("index_1", "index_0", 1.0, breakaway=True).hand()
+    solution = solve(hand, bar(0.03, 0.02))
+    positions = plan_trajectory(solution, hand).positions
+    first = solution.joint_angles["index_0"]
+    assert first == pytest.approx(angle_to_bar(0.03, 0.02), abs=1e-7)
+    assert positions[:, 0].max() == pytest.approx(first, abs=1e-12)
+    assert positions[:, 0] == pytest.approx(np.minimum(positions[:, 1], first), abs=1e-9)
+
+
+def test_a_finger_that_meets_a_resting_link_of_another_is_held_alone():
+    """The thumb's first link only rests; what it holds is the finger that runs into it."""
+    builder = HandBuilder().finger("index", [along_x(RADIUS, 0.05)], [0.05], upper=1.5)
+    shapes, lengths = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.01)], [0.05, 0.01]
+    roles = [JointRole.POSTURE, JointRole.CLOSING]
+    axes = [np.array([0.0, 1.0, 0.0])] * 2
+    # The thumb's second link turns away from the index finger.
+    axes[1] = -axes[1]
+    base = mount((0.0, 0.0, 0.03))
+    hand = builder.finger("thumb", shapes, lengths, base=base, axes=axes, upper=1.0, roles=roles, thumb=True).hand()
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = solve(hand, free, order="together")
+    assert 0.05 * np.sin(solution.joint_angles["index_0"]) + 2.0 * RADIUS == pytest.approx(0.03, abs=1e-8)
+    assert solution.joint_angles["thumb_1"] == pytest.approx(1.0)
+    assert "thumb_link_0" in solution.fingers["index"].reason
+    assert solution.certified

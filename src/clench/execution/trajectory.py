@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,8 @@ SLOWEST = 1e-6
 STAGE_STEPS = 8
 #: Way-points of a path on which all joints move at once, besides those at which one stops.
 AT_ONCE_STEPS = 32
+#: Places of a path that differ by less than this share of its length are one [-].
+ROUNDING = 1e-12
 #: Joints that move less than this stand still [rad].
 STILL = 1e-9
 
@@ -117,12 +119,12 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
     limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
     turned, opening = _preparation(hand, start, end)
     if _closed_at_once(solution):
-        stages = [[_path_at_once(solution, hand, turned, end)]] * len(hand.fingers)
+        stages = [_path_at_once(solution, hand, turned, end)] * len(hand.fingers)
     else:
         stages = [list(_stages(hand, f.joints, turned, end)) for f in hand.fingers]
     timed = [_timed(found, limits * speed) for found in stages]
     duration = max((times[-1] for times, _ in timed), default=0.0)
-    grid = np.unique(np.concatenate([np.zeros(1), *(_stretched(times, duration) for times, _ in timed)]))
+    grid = _distinct(np.concatenate([np.zeros(1), *(_stretched(times, duration) for times, _ in timed)]))
     positions = np.tile(turned, (len(grid), 1))
     for finger, (times, path) in zip(hand.fingers, timed, strict=True):
         for j in finger.joints:
@@ -158,20 +160,39 @@ def _closed_at_once(solution: GraspSolution) -> bool:
     return any(order != ClosingOrder.PROXIMAL_FIRST for order in orders)
 
 
-def _path_at_once(solution: GraspSolution, hand: Hand, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return way-points on which all joints move, each at its speed and until its end, shape (n, J).
-
-    Every place at which a joint stops is a way-point; between two of them the path is a straight line.
-    """
+def _path_at_once(solution: GraspSolution, hand: Hand, start: FloatArray, end: FloatArray) -> list[FloatArray]:
+    """Return the path on which all joints move, each at its speed and until its end, as stages."""
     speed = np.array([solution.speeds.get(name, 1.0) for name in hand.joint_names])
-    for c in hand.couplings:
-        speed[c.follower] = abs(c.ratio) * speed[c.leader]
+    path = _closing_path(hand, range(len(start)), start, end, speed, AT_ONCE_STEPS)
+    return [path, _eased(path[-1], end)] if np.abs(end - path[-1]).max(initial=0.0) > STILL else [path]
+
+
+def _closing_path(
+    hand: Hand, joints: Sequence[int], start: FloatArray, end: FloatArray, speed: FloatArray, steps: int
+) -> FloatArray:
+    """Return way-points on which joints move at their speeds, each until its end, shape (n, J); the others rest.
+
+    Followers are where their couplings have them, between their own start and end: one at its limit waits, and one
+    that breaks away goes on with the actuator while its leader is held, or is held while its leader goes on. Every
+    place at which a joint starts or stops is a way-point; between two of them the path is a straight line.
+    """
     away = end - start
-    stops = np.abs(away) / np.maximum(speed, STILL)
-    s = np.linspace(0.0, 1.0, AT_ONCE_STEPS + 1)
-    places = np.unique(np.concatenate([stops, stops.max() * s * s * (3.0 - 2.0 * s)]))
-    path: FloatArray = start + np.sign(away) * np.minimum(places[:, None] * speed, np.abs(away))
-    path[-1] = end
+    closing = np.array([j.direction for j in hand.joints], dtype=np.float64)
+    rate = np.where(np.abs(away) > STILL, np.sign(away), closing) * speed
+    free = start.copy()
+    for c in hand.couplings:
+        rate[c.follower] = c.ratio * rate[c.leader]
+        free[c.follower] = c.ratio * start[c.leader] + c.offset
+    moves = np.isin(np.arange(len(start)), joints) & (away != 0.0) & (rate != 0.0)
+    events = np.array([start - free, end - free])[:, moves] / rate[moves]
+    last = float(events.max(initial=0.0))
+    if last <= 0.0:
+        return start[None].copy()
+    s = np.linspace(0.0, 1.0, steps + 1)
+    places = _distinct(np.concatenate([np.clip(events.ravel(), 0.0, last), last * s * s * (3.0 - 2.0 * s)]))
+    between = np.clip(free + places[:, None] * rate, np.minimum(start, end), np.maximum(start, end))
+    path: FloatArray = np.where(moves, between, start)
+    path[0], path[-1] = start, np.where(moves, end, start)
     return path
 
 
@@ -184,30 +205,12 @@ def _stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatAr
         if leader in followers:
             continue
         group = [leader, *(j for j in _followers(hand, leader) if j in joints)]
-        path = _group_path(hand, group, q, end)
+        path = _closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
         yield path
         q = path[-1].copy()
-        # A follower that broke away went on alone after its leader was stopped.
-        target = q.copy()
-        target[group] = end[group]
-        if np.abs(target - q).max() > STILL:
-            yield _eased(q, target)
-            q = target
     target = q.copy()
     target[list(joints)] = end[list(joints)]
     yield _eased(q, target)
-
-
-def _group_path(hand: Hand, group: list[int], start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return way-points on which a leader goes to its end and its followers obey their couplings, shape (n, J)."""
-    leader, followers = group[0], group[1:]
-    if abs(end[leader] - start[leader]) <= STILL:
-        return start[None].copy()
-    path = _eased(start, np.where(np.arange(len(start)) == leader, end, start))
-    offset = start[followers] - hand.coupled(start)[followers]
-    for k, s in enumerate(np.linspace(0.0, 1.0, len(path))):
-        path[k, followers] = hand.coupled(path[k])[followers] + (1.0 - s) * offset
-    return path
 
 
 def _followers(hand: Hand, leader: int) -> list[int]:
@@ -243,6 +246,13 @@ def _timed(stages: list[FloatArray], limits: FloatArray) -> tuple[FloatArray, Fl
         times += [times[-1] + step * (k + 1) for k in range(len(stage) - 1)]
         path += list(stage[1:])
     return np.array(times), np.array(path)
+
+
+def _distinct(values: FloatArray) -> FloatArray:
+    """Return values in order, from 0 on; of those that differ by rounding alone, the first."""
+    ordered = np.unique(values)
+    distinct: FloatArray = ordered[np.diff(ordered, prepend=-np.inf) > ROUNDING * ordered[-1]]
+    return distinct
 
 
 def _stretched(times: FloatArray, duration: float) -> FloatArray:

@@ -72,7 +72,7 @@ def close_together(
     until = {c.item: plan.items.until[c.item].copy() for c in sets}
     held: dict[int, list[Touch]] = {c.item: [] for c in sets}
     apart = bodies.across - bodies.within
-    moving = [k for k, c in enumerate(sets) if c.plane is None and c.overlap is None]
+    moving = [k for k, c in enumerate(sets) if c.plane is None]
     meetings: dict[tuple[int, int], Meeting | None] = {}
     overlapping: set[int] = set()
     while True:
@@ -89,17 +89,26 @@ def close_together(
             ]
         first, a, b = min(later, key=lambda row: (row[0].at, row[0].links))
         meetings = {pair: m for pair, m in meetings.items() if not {a, b} & set(pair)}
+        # Two links that met rest from there on, and until there move as they did: they do not meet again.
+        apart[first.links[0], first.links[1]] = apart[first.links[1], first.links[0]] = 0
         for k, own, other, sign in ((a, 0, 1, 1.0), (b, 1, 0, -1.0)):
             c = sets[k]
             joint = _hold(hand, plan, c, first.links[own], first.at, until[c.item])
+            if joint is None:
+                continue
             held[c.item].append(_touch(first, first.links[own], first.links[other], joint, sign))
             sets[k] = _closed_again(hand, plan, exact, closed, packed, c, until[c.item])
 
 
-def _hold(hand: Hand, plan: HandPlan, c: FingerCandidate, link: int, at: float, until: FloatArray) -> int:
-    """Hold the joints of a finger up to a link from a place of the motion on; return the last of them in the hand."""
+def _hold(hand: Hand, plan: HandPlan, c: FingerCandidate, link: int, at: float, until: FloatArray) -> int | None:
+    """Hold the joints of a finger up to a link from a place of the motion on; return the last of them in the hand.
+
+    None is returned for a link that rests, and where nothing of the finger moves.
+    """
     first = int(np.searchsorted(plan.arrays.chain.joint_group, plan.arrays.entry_group[plan.items.entry[c.item]]))
     moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
+    if link not in moved_by or c.overlap is not None:
+        return None
     last = [p.joint for p in c.plan.joints].index(moved_by[link])
     until[first : first + last + 1] = np.minimum(until[first : first + last + 1], at)
     return c.plan.joints[last].joint
@@ -134,17 +143,19 @@ def _meeting(
     from clench.kernels.nearness import link_gap
 
     speeds = [_link_speeds(hand, c, bodies) for c in (one, other)]
-    ends = [_link_ends(hand, c) for c in (one, other)]
+    ends = [_joint_ends(c) for c in (one, other)]
     # What rests on both sides is judged with the whole hand.
-    moves = {(m, r): max(ends[0].get(m, 0.0), ends[1].get(r, 0.0)) for m in speeds[0] for r in speeds[1]}
-    waiting = [(0.0, m, r, np.inf) for (m, r), end in moves.items() if apart[m, r] and end > 0.0]
+    lasts = [{link: _last_end(own, e) for link, own in found.items()} for found, e in zip(speeds, ends, strict=True)]
+    last = {(m, r): max(lasts[0][m], lasts[1][r]) for m in speeds[0] for r in speeds[1] if apart[m, r]}
+    waiting = [(0.0, m, r, np.inf) for (m, r), end in last.items() if end > 0.0]
     heapify(waiting)
     out = np.empty(6)
     for looks in range(_LOOKS):
         if not waiting:
             return None
         at, m, r, away = heappop(waiting)
-        speed, end = speeds[0][m] + speeds[1][r], moves[m, r]
+        # Only joints that move still count.
+        end, speed = last[m, r], float(speeds[0][m] @ (ends[0] > at) + speeds[1][r] @ (ends[1] > at))
         slack = _SLACK if away > _NEAR else 1.0
         # A gap that is not below the bound is the bound itself, which has to be none of a touch.
         bound = (end - at) * speed + 2.0 * _TOUCH
@@ -167,8 +178,8 @@ def _poses(hand: Hand, one: FingerCandidate, other: FingerCandidate, at: float) 
     return np.ascontiguousarray(hand.link_poses(q)[:, :3])
 
 
-def _link_speeds(hand: Hand, c: FingerCandidate, bodies: HandBodies) -> dict[int, float]:
-    """Return a bound on the speed of the points of a finger's links that can touch [m per motion]."""
+def _link_speeds(hand: Hand, c: FingerCandidate, bodies: HandBodies) -> dict[int, FloatArray]:
+    """Return bounds on how fast each joint of a plan moves the points of links that can touch [m per motion], (n,)."""
     moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
     poses = hand.link_poses(c.plan.posture)
     T = c.plan.families[0].T_palm_family
@@ -180,13 +191,13 @@ def _link_speeds(hand: Hand, c: FingerCandidate, bodies: HandBodies) -> dict[int
         if bodies.links.root[link] < 0:
             continue
         ball = bodies.links.node[bodies.links.root[link]]
-        speeds[link] = 0.0
+        speeds[link] = np.zeros(len(order))
         if link in moved_by:
             last = order.index(moved_by[link])
             middle = poses[link][:3, :3] @ ball[:3] + poses[link][:3, 3]
             reach = float(np.linalg.norm(middle - pivots[last])) + ball[3]
             for j in range(last, -1, -1):
-                speeds[link] += rates[j] * reach
+                speeds[link][j] = rates[j] * reach
                 reach += float(np.linalg.norm(pivots[j] - pivots[j - 1])) if j else 0.0
     return speeds
 
@@ -201,17 +212,18 @@ def _turn(c: FingerCandidate, at: float) -> FloatArray:
     return np.array(turns)
 
 
-def _link_ends(hand: Hand, c: FingerCandidate) -> dict[int, float]:
-    """Return after how much motion each of a finger's links that closing moves is at rest."""
-    moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
-    ends = [
-        (p.start + abs(c.q[p.joint] - c.plan.posture[p.joint]) / abs(p.rate)) / c.plan.speeds[p.group]
-        if p.rate != 0.0
-        else 0.0
-        for p in c.plan.joints
-    ]
-    order = [p.joint for p in c.plan.joints]
-    return {link: max(ends[: order.index(joint) + 1]) for link, joint in moved_by.items()}
+def _joint_ends(c: FingerCandidate) -> FloatArray:
+    """Return after how much motion each joint of a set's plan is at rest, shape (n,); 0 for one that never moves."""
+    ends = []
+    for p in c.plan.joints:
+        turn = abs(c.q[p.joint] - c.plan.posture[p.joint])
+        ends.append((p.start + turn / abs(p.rate)) / c.plan.speeds[p.group] if turn > 0.0 else 0.0)
+    return np.array(ends)
+
+
+def _last_end(speeds: FloatArray, ends: FloatArray) -> float:
+    """Return after how much motion a link is at rest that joints move so fast."""
+    return float(ends[speeds > 0.0].max(initial=0.0))
 
 
 def _touch(meeting: Meeting, link: int, met: int, joint: int, sign: float) -> Touch:
