@@ -154,12 +154,24 @@ def test_nothing_to_hold_takes_no_torque(grip) -> None:
 
 def test_passed_contacts_and_obstacles_do_not_hold(grip) -> None:
     hand, ball, solution = grip
+    solution = replace(solution, contacts=clench.grasp_quality(solution, hand, ball).grasp.contacts)
     first, *rest = solution.contacts
     passed = replace(solution, contacts=(replace(first, passed=True), *rest))
     assert len(clench.grasp_quality(passed, hand, ball).grasp.contacts) == len(solution.contacts) - 1
     table = replace(ball.bodies[0], name="table", role=clench.BodyRole.OBSTACLE)
     other = replace(solution, contacts=(replace(first, body="table"), *rest))
     assert len(clench.grasp_quality(other, hand, ball.with_body(table)).grasp.contacts) == len(solution.contacts) - 1
+
+
+def test_a_touch_that_stops_two_joints_counts_once(grip) -> None:
+    hand, ball, solution = grip
+    first = solution.contacts[0]
+    twice = replace(solution, contacts=(*solution.contacts, replace(first, stops_joint="another")))
+    one, other = (clench.grasp_quality(s, hand, ball, norm="Linf") for s in (solution, twice))
+    assert other.epsilon.radius == one.epsilon.radius
+    assert len(other.grasp.contacts) == len(one.grasp.contacts)
+    places = [(c.link, *c.position.round(9)) for c in one.grasp.contacts]
+    assert len(set(places)) == len(places)
 
 
 def test_bad_input_gets_one_sentence(grip) -> None:

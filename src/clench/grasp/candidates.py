@@ -16,6 +16,7 @@ from clench.models.objects.grasp_object import BodyRole
 
 from .closing import ClosedHand, HandPlan
 from .depths import LinkDepth
+from .mechanics.contacts import without_repeats
 from .plan import FingerPlan
 from .scene import PackedObject
 from .surface import surface_normal
@@ -91,8 +92,10 @@ class FingerCandidate:
 
     @cached_property
     def holding(self) -> tuple[Touch, ...]:
-        """Contacts with a graspable body that are still touching."""
-        return tuple(t for t in self.touches if t.graspable and not t.passed)
+        """Contacts with a graspable body that are still touching, each once."""
+        still = [t for t in self.touches if t.graspable and not t.passed]
+        kept = without_repeats([t.link for t in still], [t.position for t in still], [t.normal for t in still])
+        return tuple(still[i] for i in kept)
 
 
 def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandidate]) -> FloatArray:

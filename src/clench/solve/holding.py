@@ -15,6 +15,7 @@ from clench.grasp.mechanics.contacts import (
     check_friction,
     make_contacts,
     pair_friction,
+    without_repeats,
 )
 from clench.grasp.mechanics.held import HeldObject, held_by_hand
 from clench.models.hand.hand import Hand
@@ -30,7 +31,7 @@ class HeldSolution:
     """Hold a solution as mechanics sees it.
 
     Args:
-        held: contacts in the palm frame. contacts: the solution's contacts, in the same order.
+        held: contacts in the palm frame. contacts: the solution's contacts, in the same order, each place once.
         T_world_palm: where the palm is. model: of the contacts. center: centre of mass in the world [m].
     """
 
@@ -72,7 +73,7 @@ def hold(
     torsion: float = DEFAULT_TORSION,
     center_of_mass: ArrayLike | None = None,
 ) -> HeldSolution:
-    """Return a solution as mechanics sees it; contacts with obstacles and passed ones are left out.
+    """Return a solution as mechanics sees it; contacts with obstacles, passed ones and repeated ones are left out.
 
     Args:
         solution: the solution. hand, obj: what it was computed for.
@@ -88,8 +89,10 @@ def hold(
         check_friction(friction)
     q = posture(solution.joint_angles, hand, "joint_angles")
     bodies = {body.name: body for body in obj.bodies if body.role is BodyRole.GRASPABLE}
-    contacts = tuple(c for c in solution.contacts if not c.passed and c.body in bodies)
-    links = [hand.link_index(c.link) for c in contacts]
+    still = [c for c in solution.contacts if not c.passed and c.body in bodies]
+    touching = [hand.link_index(c.link) for c in still]
+    kept = without_repeats(touching, [c.position for c in still], [c.normal for c in still])
+    contacts, links = tuple(still[i] for i in kept), [touching[i] for i in kept]
     pairs = [pair_friction(hand, link, bodies[c.body]) for link, c in zip(links, contacts, strict=True)]
     T_palm_world = solution.hand_pose.inverse()
     made = make_contacts(

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
+from math import dist
 from numbers import Integral
 from typing import Final
 
@@ -28,6 +29,8 @@ from clench.models.objects.grasp_object import Body
 DEFAULT_FRICTION: Final = 0.5
 #: Torsional coefficient of soft fingers unless given [m]: torque about the normal per normal force; MuJoCo's default.
 DEFAULT_TORSION: Final = 0.005
+#: Contacts of a link whose places and normals differ by less are one [m, -].
+_SAME: Final = 1e-9
 #: Normals whose length is off by more than this are refused [-].
 _UNIT: Final = 1e-6
 
@@ -161,6 +164,20 @@ def make_contacts(
         torsion=each(torsion, "torsion") if model == ContactModel.SOFT else None,
         links=None if links is None else np.array(links, dtype=np.int64).reshape(-1),
     )
+
+
+def without_repeats(links: Sequence[int], positions: Sequence[FloatArray], normals: Sequence[FloatArray]) -> list[int]:
+    """Return the indices of contacts, each place of a link once: a touch that stops two joints is listed for both.
+
+    Args:
+        links: indices of the touching links. positions: [m]. normals: unit; links in a corner have two at one place.
+    """
+    kept: list[int] = []
+    for i, link in enumerate(links):
+        known = (k for k in kept if links[k] == link)
+        if not any(max(dist(positions[k], positions[i]), dist(normals[k], normals[i])) <= _SAME for k in known):
+            kept.append(i)
+    return kept
 
 
 def contact_frames(normals: FloatArray) -> FloatArray:
