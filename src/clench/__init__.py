@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from clench.execution.formats.grasp_posture import GraspPosture
     from clench.execution.formats.mcap_log import write_log
     from clench.execution.history import ExecutionHistory
+    from clench.execution.hold import Hold, HoldReport
     from clench.execution.joint_map import JointMap
     from clench.execution.pregrasp import plan_pregrasp
     from clench.execution.ready_signal import ReadySignal
@@ -91,6 +92,8 @@ _HOMES = {
     "HandDriver": "clench.execution.driver",
     "HandError": "clench.base.errors",
     "HandState": "clench.execution.driver",
+    "Hold": "clench.execution.hold",
+    "HoldReport": "clench.execution.hold",
     "JointMap": "clench.execution.joint_map",
     "JointPath": "clench.execution.driver",
     "JointRole": "clench.models.hand.hand",
@@ -160,6 +163,8 @@ __all__ = [
     "HandDriver",
     "HandError",
     "HandState",
+    "Hold",
+    "HoldReport",
     "JointMap",
     "JointPath",
     "JointRole",

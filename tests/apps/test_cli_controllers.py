@@ -68,6 +68,10 @@ def test_choices_are_the_values_of_the_enumerations() -> None:
         (["--actuator", "ros2", "--joint-map", "absent.toml"], "absent.toml: no such file."),
         (["--actuator", "ros2", "--timeout", "0"], "--timeout: expected seconds above 0, got 0."),
         (["--actuator", "orca-mock", "--config", "absent.yaml"], "absent.yaml: no such file."),
+        (["--actuator", "orca-mock", "--hold"], "--hold means nothing to --actuator orca-mock."),
+        (["--mass", "0.2"], "--mass means nothing without --hold."),
+        (["--hold", "--mass", "-1"], "hold: mass: expected a finite number of at least 0.001 kg, got -1.0."),
+        (["--hold", "--friction", "nan"], "hold: friction: expected a finite number above 0, got nan;"),
         (["--object", "mug"], "geometry_hash: the solution was computed for another geometry of object 'mug'"),
         (["--log", "absent/x.mcap"], "absent/x.mcap: cannot be written (no folder 'absent')."),
         (["--out", "absent/x.json"], "absent/x.json: cannot be written (no folder 'absent')."),
@@ -115,6 +119,21 @@ def test_the_ready_signal(solution: GraspSolution, tmp_path: Path, capsys: pytes
     assert "done: Recorded as 1 and signalled to" in capsys.readouterr().out
     with Record(record) as recorded:
         assert recorded.read(json.loads(ready.read_text())["id"]) == solution
+
+
+def test_what_no_finger_touches_is_dropped(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--hold", "--mass", "0.3", "--out", str(tmp_path / "r.json")]
+    assert main(["execute", str(tmp_path / "s.json"), *options]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert printed.startswith("dropped: Every joint is within")
+    assert "hold: 0.3 kg, friction 0.6, torsion 0.02 m, 3 N for 2 s; dropped from 50.000 mm or 15° on" in printed
+    assert "Nothing touches the object." in printed
+    held = json.loads((tmp_path / "r.json").read_text())["hold"]
+    assert held["held"] is False
+    assert held["settings"]["mass"] == 0.3
+    assert any(not pulled["held"] for pulled in held["pulls"].values())
 
 
 def test_the_simulated_hand_is_logged(solution: GraspSolution, tmp_path: Path) -> None:

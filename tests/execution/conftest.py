@@ -124,7 +124,17 @@ def pinch(pincer: Hand, ball: GraspObject) -> GraspSolution:
     points = {"thumb": p_thumb, "index": np.array([x, 0.0, z])}
     links = {"thumb": "thumb_link", "index": "index_distal"}
     angles = {"thumb": {"thumb": thumb}, "index": {"index": index, "index_tip": index}}
-    contacts = {n: make_contact(finger=n, link=links[n], position=PALM_POSE.apply(p)) for n, p in points.items()}
+    centre = np.array([0.0, 0.0, BALL_HEIGHT])
+    contacts = {
+        n: make_contact(
+            finger=n,
+            link=links[n],
+            body="ball",
+            position=PALM_POSE.apply(p),
+            normal=PALM_POSE.rotation @ (p - centre) / BALL_RADIUS,
+        )
+        for n, p in points.items()
+    }
     return make_solution(
         status=SolutionStatus.GRASP,
         geometry_hash=f"{hash_hand(pincer, CollisionSource.ENGINE)}+{hash_bodies(ball.bodies, CollisionSource.RAW)}",

@@ -11,6 +11,7 @@ from clench.base.json_files import write_json
 from clench.base.pose import FloatArray
 
 from .history import ExecutionHistory
+from .hold import HoldReport
 
 SCHEMA = "clench.execution/1"
 
@@ -64,6 +65,7 @@ class ExecutionReport:
         angle_tolerance: [rad], contact_tolerance: [m]: what counted as reached.
         notes: sentences about what the comparison does not show.
         history: what was told and measured on the way, None when it was not kept.
+        hold: what came of a hold test, None without one.
     """
 
     actuator: str
@@ -79,6 +81,7 @@ class ExecutionReport:
     contact_tolerance: float | None = None
     notes: tuple[str, ...] = ()
     history: ExecutionHistory | None = None
+    hold: HoldReport | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, schema `clench.execution/1`."""
@@ -111,6 +114,7 @@ class ExecutionReport:
             "contact_tolerance": self.contact_tolerance,
             "notes": list(self.notes),
             "history": None if self.history is None else self.history.to_dict(),
+            "hold": None if self.hold is None else self.hold.to_dict(),
         }
 
     def save(self, path: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""A MuJoCo scene: the hand fixed in space at its palm, every joint on a servo, and the object fixed in front of it."""
+"""A MuJoCo scene: the hand fixed in space at its palm, every joint on a servo, and the object, fixed or free."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 from .convex_pieces import convex_pieces, hull_of
+from .hold import Hold
 
 PREFIX = "hand/"
 BASE = "hand base"
@@ -37,7 +38,7 @@ class Scene:
         qpos: address of every joint of the hand, in the hand's order, shape (J,).
         link_bodies: body of every link, -1 when the simulation merged it into another, shape (L,).
         link_geoms: colliding geoms of every link.
-        object_geoms: geoms of the object and its obstacles.
+        object_body: body of the object and its obstacles. object_geoms: its geoms.
         approximated: names of the bodies whose simulated shape is only near the object's.
     """
 
@@ -45,11 +46,20 @@ class Scene:
     qpos: FloatArray
     link_bodies: tuple[int, ...]
     link_geoms: tuple[tuple[int, ...], ...]
+    object_body: int
     object_geoms: tuple[int, ...]
     approximated: tuple[str, ...]
 
 
-def build_scene(hand: Hand, obj: GraspObject, hand_pose: Pose, q: FloatArray, *, show_progress: bool = False) -> Scene:
+def build_scene(
+    hand: Hand,
+    obj: GraspObject,
+    hand_pose: Pose,
+    q: FloatArray,
+    *,
+    free: Hold | None = None,
+    show_progress: bool = False,
+) -> Scene:
     """Place a hand and an object in a scene without gravity.
 
     The model's own actuators, tendons, equalities and sensors are left out: every joint has a position servo of
@@ -61,6 +71,7 @@ def build_scene(hand: Hand, obj: GraspObject, hand_pose: Pose, q: FloatArray, *,
         obj: the object, at its pose.
         hand_pose: `T_world_palm`.
         q: posture [rad], shape (J,), at which the palm is placed (matters when a wrist is upstream of it).
+        free: mass and friction of an object that can move; None fixes it in place.
         show_progress: show a bar while convex pieces are computed.
 
     Raises:
@@ -74,12 +85,20 @@ def build_scene(hand: Hand, obj: GraspObject, hand_pose: Pose, q: FloatArray, *,
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     _add_hand(spec, hand)
-    approximated = _add_object(spec, obj, show_progress)
+    if free is not None:
+        # Without these, friction of the engine creeps: a held object slides out slowly.
+        spec.option.impratio = 10.0
+        spec.option.noslip_iterations = 2
+    approximated = _add_object(spec, obj, free, show_progress)
     try:
         model = spec.compile()
     except ValueError as error:
         raise HandError(f"Hand '{hand.name}' and object '{obj.name}' cannot be simulated: {error}.") from None
     scene = _located(model, hand, approximated)
+    if free is not None:
+        share = free.mass / model.body_mass[scene.object_body]
+        model.body_mass[scene.object_body] *= share
+        model.body_inertia[scene.object_body] *= share
     _tune(scene, hand)
     _place(scene, hand, hand_pose, q)
     return scene
@@ -122,18 +141,21 @@ def _without_replaced(xml: str) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def _add_object(spec: Any, obj: GraspObject, show_progress: bool) -> tuple[str, ...]:
-    """Add the object's bodies, fixed; return the names of those whose shape is approximated."""
+def _add_object(spec: Any, obj: GraspObject, free: Hold | None, show_progress: bool) -> tuple[str, ...]:
+    """Add the object's bodies, as one; return the names of those whose shape is approximated."""
     base = spec.worldbody.add_body(name="object", pos=obj.pose.position, quat=obj.pose.wxyz)
+    surface = _surface(free)
+    if free is not None:
+        base.add_freejoint()
     approximated = []
     for number, body in enumerate(obj.bodies):
         pieces = _pieces(body, obj.collision_source, show_progress)
         count = sum(len(vertices) for vertices in pieces.values())
         for i, (shape, hulls) in enumerate(pieces.items()):
             for k, vertices in enumerate(hulls):
-                _add_hull(spec, base, f"object {number} {i} {k}", vertices)
+                _add_hull(spec, base, f"object {number} {i} {k}", vertices, surface)
             if not hulls:
-                _add_primitive(base, body.shapes[shape], f"object {number} {i}")
+                _add_primitive(base, body.shapes[shape], f"object {number} {i}", surface)
         if count > sum(1 for hulls in pieces.values() if hulls):
             approximated.append(body.name)
     return tuple(approximated)
@@ -156,14 +178,14 @@ def _pieces(body: Body, source: CollisionSource, show_progress: bool) -> dict[in
     return found
 
 
-def _add_hull(spec: Any, base: Any, name: str, vertices: FloatArray) -> None:
+def _add_hull(spec: Any, base: Any, name: str, vertices: FloatArray, surface: dict[str, Any]) -> None:
     import mujoco
 
     spec.add_mesh(name=name, uservert=np.ascontiguousarray(vertices).ravel())
-    base.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **_surface())
+    base.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **surface)
 
 
-def _add_primitive(base: Any, shape: Shape, name: str) -> None:
+def _add_primitive(base: Any, shape: Shape, name: str, surface: dict[str, Any]) -> None:
     import mujoco
 
     kinds = {
@@ -174,12 +196,15 @@ def _add_primitive(base: Any, shape: Shape, name: str) -> None:
         ShapeKind.ELLIPSOID: mujoco.mjtGeom.mjGEOM_ELLIPSOID,
     }
     place = {"pos": shape.pose.position, "quat": shape.pose.wxyz}
-    base.add_geom(name=name, type=kinds[shape.kind], size=np.array(shape.size), **place, **_surface())
+    base.add_geom(name=name, type=kinds[shape.kind], size=np.array(shape.size), **place, **surface)
 
 
-def _surface() -> dict[str, Any]:
+def _surface(free: Hold | None) -> dict[str, Any]:
     """Return how the object's geoms touch: anything that touches at all, as stiffly as the time step allows."""
-    return {"contype": _ALL_BITS, "conaffinity": _ALL_BITS, "priority": 1, "solref": [2 * TIMESTEP, 1.0]}
+    found = {"contype": _ALL_BITS, "conaffinity": _ALL_BITS, "priority": 1, "solref": [2 * TIMESTEP, 1.0]}
+    if free is not None:
+        found |= {"condim": 4, "friction": [free.friction, free.torsion, 0.0]}
+    return found
 
 
 def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
@@ -198,6 +223,7 @@ def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
         qpos=model.jnt_qposadr[joints],
         link_bodies=bodies,
         link_geoms=tuple(tuple(np.flatnonzero(colliding & (owner == b)).tolist()) if b >= 0 else () for b in bodies),
+        object_body=object_body,
         object_geoms=tuple(np.flatnonzero(owner == object_body).tolist()),
         approximated=approximated,
     )
@@ -208,7 +234,8 @@ def _tune(scene: Scene, hand: Hand) -> None:
     import mujoco
 
     model = scene.model
-    model.dof_armature[:] = np.maximum(model.dof_armature, ARMATURE)
+    of_hand = model.dof_bodyid != scene.object_body
+    model.dof_armature[of_hand] = np.maximum(model.dof_armature[of_hand], ARMATURE)
     model.dof_damping[:] = 0.0
     model.dof_frictionloss[:] = 0.0
     model.jnt_stiffness[:] = 0.0

@@ -14,6 +14,8 @@ from clench.solve.posture import posture
 from clench.solve.solution import Contact, FingerStatus, GraspSolution
 
 from .history import ExecutionHistory
+from .hold import Hold, HoldReport
+from .pulling import hold_and_pull
 from .report import ContactReached, ExecutionReport, JointReached
 from .scene import TIMESTEP, Scene, body_pose, build_scene
 from .trajectory import Trajectory
@@ -25,7 +27,7 @@ WATCH_INTERVAL = 0.02
 
 
 class SimulatedHand:
-    """Move a hand in simulation, with the palm fixed and the object held in place.
+    """Move a hand in simulation, with the palm fixed and the object held in place until the touch.
 
     The simulated object is made of convex pieces and its contacts are a little soft, so angles and contacts are reached
     up to tolerances, which the report names.
@@ -36,6 +38,8 @@ class SimulatedHand:
         angle_tolerance: largest difference to the computed angles that counts as reached [rad].
         contact_tolerance: largest distance that counts as touching [m].
         show_progress: show a bar while convex pieces are computed.
+        hold: once the touch is reached, release the object, squeeze it as planned, and pull it in six directions;
+            without it the object stays where it is.
         on_step: called with time [s], joint angles [rad] in model order, shape (J,), whenever touches are looked for.
     """
 
@@ -49,6 +53,7 @@ class SimulatedHand:
         angle_tolerance: float = 0.02,
         contact_tolerance: float = 0.001,
         show_progress: bool = False,
+        hold: Hold | None = None,
         on_step: Callable[[float, FloatArray], None] | None = None,
     ) -> None:
         self._hand = hand
@@ -56,6 +61,7 @@ class SimulatedHand:
         self.angle_tolerance = angle_tolerance
         self.contact_tolerance = contact_tolerance
         self.show_progress = show_progress
+        self.hold = hold
         self.on_step = on_step
 
     @property
@@ -64,7 +70,7 @@ class SimulatedHand:
         return self._hand
 
     def carry_out(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
-        """Open, follow the trajectory, stand still for a moment, and compare with the solution.
+        """Open, follow the trajectory, stand still for a moment, compare with the solution; test the hold if asked.
 
         Raises:
             HandError: the hand cannot be simulated. ObjectError: the object cannot. CommandError: the solution is
@@ -91,6 +97,9 @@ class SimulatedHand:
         )
         error = float(np.abs(reached - computed).max(initial=0.0))
         success, reason = self._judge(solution, joints, contacts, error)
+        held = self._held(solution, obj, start, reached) if success else None
+        if held is not None:
+            success, reason = held.held, f"{reason} {held.reason}"
         return ExecutionReport(
             actuator=self.name,
             success=success,
@@ -103,9 +112,29 @@ class SimulatedHand:
             largest_angle_error=error,
             angle_tolerance=self.angle_tolerance,
             contact_tolerance=self.contact_tolerance,
-            notes=_notes(scene, solution),
+            notes=(*_notes(scene, solution), *self._notes_on_hold(held)),
             history=history,
+            hold=held,
         )
+
+    def _held(
+        self, solution: GraspSolution, obj: GraspObject, start: FloatArray, reached: FloatArray
+    ) -> HoldReport | None:
+        if self.hold is None:
+            return None
+        return hold_and_pull(
+            solution, self.hand, obj, self.hold, start=start, reached=reached, show_progress=self.show_progress
+        )
+
+    def _notes_on_hold(self, held: HoldReport | None) -> tuple[str, ...]:
+        if self.hold is None:
+            return ()
+        if held is None:
+            return ("Holding was not tested: the touch was not reached.",)
+        notes = ["The object was held in place until the touch, so closing did not move it; there is no gravity."]
+        if not held.planned:
+            notes.append(f"The squeeze is not one that holds: {held.plan}")
+        return tuple(notes)
 
     def _run(self, scene: Scene, trajectory: Trajectory) -> tuple[Any, dict[str, float | None], ExecutionHistory]:
         """Simulate the motion; return the final state, when each finger first touched, and the samples on the way."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from clench.base.errors import CommandError
 
 if TYPE_CHECKING:
     from clench.execution.driver import HandDriver
     from clench.execution.executing import Actuator
+    from clench.execution.hold import Hold
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
@@ -30,11 +31,12 @@ class ActuatorOptions:
     timeout: float
     to: str | None
     record: Path | None
+    hold: Hold | None = None
 
 
 #: Which options mean something to which actuator; any other that is given is refused.
 _TAKEN: dict[str, tuple[str, ...]] = {
-    "simulated": (),
+    "simulated": ("hold",),
     "ros2": ("controller", "joint_states", "interface", "joint_map"),
     "orca": ("joint_map", "config"),
     "orca-mock": ("joint_map", "config"),
@@ -58,7 +60,7 @@ def make_actuator(
     if not options.timeout > 0.0:
         raise CommandError(f"--timeout: expected seconds above 0, got {options.timeout:g}.")
     if name == "simulated":
-        return clench.SimulatedHand(hand, obj, show_progress=show_progress)
+        return clench.SimulatedHand(hand, obj, show_progress=show_progress, hold=options.hold)
     if name == "signal":
         if options.to is None or options.record is None:
             raise CommandError("--actuator signal needs --to (file:PATH, tcp:HOST:PORT, …) and --record DB.")
@@ -66,6 +68,21 @@ def make_actuator(
     joint_map = None if options.joint_map is None else clench.JointMap.load(options.joint_map)
     driver = _driver(name, options)
     return clench.DrivenHand(hand, driver, joint_map=joint_map, obj=obj, connect_timeout=options.timeout)
+
+
+def make_hold(hold: bool, mass: float | None, friction: float | None) -> Hold | None:
+    """Return the hold test that was asked for, None without `--hold`.
+
+    Raises:
+        CommandError: an option of the test without it; a value out of range.
+    """
+    import clench
+
+    given: dict[str, Any] = {"mass": mass, "friction": friction}
+    given = {key: value for key, value in given.items() if value is not None}
+    if not hold and given:
+        raise CommandError(f"--{next(iter(given))} means nothing without --hold.")
+    return clench.Hold(**given) if hold else None
 
 
 def _driver(name: ActuatorName, options: ActuatorOptions) -> HandDriver:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clench.base.errors import FileError
 
-from .actuators import ActuatorName, ActuatorOptions, Interface, make_actuator
+from .actuators import ActuatorName, ActuatorOptions, Interface, make_actuator, make_hold
 from .interrupts import stopped_by_signals
 
 
@@ -22,6 +22,9 @@ def execute(
     scale: float = 1.0,
     speed: float = 1.0,
     force: bool = False,
+    hold: bool = False,
+    mass: float | None = None,
+    friction: float | None = None,
     controller: str | None = None,
     joint_states: str | None = None,
     interface: Interface | None = None,
@@ -47,6 +50,9 @@ def execute(
         scale: that was used to load the object.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, too.
+        hold: simulated: after the touch release the object, squeeze it as planned, pull it in six directions.
+        mass: hold: of the object, kg (0.1).
+        friction: hold: of its contacts (0.6).
         controller: ros2: name of the joint_trajectory_controller (hand_controller).
         joint_states: ros2: topic of the joint states (/joint_states).
         interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
@@ -70,6 +76,7 @@ def execute(
     for file in (out, log):
         if file is not None and not file.parent.is_dir():
             raise FileError(file, f"cannot be written (no folder '{file.parent}').")
+    tested = make_hold(hold, mass, friction)
     the_solution = clench.GraspSolution.load(solution)
     the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(
@@ -77,7 +84,7 @@ def execute(
         scale=scale,
         collision_source=the_solution.object_collision_source,
     )
-    options = ActuatorOptions(controller, joint_states, interface, joint_map, config, timeout, to, record)
+    options = ActuatorOptions(controller, joint_states, interface, joint_map, config, timeout, to, record, tested)
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
         report = clench.execute(the_solution, moved, speed=speed, force=force)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from clench.execution.hold import HoldReport
     from clench.execution.report import ExecutionReport
     from clench.models.hand.report import HandReport
     from clench.solve.pareto import HandSets
@@ -133,6 +134,8 @@ def print_report(report: ExecutionReport) -> None:
     """Print what an actuator reached."""
     console = _console()
     good, bad = ("reached", "not reached") if report.joints else ("done", "failed")
+    if report.hold is not None:
+        good, bad = "held", "dropped"
     verdict = f"[bold green]{good}[/bold green]" if report.success else f"[bold red]{bad}[/bold red]"
     console.print(f"{verdict}: {_plain(report.reason)}")
     if report.joints:
@@ -149,7 +152,25 @@ def print_report(report: ExecutionReport) -> None:
     times = ", ".join(f"{n} {t:.2f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
     if times:
         console.print(f"first touch: {_plain(times)}")
+    if report.hold is not None:
+        _print_hold(console, report.hold)
     _sentences(console, "note", report.notes)
+
+
+def _print_hold(console: Console, hold: HoldReport) -> None:
+    asked, squeezed = hold.settings, hold.squeezed
+    console.print(
+        f"hold: {asked.mass:g} kg, friction {asked.friction:g}, torsion {asked.torsion:g} m, "
+        f"{asked.pull * asked.mass:g} N for {asked.duration:g} s; "
+        f"dropped from {_millimetres(asked.max_distance)} mm or {np.rad2deg(asked.max_angle):.3g}° on"
+    )
+    console.print(f"plan: {_plain(hold.plan)}")
+    table = _table("object, from where it was held", "after", "held", "moved [mm]", "turned [deg]")
+    table.add_row("squeeze", "", _millimetres(squeezed.distance), f"{np.rad2deg(squeezed.angle):.2f}")
+    for direction, pulled in hold.pulls.items():
+        moved = _millimetres(pulled.motion.distance), f"{np.rad2deg(pulled.motion.angle):.2f}"
+        table.add_row(f"pull {direction}", "yes" if pulled.held else "no", *moved)
+    console.print(table)
 
 
 def print_choice(solution: GraspSolution) -> None:
