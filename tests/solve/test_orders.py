@@ -8,6 +8,7 @@ from chain_hands import HandBuilder, along_x, mount, three_links
 from clench.base.pose import Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import JointRole
+from clench.solve.controller import finger_sets, make_problem
 
 RADIUS = 0.007
 
@@ -251,3 +252,27 @@ def test_a_finger_that_meets_a_resting_link_of_another_is_held_alone():
     assert solution.joint_angles["thumb_1"] == pytest.approx(1.0)
     assert "thumb_link_0" in solution.fingers["index"].reason
     assert solution.certified
+
+
+@pytest.mark.parametrize(("order", "breaks"), [("together", False), ("proximal-first", True)])
+def test_the_change_with_the_pose_is_not_guessed_for_paths_that_cannot_be_found_again(order, breaks):
+    hand, rod = breaking(breaks), bar(0.03, 0.02)
+    found = clench.sensitivity(solve(hand, rod, order=order), hand, rod)
+    assert np.isinf(found.translation).all()
+    assert np.isinf(found.rotation).all()
+    words = "break away" if breaks else "'together'"
+    assert all(words in found.reasons[name] for name in hand.joint_names)
+
+
+def test_sets_with_joints_that_break_away_are_judged_where_these_were_held():
+    """The actuator goes to its limit on every plane; where the first joint was held tells the sets apart."""
+    ball = clench.GraspObject.load("sphere:r=0.004", pose=Pose([0.03, 0.005, 0.02]))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True)
+    (sets,) = finger_sets(make_problem(breaking(True), ball, command))
+    full = next(c for c in sets if c.plane is None)
+    free = [c for c in sets if c.q[0] > full.q[0] + 1e-3]
+    assert free
+    assert not any(c.clear for c in free)
+    across = solve(breaking(True), bar(0.03, 0.02), check_sets=True).fingers["index"].candidates
+    # The middle of a round link touches first; its own plane's set is the full width's.
+    assert [c.feasible for c in across if c.plane in (1, None)] == [True, True]

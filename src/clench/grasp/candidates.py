@@ -90,6 +90,19 @@ class FingerCandidate:
         """Place of the plane along y of the first family [m]; None for the full width."""
         return None if self.plane is None else float(self.plan.families[0].offsets[self.plane])
 
+    def on_the_way(self, hand: Hand, travel: FloatArray) -> FloatArray:
+        """Return the angles of all joints when the groups have travelled so far, each joint until it was held [rad].
+
+        Args:
+            hand: the hand. travel: of the plan's groups [rad].
+        """
+        turns = []
+        for p in self.plan.joints:
+            moved = min(max(travel[p.group], p.start), p.stop) - p.start
+            final = abs(self.q[p.joint] - self.plan.posture[p.joint])
+            turns.append(np.sign(p.rate) * min(abs(p.rate) * moved, final))
+        return self.plan.turned(hand, np.array(turns))
+
     @cached_property
     def holding(self) -> tuple[Touch, ...]:
         """Contacts with a graspable body that are still touching, each once."""

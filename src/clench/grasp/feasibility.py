@@ -16,7 +16,7 @@ from .candidates import FingerCandidate
 from .depths import hand_depths
 from .scene import PackedObject
 
-#: Travels closer than this are the same set [rad].
+#: Angles closer than this are the same set [rad].
 _SAME = 1e-12
 #: Postures at which the path of a set is looked at, besides its end.
 _LOOKS = 8
@@ -29,6 +29,7 @@ def judge_sets(
     T_palm_object: FloatArray,
     source: CollisionSource,
     measure: bool,
+    together: bool = False,
 ) -> list[FingerCandidate]:
     """Return the candidates with `clear`, and on request `feasible` and `penetration`, filled.
 
@@ -38,7 +39,7 @@ def judge_sets(
 
     Args:
         hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
-        source: geometry of the hand. measure: measure every set, along its path.
+        source: geometry of the hand. measure: measure every set, along its path. together: all joints close at once.
     """
     whole = {id(c.plan): c for c in candidates if c.plane is None}
     judged = []
@@ -50,9 +51,9 @@ def judge_sets(
             judged.append(replace(c, clear=True, feasible=True, penetration=0.0))
             continue
         full = whole.get(id(c.plan))
-        clear = full is not None and bool(np.abs(c.travel - full.travel).max(initial=0.0) <= _SAME)
+        clear = full is not None and bool(np.abs(c.q - full.q).max(initial=0.0) <= _SAME)
         if measure:
-            depth, allowed = _deepest(hand, c, packed, T_palm_object, source)
+            depth, allowed = _deepest(hand, c, packed, T_palm_object, source, together)
             judged.append(replace(c, clear=clear, feasible=depth <= allowed, penetration=depth))
         else:
             judged.append(replace(c, clear=clear))
@@ -60,12 +61,17 @@ def judge_sets(
 
 
 def _deepest(
-    hand: Hand, candidate: FingerCandidate, packed: PackedObject, T_palm_object: FloatArray, source: CollisionSource
+    hand: Hand,
+    candidate: FingerCandidate,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    source: CollisionSource,
+    together: bool,
 ) -> tuple[float, float]:
     """Return the largest depth beyond its link's allowance along a set's path, and that allowance [m]."""
     deepest, allowance = 0.0, ALLOWED_PENETRATION
-    for travel in _path(candidate.travel):
-        q = candidate.plan.angles(hand, travel)
+    for travel in _path_at_once(candidate) if together else _path(candidate.travel):
+        q = candidate.on_the_way(hand, travel)
         for found in hand_depths(hand, q, packed, T_palm_object, source, links=candidate.plan.finger.links):
             allowed = max(ALLOWED_PENETRATION, hand.links[found.link].pad_indentation)
             if found.depth - allowed > deepest - allowance:
@@ -80,3 +86,11 @@ def _path(travel: FloatArray) -> list[FloatArray]:
         for part in np.linspace(0.0, 1.0, _LOOKS, endpoint=False)[1:]:
             path.append(np.concatenate([travel[:g], [part * travel[g]], np.zeros(len(travel) - g - 1)]))
     return [*path, travel]
+
+
+def _path_at_once(candidate: FingerCandidate) -> list[FloatArray]:
+    """Return travels along the closing path where all groups move at once, the end last."""
+    speeds = np.array(candidate.plan.speeds)
+    last = float((candidate.travel / speeds).max(initial=0.0))
+    parts = np.linspace(0.0, last, _LOOKS * len(speeds), endpoint=False)[1:]
+    return [*(np.minimum(speeds * at, candidate.travel) for at in parts), candidate.travel]

@@ -151,7 +151,8 @@ class PoseSensitivity:
     def score(self, candidate: FingerCandidate, setting: Setting) -> float | None:
         """Return max |dq/dx| [rad/m]; None where a joint's is not known, and for other closing orders."""
         s = setting
-        if s.packed is None or s.T_palm_object is None or s.source is None or not s.in_stages or candidate.overlap:
+        in_stages = s.in_stages and not any(candidate.plan.breaks)
+        if s.packed is None or s.T_palm_object is None or s.source is None or not in_stages or candidate.overlap:
             return None
         opened = candidate.plan.posture
         stages = closing_stages(s.hand, [candidate.plan.finger], opened, candidate.q)

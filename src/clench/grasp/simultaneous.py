@@ -174,7 +174,7 @@ def _poses(hand: Hand, one: FingerCandidate, other: FingerCandidate, at: float) 
     q = one.plan.posture.copy()
     for c in (one, other):
         own = [p.joint for p in c.plan.joints]
-        q[own] = c.plan.turned(hand, _turn(c, at))[own]
+        q[own] = c.on_the_way(hand, np.array(c.plan.speeds) * at)[own]
     return np.ascontiguousarray(hand.link_poses(q)[:, :3])
 
 
@@ -200,16 +200,6 @@ def _link_speeds(hand: Hand, c: FingerCandidate, bodies: HandBodies) -> dict[int
                 speeds[link][j] = rates[j] * reach
                 reach += float(np.linalg.norm(pivots[j] - pivots[j - 1])) if j else 0.0
     return speeds
-
-
-def _turn(c: FingerCandidate, at: float) -> FloatArray:
-    """Return how far the joints of a set's plan have turned after so much motion [rad], shape (n,)."""
-    turns = []
-    for p in c.plan.joints:
-        moved = min(max(c.plan.speeds[p.group] * at, p.start), p.stop) - p.start
-        final = abs(c.q[p.joint] - c.plan.posture[p.joint])
-        turns.append(np.sign(p.rate) * min(abs(p.rate) * moved, final))
-    return np.array(turns)
 
 
 def _joint_ends(c: FingerCandidate) -> FloatArray:

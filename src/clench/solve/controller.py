@@ -137,7 +137,8 @@ def _close_fingers(
     clock.lap("close")
     overlaps = start_overlaps(hand, plan, exact.link_pose, closed, packed, T, problem.source)
     candidates = read_candidates(hand, plan, packed, closed, overlaps)
-    judged = judge_sets(hand, candidates, packed, T, problem.source, problem.command.check_sets)
+    measure = problem.command.check_sets
+    judged = judge_sets(hand, candidates, packed, T, problem.source, measure, plan.together)
     clock.lap("sets")
     return plan, exact, closed, group_by_finger(plan, judged)
 

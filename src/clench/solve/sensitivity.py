@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 
 from clench.base.errors import ClenchError
 from clench.base.pose import FloatArray
+from clench.grasp.plan import closing_joints
 from clench.grasp.pose_change import PoseChange
 from clench.grasp.scene import PackedObject, hash_hand, pack_object
 from clench.grasp.stages import closing_stages
-from clench.models.hand.hand import Hand
+from clench.models.command import ClosingOrder
+from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.loading import collision_source_named
 from clench.models.shapes import CollisionSource
@@ -103,13 +105,30 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
     final = np.array([solution.joint_angles[name] for name in names])
     closed = [hand.finger(name) for name, f in solution.fingers.items() if f.status is not FingerStatus.NO_MOTION]
     moved = [finger for finger in closed if solution.fingers[finger.name].status is not FingerStatus.BLOCKED]
+    origin = solution.object_pose.position
+    text = _not_covered(solution, hand, moved)
+    if text:
+        unknown = {names[j]: text for finger in moved for j in closing_joints(hand, finger)}
+        columns = np.where(np.isin(names, list(unknown))[:, None], np.inf, np.zeros((len(names), 3)))
+        return Sensitivity(names, origin, columns, columns.copy(), {}, unknown)
     stages = closing_stages(hand, moved, opened, final)
     rows = PoseChange(hand, packed, source, solution.hand_pose, solution.object_pose, stages, obj.name)
     for number, stage in enumerate(stages):
         rows.add(number, stage, opened[stage.leader])
     change = np.where(rows.known, rows.change, np.inf)
-    origin = solution.object_pose.position
     return Sensitivity(names, origin, change[:, :3], change[:, 3:], rows.stopped_by, rows.reasons)
+
+
+def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -> str:
+    """Return why what stopped the joints cannot be found again, or nothing."""
+    for finger in moved:
+        result = solution.fingers[finger.name]
+        order = result.candidates[result.chosen].order
+        if order != ClosingOrder.PROXIMAL_FIRST:
+            return f"it closed in order '{order}'; changes are known for '{ClosingOrder.PROXIMAL_FIRST}' alone"
+        if any(c.breakaway and c.follower in finger.joints for c in hand.couplings):
+            return f"joints of {finger.name} break away; changes are known for groups that stop as one"
+    return ""
 
 
 def _check_same(solution: GraspSolution, hand: Hand, packed: PackedObject, source: CollisionSource) -> None:
