@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -69,14 +68,15 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> None:
 SOLVE = ["solve", "--hand", "pincer", "--object", "ball"]
 
 
-def test_help_is_quick_and_names_every_command() -> None:
-    program = "import sys; from clench.apps.cli.main import main; sys.exit(main(['--help']))"
-    runs = []
-    for _ in range(3):
-        start = time.perf_counter()
-        run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        runs.append(time.perf_counter() - start)
-    assert min(runs) < 0.5
+def test_help_loads_nothing_heavy_and_names_every_command() -> None:
+    """What takes time is loading; a clock would tell how busy the machine is."""
+    heavy = ("numpy", "numba", "scipy", "mujoco", "trimesh", "matplotlib")
+    program = (
+        "import sys; from clench.apps.cli.main import main; code = main(['--help']); "
+        f"print([name for name in {heavy!r} if name in sys.modules]); sys.exit(code)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "[]"
     for name in commands.COMMANDS:
         assert f"\n  {name} " in run.stdout
 
