@@ -276,3 +276,14 @@ def test_sets_with_joints_that_break_away_are_judged_where_these_were_held():
     across = solve(breaking(True), bar(0.03, 0.02), check_sets=True).fingers["index"].candidates
     # The middle of a round link touches first; its own plane's set is the full width's.
     assert [c.feasible for c in across if c.plane in (1, None)] == [True, True]
+
+
+def test_no_trajectory_is_made_up_where_joints_were_gone_through_again():
+    """A straight line, or one round, could meet the object on the way."""
+    hand = three_links(upper=1.5)
+    solution = solve(hand, bar(0.06, 0.02), rounds=2)
+    again = clench.GraspSolution.from_dict(solution.to_dict())
+    assert again.rounds == 2
+    with pytest.raises(clench.ClenchError, match="rounds"):
+        plan_trajectory(again, hand)
+    assert clench.complete(again, hand, bar(0.06, 0.02)).pregrasp is None

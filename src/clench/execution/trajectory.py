@@ -108,8 +108,14 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
         speed: fraction of the velocity limits to use, above 0 and up to 1.
 
     Raises:
-        CommandError: the solution is of another hand, lacks a joint, or `speed` is out of range.
+        CommandError: the solution is of another hand, lacks a joint, has more than one round, or `speed` is out of
+            range.
     """
+    if solution.rounds != 1:
+        raise CommandError(
+            f"rounds: expected a solution of 1 round, got {solution.rounds} (0 is until rest): of joints that were "
+            "gone through more than once no path is kept."
+        )
     if not SLOWEST <= speed <= 1.0:
         raise CommandError(f"speed: expected a fraction above 0 and up to 1, at least {SLOWEST:g}, got {speed}.")
     start, end = (

@@ -109,6 +109,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         choice=answer.choice,
         timing=dict(timing),
         speeds=dict(command.speeds),
+        rounds=command.rounds,
         joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
     )
 

@@ -100,6 +100,7 @@ class _SolutionForm(msgspec.Struct):
     certificate: dict[str, Any] | None = None
     choice: dict[str, Any] | None = None
     speeds: _Map = {}
+    rounds: int = 1
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -123,6 +124,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "open_angles": _numbers(s.open_angles),
         "joint_limits": {name: [float(low), float(high)] for name, (low, high) in s.joint_limits.items()},
         "speeds": _numbers(s.speeds),
+        "rounds": int(s.rounds),
         "certified": bool(s.certified),
         "collision_source": str(s.collision_source),
         "object_collision_source": str(s.object_collision_source),
@@ -190,6 +192,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         choice=form.choice,
         timing=angles(form.timing, "timing"),
         speeds=angles(form.speeds, "speeds"),
+        rounds=form.rounds,
         joint_limits={
             name: _convert(v, tuple[float, float], source, f"joint_limits.{name}")
             for name, v in form.joint_limits.items()

@@ -124,6 +124,8 @@ def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -
     for finger in moved:
         result = solution.fingers[finger.name]
         order = result.candidates[result.chosen].order
+        if solution.rounds != 1:
+            return "its joints were gone through more than once; changes are known for one round alone"
         if order != ClosingOrder.PROXIMAL_FIRST:
             return f"it closed in order '{order}'; changes are known for '{ClosingOrder.PROXIMAL_FIRST}' alone"
         if any(c.breakaway and c.follower in finger.joints for c in hand.couplings):

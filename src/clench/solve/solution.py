@@ -154,6 +154,7 @@ class GraspSolution:
         choice: why these sets: what counted, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the whole width and all links [m], None when not computed.
         speeds: how fast free joints closed relative to each other in an order where all move at once; 1 if not named.
+        rounds: how often the joints were gone through, 0 for until rest.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
 
@@ -185,6 +186,7 @@ class GraspSolution:
     timing: Mapping[str, float] = field(default_factory=dict)
     joint_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     speeds: Mapping[str, float] = field(default_factory=dict)
+    rounds: int = 1
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""

@@ -27,7 +27,7 @@ def print_json(document: dict[str, Any]) -> None:
 def write_results(
     hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, folder: Path
 ) -> list[Path]:
-    """Write solution.json, trajectory.json and the figures; return their paths.
+    """Write solution.json, trajectory.json where the path is known, and the figures; return their paths.
 
     Raises:
         FileError: the folder or a file cannot be written.
@@ -37,9 +37,11 @@ def write_results(
 
     make_folder(folder)
     solution.save(folder / "solution.json")
-    plan_trajectory(solution, hand).save(folder / "trajectory.json")
-    figures = draw_solution(hand, obj, command, solution, folder)
-    return [folder / "solution.json", folder / "trajectory.json", *figures]
+    written = [folder / "solution.json"]
+    if solution.rounds == 1:
+        plan_trajectory(solution, hand).save(folder / "trajectory.json")
+        written.append(folder / "trajectory.json")
+    return [*written, *draw_solution(hand, obj, command, solution, folder)]
 
 
 def make_folder(folder: Path) -> None:
