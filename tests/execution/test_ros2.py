@@ -176,7 +176,8 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
     # What we report is what the controller did: every measured sample is on its way.
     measured = np.array(report["history"]["measured"])
     np.testing.assert_allclose(measured[0], [0.05, 0.0], atol=1e-9)
-    np.testing.assert_allclose(measured[-1], samples[-1, 1:], atol=1e-3)
+    # The last look is that with which it counts as arrived: a fifth of 0.05 rad from its target, on a busy machine.
+    np.testing.assert_allclose(measured[-1], samples[-1, 1:], atol=0.01)
     for column in range(2):
         near = np.abs(measured[:, column, None] - samples[None, :, 1 + column]).min(axis=1)
         assert near.max() < 0.03
