@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +15,15 @@ from clench.base.tolerances import PASSED_GAP
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole
 
-from .closing import ClosedHand, HandPlan
+from .closing import ClosedHand, HandPlan, close_item_again, only_item
 from .depths import LinkDepth
 from .mechanics.contacts import without_repeats
 from .plan import FingerPlan
 from .scene import PackedObject
 from .surface import surface_normal
+
+if TYPE_CHECKING:
+    from clench.kernels.exact import ExactArrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +139,7 @@ def read_candidates(
         travel = np.zeros(last - first) if blocked[i] else closed.answer.travel[i, first:last].copy()
         q = finger.angles(hand, travel)
         if any(finger.breaks) and not blocked[i]:
-            joints = slice(*np.searchsorted(plan.arrays.chain.joint_group, (first, last)))
-            q = finger.turned(hand, closed.answer.turn[i, joints])
+            q = finger.turned(hand, closed.answer.turn[i, plan.joints_of(entry)])
         candidates.append(
             FingerCandidate(
                 item=i,
@@ -151,6 +154,22 @@ def read_candidates(
             )
         )
     return candidates
+
+
+def closed_anew(
+    hand: Hand,
+    plan: HandPlan,
+    exact: ExactArrays,
+    closed: ClosedHand,
+    packed: PackedObject,
+    candidate: FingerCandidate,
+    rounds: int,
+) -> FingerCandidate:
+    """Return a set closed again, with what stands in its way now; the arguments are those of `close_item_again`."""
+    again = close_item_again(plan, exact, packed, closed, candidate.item, rounds)
+    nowhere = [None] * len(plan.plans)
+    (found,) = read_candidates(hand, only_item(plan, candidate.item), packed, again, nowhere)
+    return replace(found, item=candidate.item)
 
 
 def _read_touches(
@@ -253,8 +272,7 @@ def _stopped(plan: HandPlan, entry: int, group: int, last: int) -> int:
     finger = plan.plans[entry]
     if not finger.breaks[group]:
         return finger.leaders[group]
-    first = int(np.searchsorted(plan.arrays.chain.joint_group, plan.arrays.entry_group[entry]))
-    return finger.joints[last - first].joint
+    return finger.joints[last - int(plan.joints_of(entry).start)].joint
 
 
 def _carried(hand: Hand, plan: FingerPlan, link: int, family: int, travel: FloatArray, position: FloatArray) -> float:

@@ -48,6 +48,11 @@ class HandPlan:
     whole: tuple[bool, ...]
     together: bool
 
+    def joints_of(self, entry: int) -> slice:
+        """Return the range of an entry's joints in the packed arrays."""
+        first = sum(len(plan.joints) for plan in self.plans[:entry])
+        return slice(first, first + len(self.plans[entry].joints))
+
     @property
     def most_planes(self) -> int:
         """Return the number of planes of the largest entry."""

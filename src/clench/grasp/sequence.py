@@ -11,8 +11,8 @@ import numpy as np
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 
-from .candidates import FingerCandidate, read_candidates
-from .closing import ClosedHand, HandPlan, close_item_again, only_item
+from .candidates import FingerCandidate, closed_anew
+from .closing import ClosedHand, HandPlan, close_item_again
 from .exact import HandBodies
 from .scene import PackedObject
 
@@ -55,7 +55,7 @@ def close_in_sequence(
             among = exact._replace(link_pose=placed, wanted=np.ones(1, dtype=np.int64))
             if _meets_another(plan, among._replace(checked=others), closed, candidate, entry, rounds):
                 among = among._replace(checked=bodies.across)
-                candidate = _closed_anew(hand, plan, among, closed, packed, candidate, rounds)
+                candidate = closed_anew(hand, plan, among, closed, packed, candidate, rounds)
         own = list(candidate.plan.finger.joints)
         q[own] = candidate.q[own]
         result.append(candidate)
@@ -75,18 +75,3 @@ def _meets_another(
     bounded = replace(plan, arrays=plan.arrays._replace(chain=chain))
     answer = close_item_again(bounded, exact, None, closed, candidate.item, rounds).answer
     return bool(answer.contacts[0] or answer.skipped[0])
-
-
-def _closed_anew(
-    hand: Hand,
-    plan: HandPlan,
-    exact: ExactArrays,
-    closed: ClosedHand,
-    packed: PackedObject,
-    candidate: FingerCandidate,
-    rounds: int,
-) -> FingerCandidate:
-    again = close_item_again(plan, exact, packed, closed, candidate.item, rounds)
-    nowhere = [None] * len(plan.plans)
-    (found,) = read_candidates(hand, only_item(plan, candidate.item), packed, again, nowhere)
-    return replace(found, item=candidate.item)

@@ -13,8 +13,8 @@ import numpy as np
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 
-from .candidates import FingerCandidate, Touch, read_candidates
-from .closing import ClosedHand, HandPlan, close_item_again, only_item
+from .candidates import FingerCandidate, Touch, closed_anew
+from .closing import ClosedHand, HandPlan
 from .exact import HandBodies
 from .plan import last_closing_joint
 from .scene import PackedObject
@@ -73,20 +73,19 @@ def close_together(
     held: dict[int, list[Touch]] = {c.item: [] for c in sets}
     apart = bodies.across - bodies.within
     moving = [k for k, c in enumerate(sets) if c.plane is None]
+    # How fast joints move links is a matter of the plan; where they are held changes nothing of it.
+    speeds = {k: _link_speeds(hand, sets[k], bodies) for k in moving}
     meetings: dict[tuple[int, int], Meeting | None] = {}
     overlapping: set[int] = set()
     while True:
         for a, b in combinations(moving, 2):
             if (a, b) not in meetings:
-                meetings[a, b] = _meeting(hand, sets[a], sets[b], bodies, apart)
+                meetings[a, b] = _meeting(hand, (sets[a], sets[b]), (speeds[a], speeds[b]), bodies, apart)
         found = [(m, a, b) for (a, b), m in meetings.items() if m is not None]
         overlapping |= {k for m, a, b in found if m.at == 0.0 for k in (a, b)}
         later = [row for row in found if row[0].at > 0.0]
         if not later:
-            return [
-                replace(c, exact=c.exact and k not in overlapping, touches=(*c.touches, *held[c.item]))
-                for k, c in enumerate(sets)
-            ]
+            return [_finished(c, held[c.item], c.exact and k not in overlapping) for k, c in enumerate(sets)]
         first, a, b = min(later, key=lambda row: (row[0].at, row[0].links))
         meetings = {pair: m for pair, m in meetings.items() if not {a, b} & set(pair)}
         # Two links that met rest from there on, and until there move as they did: they do not meet again.
@@ -100,12 +99,18 @@ def close_together(
             sets[k] = _closed_again(hand, plan, exact, closed, packed, c, until[c.item])
 
 
+def _finished(c: FingerCandidate, held: list[Touch], exact: bool) -> FingerCandidate:
+    if not held and exact == c.exact:
+        return c
+    return replace(c, exact=exact, touches=(*c.touches, *held))
+
+
 def _hold(hand: Hand, plan: HandPlan, c: FingerCandidate, link: int, at: float, until: FloatArray) -> int | None:
     """Hold the joints of a finger up to a link from a place of the motion on; return the last of them in the hand.
 
     None is returned for a link that rests, and where nothing of the finger moves.
     """
-    first = int(np.searchsorted(plan.arrays.chain.joint_group, plan.arrays.entry_group[plan.items.entry[c.item]]))
+    first = plan.joints_of(int(plan.items.entry[c.item])).start
     moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
     if link not in moved_by or c.overlap is not None:
         return None
@@ -127,13 +132,15 @@ def _closed_again(
     held[c.item] = until
     bound = replace(plan, items=plan.items._replace(until=held))
     one = exact._replace(wanted=exact.wanted[c.item : c.item + 1])
-    again = close_item_again(bound, one, packed, closed, c.item, 1)
-    (found,) = read_candidates(hand, only_item(bound, c.item), packed, again, [None] * len(plan.plans))
-    return replace(found, item=c.item)
+    return closed_anew(hand, bound, one, closed, packed, c, 1)
 
 
 def _meeting(
-    hand: Hand, one: FingerCandidate, other: FingerCandidate, bodies: HandBodies, apart: np.ndarray
+    hand: Hand,
+    pair: tuple[FingerCandidate, FingerCandidate],
+    speeds: tuple[dict[int, FloatArray], dict[int, FloatArray]],
+    bodies: HandBodies,
+    apart: np.ndarray,
 ) -> Meeting | None:
     """Return where two fingers first meet that were free of each other, or that they overlap at the start.
 
@@ -142,8 +149,7 @@ def _meeting(
     """
     from clench.kernels.nearness import link_gap
 
-    speeds = [_link_speeds(hand, c, bodies) for c in (one, other)]
-    ends = [_joint_ends(c) for c in (one, other)]
+    ends = [_joint_ends(c) for c in pair]
     # What rests on both sides is judged with the whole hand.
     lasts = [{link: _last_end(own, e) for link, own in found.items()} for found, e in zip(speeds, ends, strict=True)]
     last = {(m, r): max(lasts[0][m], lasts[1][r]) for m in speeds[0] for r in speeds[1] if apart[m, r]}
@@ -159,7 +165,7 @@ def _meeting(
         slack = _SLACK if away > _NEAR else 1.0
         # A gap that is not below the bound is the bound itself, which has to be none of a touch.
         bound = (end - at) * speed + 2.0 * _TOUCH
-        gap = link_gap(bodies.links, m, r, _poses(hand, one, other, at), bound, slack, out)
+        gap = link_gap(bodies.links, m, r, _poses(hand, pair, at), bound, slack, out)
         if gap <= _TOUCH or looks == _LOOKS - 1:
             return Meeting(at, (m, r), out[:3].copy(), out[3:].copy(), gap)
         # Links that are held where they met touch at the end of their motion.
@@ -169,10 +175,10 @@ def _meeting(
     return None
 
 
-def _poses(hand: Hand, one: FingerCandidate, other: FingerCandidate, at: float) -> FloatArray:
+def _poses(hand: Hand, pair: tuple[FingerCandidate, FingerCandidate], at: float) -> FloatArray:
     """Return `T_palm_link` of every link after so much motion of two fingers, shape (L, 3, 4)."""
-    q = one.plan.posture.copy()
-    for c in (one, other):
+    q = pair[0].plan.posture.copy()
+    for c in pair:
         own = [p.joint for p in c.plan.joints]
         q[own] = c.on_the_way(hand, np.array(c.plan.speeds) * at)[own]
     return np.ascontiguousarray(hand.link_poses(q)[:, :3])

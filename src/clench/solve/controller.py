@@ -73,6 +73,11 @@ class Problem:
         return self.command.rounds or UNTIL_REST
 
     @property
+    def together(self) -> bool:
+        """Whether all joints close at once."""
+        return self.command.order != ClosingOrder.PROXIMAL_FIRST
+
+    @property
     def T_palm_object(self) -> FloatArray:
         """Where the object is for the hand, shape (4, 4)."""
         return invert(self.T_world_palm.matrix) @ self.T_world_object.matrix
@@ -106,12 +111,13 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
         again = close_in_sequence(
             hand, plan, exact, closed, problem.packed, best, problem.start, problem.rounds, bodies
         )
-    for k, (old, new) in enumerate(zip(best, again, strict=True)):
-        if new is not old:
-            best[k] = fingers[k][chosen[k]] = replace(new, clear=old.clear)
-            score_sets([best[k]], choice.used, setting)
-            explained["fingers"][new.plan.finger.name]["closed_again"] = True
-            explained["final_hand_scores"] = score_hand(best, choice.used, setting)
+    changed = [k for k, (old, new) in enumerate(zip(best, again, strict=True)) if new is not old]
+    for k in changed:
+        best[k] = fingers[k][chosen[k]] = replace(again[k], clear=best[k].clear)
+        explained["fingers"][best[k].plan.finger.name]["closed_again"] = True
+    if changed:
+        score_sets([best[k] for k in changed], choice.used, setting)
+        explained["final_hand_scores"] = score_hand(best, choice.used, setting)
     clock.lap("sequence")
     answer = judge_answer(problem, fingers, chosen, best, exact, explained)
     clock.lap("judge")
@@ -178,7 +184,7 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         weights if calibration.joints else None,
         problem.obj,
         problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
-        problem.command.order is ClosingOrder.PROXIMAL_FIRST and problem.command.rounds == 1,
+        not problem.together and problem.command.rounds == 1,
     )
 
 
@@ -200,7 +206,7 @@ def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
         None if command.fingers is None else tuple(command.fingers),
         command.planes,
         command.rounds != 1,
-        command.order != ClosingOrder.PROXIMAL_FIRST,
+        problem.together,
         tuple(sorted(command.speeds.items())),
         command.full_width,
         tuple(command.yaw_grid),
@@ -220,12 +226,11 @@ def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
                 posture.append(p)
     if not plans:
         raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
-    together = command.order != ClosingOrder.PROXIMAL_FIRST
-    if together or command.rounds != 1:
-        _check_parallel(plans, f"order {command.order}" if together else "rounds")
-    plan = make_hand_plan(plans, finger, posture, command.full_width, together)
+    if problem.together or command.rounds != 1:
+        _check_parallel(plans, f"order {command.order}" if problem.together else "rounds")
+    plan = make_hand_plan(plans, finger, posture, command.full_width, problem.together)
     exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
-    if together:
+    if problem.together:
         exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
     _plans[key] = (hand, plan, exact)
     while len(_plans) > _KEPT_PLANS:

@@ -62,9 +62,7 @@ def solve(
     """
     from .solving import bench_solve
 
-    for key, count in (("planes", planes), ("poses", poses), ("passes", passes)):
-        if count < 1:
-            raise CommandError(f"--{key}: expected at least 1, got {count}.")
+    _at_least(1, planes=planes, poses=poses, passes=passes)
     return _print(bench_solve(hand, object, scale, planes, poses, passes, seed), json)
 
 
@@ -91,9 +89,7 @@ def choose(
     """
     from .choosing import bench_choice
 
-    for key, count in (("alternatives", alternatives), ("poses", poses), ("passes", passes)):
-        if count < 1:
-            raise CommandError(f"--{key}: expected at least 1, got {count}.")
+    _at_least(1, alternatives=alternatives, poses=poses, passes=passes)
     return _print(bench_choice(hand, object, alternatives, poses, passes, seed), json)
 
 
@@ -118,13 +114,18 @@ def steadiness(
     """
     from .steadiness import bench_steadiness
 
-    for key, count, least in (("contacts", contacts, 2), ("grasps", grasps, 1), ("passes", passes, 1)):
-        if count < least:
-            raise CommandError(f"--{key}: expected at least {least}, got {count}.")
+    _at_least(2, contacts=contacts)
+    _at_least(1, grasps=grasps, passes=passes)
     return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 
 BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose, "steadiness": steadiness}
+
+
+def _at_least(least: int, **counts: int) -> None:
+    for key, count in counts.items():
+        if count < least:
+            raise CommandError(f"--{key}: expected at least {least}, got {count}.")
 
 
 def _print(report: BenchReport, json: bool) -> int:
