@@ -236,7 +236,9 @@ CHOICE = {
     "total": -0.3,
     "hand_scores": {},
     "final_hand_scores": {},
+    "combinations": 3,
     "combinations_tried": 0,
+    "proved": True,
     "runner_up": None,
     "fingers": {
         "index": {

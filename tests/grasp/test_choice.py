@@ -13,6 +13,7 @@ from clench.grasp import criterion_registry
 from clench.grasp.calibration import Calibration
 from clench.grasp.choice import choose
 from clench.grasp.criteria import Setting
+from clench.grasp.explaining import explain_choice
 
 SETTING = Setting(HAND, np.zeros(2))
 CALIBRATION = Calibration(weights={"range_of_motion": 1.0})
@@ -153,3 +154,15 @@ def test_a_limit_on_a_criterion_of_the_hand_holds(together):
     sets = [[moved(0.1), moved(0.5)], [moved(0.5), moved(0.6)]]
     limited = Calibration(weights={"range_of_motion": 1.0}, limits={"together": 0.15})
     assert choose(sets, limited, SETTING).chosen == [1, 0]
+
+
+def test_a_search_that_ends_without_a_proof_says_so(together):
+    """Nothing bounds this criterion, and 8³ combinations are more than are all tried."""
+    weights = Calibration(weights={"range_of_motion": 1.0, "together": 0.5})
+    sets = [[moved(0.1 * k + 0.01 * n) for k in range(8)] for n in range(3)]
+    many, few = choose(sets, weights, SETTING), choose([group[:3] for group in sets], weights, SETTING)
+    assert (many.proved, few.proved) == (False, True)
+    assert few.tried == 27
+    assert explain_choice(many, sets)["text"].endswith(
+        f" The search tried {many.tried} of 512 combinations: one that is better may exist."
+    )

@@ -10,8 +10,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from clench.base.errors import ClenchError, FileError, UnknownNameError
 from clench.base.files import read_text
+from clench.base.pose import FloatArray
 
 from .criterion_registry import check_numbers, find_criterion
 
@@ -57,10 +61,13 @@ class Calibration:
         """Say whether a value is inside the criterion's limit; one that is not known is not."""
         if name not in self.limits:
             return True
-        if value is None:
-            return False
+        return value is not None and bool(self.inside(name, np.array(value)))
+
+    def inside(self, name: str, values: FloatArray) -> NDArray[np.bool_]:
+        """Say which values are inside the criterion's limit."""
         larger = find_criterion(name, self.name).larger_is_better
-        return value >= self.limits[name] if larger else value <= self.limits[name]
+        limit = self.limits.get(name, -np.inf if larger else np.inf)
+        return np.asarray(values >= limit if larger else values <= limit)
 
 
 def calibration_of(criteria: Mapping[str, float] | Path | str | None) -> Calibration:

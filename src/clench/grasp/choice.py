@@ -4,12 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from clench.base.pose import FloatArray
 
 from .calibration import Calibration
 from .candidates import FingerCandidate
-from .combinations import Combination, best_combination
+from .combinations import Ceilings, Combination, best_combination
 from .criteria import Setting
-from .criterion_registry import find_criterion, is_of_finger, is_of_hand, prepare_hand, score_hand, score_sets
+from .criterion_registry import (
+    bound_hand,
+    find_criterion,
+    ideal_value,
+    is_of_finger,
+    is_of_hand,
+    prepare_hand,
+    score_hand,
+    score_sets,
+)
 
 #: What puts one set before another, whatever their scores, strongest first; as `tier` lists them.
 TIERS = (
@@ -51,7 +65,7 @@ class HandChoice:
             that said nothing about any set. hand_scores: values of the hand's criteria for the chosen sets.
         runner_up: the second best combination, as indices, with its total and hand scores; None when there is none.
         total: weighted sum over the chosen sets [-]. tried: how many combinations were compared; 0 when no criterion
-            is about the whole hand, and every finger has its own best.
+            is about the whole hand, and every finger has its own best. proved: no other combination is better.
     """
 
     fingers: tuple[FingerChoice, ...]
@@ -62,6 +76,7 @@ class HandChoice:
     runner_up: Combination | None
     total: float
     tried: int
+    proved: bool
 
     @property
     def chosen(self) -> list[int]:
@@ -88,11 +103,13 @@ def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration
     judge = _HandJudge(groups, fingers, of_hand, calibration, setting)
     known = {name for group in groups for c in group for name in c.scores}
     if of_hand:
-        best, second, tried = best_combination([finger.equals for finger in fingers], judge)
+        search = best_combination([finger.equals for finger in fingers], judge)
+        best, second, tried, proved = search.best, search.second, search.tried, search.proved
         known |= set(best.scores)
         fingers = [replace(finger, chosen=i) for finger, i in zip(fingers, best.sets, strict=True)]
     else:
-        best, second, tried = judge(tuple(finger.chosen for finger in fingers)), _next_best(fingers, judge), 0
+        best, second = judge(tuple(finger.chosen for finger in fingers)), _next_best(fingers, judge)
+        tried, proved = 0, True
     return HandChoice(
         tuple(fingers),
         calibration,
@@ -102,6 +119,7 @@ def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration
         second,
         best.total,
         tried,
+        proved,
     )
 
 
@@ -153,8 +171,17 @@ class _HandJudge:
         self._groups, self._fingers, self._criteria = groups, fingers, criteria
         self._calibration, self._setting = calibration, setting
         self._worth = {name: calibration.worth(name, 1.0) for name in criteria}
-        among = [group[i] for group, finger in zip(groups, fingers, strict=True) for i in finger.equals]
-        prepare_hand(among, criteria, setting)
+        self._options = [[group[i] for i in f.equals] for group, f in zip(groups, fingers, strict=True)]
+        #: Values that no combination beats, by criterion; criteria that know none are missing.
+        self._unbeaten: dict[str, FloatArray] = {
+            name: np.array(ideal) for name in criteria if (ideal := ideal_value(name)) is not None
+        }
+        prepare_hand([c for options in self._options for c in options], criteria, setting)
+
+    @property
+    def criteria(self) -> int:
+        """How many criteria of the whole hand may have a value."""
+        return len(self._criteria)
 
     def __call__(self, sets: tuple[int, ...]) -> Combination:
         """Return a combination with its scores and total."""
@@ -164,3 +191,19 @@ class _HandJudge:
         total += sum(self._worth[name] * value for name, value in scores.items())
         allowed = all(self._calibration.allows(name, scores.get(name)) for name in self._criteria)
         return Combination(sets, scores, allowed, total)
+
+    def ceilings(self, places: tuple[int, ...]) -> Ceilings | None:
+        """Return what no combination exceeds; None where a criterion of the whole hand does not say."""
+        for name in self._criteria:
+            found = bound_hand(name, self._options, places, self._setting)
+            if found is not None:
+                closer = np.minimum if find_criterion(name, "choice").larger_is_better else np.maximum
+                self._unbeaten[name] = closer(self._unbeaten.get(name, found), found)
+        if len(self._unbeaten) < len(self._criteria):
+            return None
+        total: FloatArray = reduce(np.add.outer, [np.array([f.totals[i] for i in f.equals]) for f in self._fingers])
+        allowed = np.ones(total.shape, dtype=np.bool_)
+        for name, values in self._unbeaten.items():
+            total = total + self._worth[name] * values
+            allowed &= self._calibration.inside(name, values)
+        return Ceilings(allowed, total)

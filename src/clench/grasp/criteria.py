@@ -71,7 +71,12 @@ class Criterion(Protocol):
 class HandCriterion(Protocol):
     """Judge the sets of all fingers together; otherwise like `Criterion`.
 
-    A method `prepare(candidates, setting)`, where there is one, is given all sets before any combination is judged.
+    What else it may have makes the search for the best combination quicker, and lets it end with a proof:
+
+    - `prepare(candidates, setting)` is given all sets before any combination is judged;
+    - `ideal`: a value that no combination beats;
+    - `bound(groups, places, setting)` returns values that combinations do not beat, one axis per finger, near the
+      value of the combination that takes set `places[k]` of `groups[k]`; None for nothing to say.
     """
 
     name: ClassVar[str]

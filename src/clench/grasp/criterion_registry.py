@@ -7,7 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Final, TypeGuard
 
+import numpy as np
+
 from clench.base.errors import CommandError, UnknownNameError
+from clench.base.pose import FloatArray
 
 from .candidates import FingerCandidate
 from .criteria import Criterion, HandCriterion, Setting
@@ -134,6 +137,21 @@ def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], se
         prepare = getattr(_registry[name], "prepare", None)
         if prepare is not None:
             prepare(candidates, setting)
+
+
+def ideal_value(name: str) -> float | None:
+    """Return the value that no sets of the whole hand can beat, where a criterion says one."""
+    ideal = getattr(_registry[name], "ideal", None)
+    return None if ideal is None else float(ideal)
+
+
+def bound_hand(
+    name: str, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], setting: Setting
+) -> FloatArray | None:
+    """Return values that no combination beats in a criterion, where it says any; see `HandCriterion`."""
+    bound = getattr(_registry[name], "bound", None)
+    found = None if bound is None else bound(groups, places, setting)
+    return None if found is None else np.asarray(found, dtype=np.float64)
 
 
 def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting: Setting) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -30,11 +31,13 @@ def explain_choice(choice: HandChoice, groups: Groups) -> dict[str, Any]:
         "calibration": calibration.name,
         "criteria": {name: _described(name, calibration) for name in choice.used},
         "unused": list(choice.unused),
-        "text": _hand_text(choice, groups, names),
+        "text": f"{_hand_text(choice, groups, names)}{_doubt(choice)}",
         "total": choice.total,
         "hand_scores": dict(choice.hand_scores),
         "final_hand_scores": dict(choice.hand_scores),
+        "combinations": math.prod(len(finger.equals) for finger in choice.fingers),
         "combinations_tried": choice.tried,
+        "proved": choice.proved,
         "runner_up": None
         if second is None
         else {
@@ -151,6 +154,14 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     ours = {n: sum(a.get(n, 0.0) for a, _ in pairs) for n in gains}
     theirs = {n: sum(b.get(n, 0.0) for _, b in pairs) for n in gains}
     return f"The chosen sets lead the next best ({swapped}) by {lead:.3g}; {_decided(gains, ours, theirs)}"
+
+
+def _doubt(choice: HandChoice) -> str:
+    """Return what has to be said where a better combination may exist."""
+    if choice.proved:
+        return ""
+    every = math.prod(len(finger.equals) for finger in choice.fingers)
+    return f" The search tried {choice.tried} of {every} combinations: one that is better may exist."
 
 
 def _gains(pairs: Sequence[tuple[Mapping[str, float], Mapping[str, float]]], choice: HandChoice) -> dict[str, float]:

@@ -17,17 +17,19 @@ from clench.models.objects.mass import mass_properties
 from .candidates import FingerCandidate, combined_posture
 from .criteria import Setting
 from .mechanics.actuation import Effort, least_effort
+from .mechanics.alternative_wrenches import AlternativeWrenches
 from .mechanics.contacts import ContactSet, make_contacts, pair_friction
 from .mechanics.held import HeldObject, held_by_contacts, held_by_hand
 from .mechanics.loads import GRAVITY, gravity_any_direction, weight
-from .mechanics.steadiness import ConeParts, cone_parts, epsilon_bound_of
+from .mechanics.steadiness import EDGES
+from .mechanics.wrench_space import epsilon_l1
 
 #: Mass whose weight is 1 N [kg].
 _NEWTON: Final = 1.0 / GRAVITY
 
 
 class Steadiness:
-    """Lower bound of the Ferrari-Canny epsilon (normal forces sum to 1 N): the worst pull or twist that is resisted."""
+    """The Ferrari-Canny epsilon (normal forces sum to 1 N): the worst pull or twist that is resisted."""
 
     name: ClassVar[str] = "steadiness"
     unit: ClassVar[str] = "N/N"
@@ -36,16 +38,29 @@ class Steadiness:
     larger_is_better: ClassVar[bool] = True
 
     def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
-        """Return the bound [N per N of normal force]."""
+        """Return epsilon [N per N of normal force], 0 without force closure."""
         if setting.obj is None:
             return None
-        parts = [p for p in (_parts(c, setting) for c in chosen) if p is not None]
-        return epsilon_bound_of(parts) if parts else 0.0
+        wrenches = np.vstack([np.empty((0, 6)), *(_wrenches(c, setting) for c in chosen)])
+        return epsilon_l1(wrenches).radius
 
     def prepare(self, candidates: Sequence[FingerCandidate], setting: Setting) -> None:
-        """Find what every set adds to the bound, all at once, which takes a tenth of the time of one by one."""
+        """Find the wrenches of every set, all at once, which takes a tenth of the time of one by one."""
         if setting.obj is not None:
-            _keep_parts(candidates, setting)
+            _keep_wrenches(candidates, setting)
+
+    def bound(
+        self, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], setting: Setting
+    ) -> FloatArray | None:
+        """Return how far every combination reaches along a direction in which one is weak [N per N]."""
+        if setting.obj is None:
+            return None
+        key = ("alternatives", *(id(c) for group in groups for c in group))
+        if key not in setting.kept:
+            wrenches = [[_wrenches(c, setting) for c in group] for group in groups]
+            setting.kept[key] = AlternativeWrenches(wrenches)
+        alternatives: AlternativeWrenches = setting.kept[key]
+        return alternatives.bound(places)
 
 
 class ActuationForce:
@@ -55,6 +70,7 @@ class ActuationForce:
     unit: ClassVar[str] = "Nm/N"
     source: ClassVar[str] = "Bicchi and Kumar, ICRA 2000"
     scale: ClassVar[float] = 0.02
+    ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
     def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
@@ -69,6 +85,7 @@ class ActuationForceAnyWay:
     unit: ClassVar[str] = "Nm/N"
     source: ClassVar[str] = "Bicchi and Kumar, ICRA 2000"
     scale: ClassVar[float] = 0.05
+    ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
     def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
@@ -83,6 +100,7 @@ class TendonTension:
     unit: ClassVar[str] = "N"
     source: ClassVar[str] = "Abdallah et al., Humanoids 2010"
     scale: ClassVar[float] = 5.0
+    ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
     def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
@@ -109,30 +127,25 @@ def _held(chosen: Sequence[FingerCandidate], setting: Setting) -> HeldObject | N
     return held_by_hand(setting.hand, combined_posture(setting.hand, setting.start, chosen), contacts, *_mass(setting))
 
 
-def _parts(candidate: FingerCandidate, setting: Setting) -> ConeParts | None:
-    """Return what a set adds to the bound of epsilon, None when it does not touch; found once per set."""
-    key = ("cones", id(candidate))
+def _wrenches(candidate: FingerCandidate, setting: Setting) -> FloatArray:
+    """Return the wrenches of the edges of a set's friction cones, shape (N, 6); found once per set."""
+    key = ("wrenches", id(candidate))
     if key not in setting.kept:
-        _keep_parts([candidate], setting)
-    found: ConeParts | None = setting.kept[key][1]
+        _keep_wrenches([candidate], setting)
+    found: FloatArray = setting.kept[key][1]
     return found
 
 
-def _keep_parts(candidates: Sequence[FingerCandidate], setting: Setting) -> None:
-    """Find the parts of several sets at once; the sets are kept with them, so that their identities stay their own."""
+def _keep_wrenches(candidates: Sequence[FingerCandidate], setting: Setting) -> None:
+    """Find the wrenches of several sets at once; sets are kept with them, so that their identities stay their own."""
     for c in candidates:
-        setting.kept["cones", id(c)] = (c, None)
+        setting.kept["wrenches", id(c)] = (c, np.empty((0, 6)))
     holding = [c for c in candidates if c.holding]
     if not holding:
         return
-    whole = cone_parts(held_by_contacts(_contacts(holding, setting), *_mass(setting)))
-    width, first = whole.reach.shape[1], 0
-    for c in holding:
-        last = first + len(c.holding)
-        own = whole.grasp_map[:, width * first : width * last]
-        rest = (array[first:last] for array in whole[1:])
-        setting.kept["cones", id(c)] = (c, ConeParts(own, *rest))
-        first = last
+    whole = held_by_contacts(_contacts(holding, setting), *_mass(setting)).edge_wrenches(EDGES)
+    for c, own in zip(holding, np.split(whole, np.cumsum([len(c.holding) for c in holding])[:-1]), strict=True):
+        setting.kept["wrenches", id(c)] = (c, own.reshape(-1, 6))
 
 
 def _contacts(chosen: Sequence[FingerCandidate], setting: Setting) -> ContactSet:

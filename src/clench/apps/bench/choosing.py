@@ -83,15 +83,17 @@ def _wrong(groups: Groups, setting: Setting) -> list[str]:
 
 
 def _time(report: BenchReport, made: Sequence[tuple[Groups, Setting]], calibration: Calibration, passes: int) -> None:
-    seconds, tried = [], []
+    seconds, tried, proved = [], [], []
     for groups, setting in [case for _ in range(passes) for case in made]:
         setting.kept.clear()
         start = time.perf_counter()
         choice: HandChoice = choose(groups, calibration, setting)
         seconds.append(time.perf_counter() - start)
         tried.append(choice.tried)
+        proved.append(choice.proved)
     report.distribution(f"choose_{calibration.name}", seconds)
     report.values[f"combinations_tried_{calibration.name}_median"] = float(np.median(tried))
+    report.values[f"proved_{calibration.name}"] = float(np.mean(proved))
     report.values[f"combinations_{calibration.name}_median"] = float(
         np.median([np.prod([len(f.equals) for f in choose(g, calibration, s).fingers]) for g, s in made])
     )

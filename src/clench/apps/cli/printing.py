@@ -196,6 +196,9 @@ def print_choice(solution: GraspSolution) -> None:
     for name, value in choice["final_hand_scores"].items():
         out.print(_plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
     out.print(f"[bold]{_plain(choice['text'])}[/bold]")
+    if choice["combinations_tried"] and choice.get("proved"):
+        judged, every = choice["combinations_tried"], choice["combinations"]
+        out.print(f"No combination of one set per finger is better ({judged} of {every} had to be judged).")
 
 
 def print_entries(entries: Sequence[RecordEntry], total: int) -> None:

@@ -6,9 +6,8 @@ N edges by at most a factor cos(pi / N) in the friction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -69,40 +68,11 @@ def epsilon_bound(held: HeldObject, norm: WrenchNorm | str | None = WrenchNorm.L
     if not len(held.contacts):
         return 0.0
     caps, most = _caps(held, norm)
-    return float(resisted_ball(*cone_parts(held, edges), caps, most, _ROUNDS))
-
-
-class ConeParts(NamedTuple):
-    """Hold what some contacts add to the bound of epsilon.
-
-    Args:
-        grasp_map: shape (6, C * width). edges, faces: of the cones, shapes (C, N, width) and (C, F, width).
-        reach: semi-axes of the cones at unit normal force, 1 for the normal, shape (C, width).
-    """
-
-    grasp_map: FloatArray
-    edges: FloatArray
-    faces: FloatArray
-    reach: FloatArray
-
-
-def cone_parts(held: HeldObject, edges: int = EDGES) -> ConeParts:
-    """Return what the contacts of a grasp add to its bound."""
     contacts = held.contacts
     reach = np.ones((len(contacts), contacts.width))
     reach[:, :2], reach[:, 3:] = contacts.reach[:, :2], contacts.reach[:, 2:]
-    return ConeParts(held.grasp_map, contacts.cone_edges(edges), cone_faces(contacts, edges), reach)
-
-
-def epsilon_bound_of(parts: Sequence[ConeParts]) -> float:
-    """Return the lower bound of `epsilon` (L1) of contacts in several parts, at least one, with one centre [N]."""
-    from clench.kernels.wrench_bound import resisted_ball
-
-    G = np.concatenate([p.grasp_map for p in parts], axis=1)
-    edges, faces, reach = (np.concatenate([p[k] for p in parts]) for k in (1, 2, 3))
-    sum_of_normals = np.zeros((1, G.shape[1]))
-    sum_of_normals[0, 2 :: reach.shape[1]] = 1.0
-    return float(resisted_ball(G, edges, faces, reach, sum_of_normals, np.ones(1), _ROUNDS))
+    generators, faces = contacts.cone_edges(edges), cone_faces(contacts, edges)
+    return float(resisted_ball(held.grasp_map, generators, faces, reach, caps, most, _ROUNDS))
 
 
 def cone_faces(contacts: ContactSet, edges: int) -> FloatArray:
