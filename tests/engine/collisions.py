@@ -1,5 +1,7 @@
 """Whether posed fingers collide with an object, by python-fcl, along their closing path."""
 
+from collections import Counter
+
 import fcl
 import numpy as np
 import numpy.typing as npt
@@ -7,6 +9,7 @@ import numpy.typing as npt
 import clench
 from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.shapes import Shape
+from oracle.width import core_of, gap
 
 from .surfaces import volume_tree
 
@@ -23,14 +26,27 @@ def tree_of(shape: Shape) -> fcl.BVHModel:
     return volume_tree(mesh.vertices, mesh.triangles)
 
 
-class Collisions:
-    """Look for colliding triangles of one hand's fingers and one object."""
+def trees_of_links(hand: Hand) -> list[list[fcl.BVHModel]]:
+    """Return the triangles of every link of a hand."""
+    return [[tree_of(s) for s in link.shapes.get(hand.default_source, ())] for link in hand.links]
 
-    def __init__(self, hand: Hand, obj: clench.GraspObject) -> None:
+
+class Collisions:
+    """Look for colliding triangles of one hand's fingers and one object.
+
+    Args:
+        links: of the hand, where they are at hand: they take a second to make.
+    """
+
+    def __init__(self, hand: Hand, obj: clench.GraspObject, links: list[list[fcl.BVHModel]] | None = None) -> None:
         self.hand = hand
+        self.cores = [core_of(s) for body in obj.bodies for s in body.shapes]
         self.objects = [fcl.CollisionObject(tree_of(s)) for body in obj.bodies for s in body.shapes]
-        self.links = [[tree_of(s) for s in link.shapes.get(hand.default_source, ())] for link in hand.links]
+        self.links = trees_of_links(hand) if links is None else links
         self.followers = {c.follower for c in hand.couplings}
+        free = set(map(frozenset, hand.allowed_pairs))
+        solid = [i for i in hand.solid_links if self.links[i]]
+        self.pairs = [(a, b) for a in solid for b in solid if a < b and frozenset((a, b)) not in free]
 
     def collide(self, q: Floats, T_object_palm: Floats, finger: Finger) -> list[str]:
         """Return the names of the finger's links that collide at a posture."""
@@ -42,6 +58,25 @@ class Collisions:
             if any(fcl.collide(tree, obj) for tree in trees for obj in self.objects):
                 names.append(self.hand.links[link].name)
         return names
+
+    def core_gap(self, q: Floats, T_object_palm: Floats, link: int) -> float:
+        """Return a link's gap by the engine's distance to its core [m]: the triangles of a round one lie inside it."""
+        T = T_object_palm @ self.hand.link_poses(self.hand.coupled(q))[link]
+        cores = [core_of(s) for s in self.hand.links[link].shapes[self.hand.default_source]]
+        return min(gap(core, T, other, np.eye(4)) for core in cores for other in self.cores)
+
+    def collide_among(self, q: Floats) -> list[tuple[str, str]]:
+        """Return the names of links of the hand that collide with each other and may not."""
+        poses = self.hand.link_poses(self.hand.coupled(q))
+        placed = [
+            [fcl.CollisionObject(tree, fcl.Transform(T[:3, :3], T[:3, 3])) for tree in trees]
+            for trees, T in zip(self.links, poses, strict=True)
+        ]
+        return [
+            (self.hand.links[a].name, self.hand.links[b].name)
+            for a, b in self.pairs
+            if any(fcl.collide(one, other) for one in placed[a] for other in placed[b])
+        ]
 
     def path(self, finger: Finger, start: Floats, end: Floats) -> list[Floats]:
         """Return postures along the proximal-first path; where a joint stops it is backed off."""
@@ -58,21 +93,40 @@ class Collisions:
                 q[j] = end[j]
         return postures
 
-    def check(self, solution: clench.GraspSolution) -> int:
-        """Assert that nothing collides on the way and that every contact stops its joint; return how many do."""
+    def wrong(self, solution: clench.GraspSolution) -> tuple[Counter[str], list[str]]:
+        """Return what was looked at, and what is wrong with a certified solution, as sentences.
+
+        On the path and at its end nothing may collide; with a joint advanced alone beyond the contact that stops it,
+        its finger must collide with the object.
+        """
         T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
         start = np.array([solution.open_angles[name] for name in self.hand.joint_names])
         end = np.array([solution.joint_angles[name] for name in self.hand.joint_names])
+        counted: Counter[str] = Counter()
+        wrong = [f"links {pair} collide at the end" for pair in self.collide_among(end)]
         for name in solution.fingers:
             finger = self.hand.finger(name)
             for q in [*self.path(finger, start, end), end]:
-                assert not self.collide(q, T_object_palm, finger), name
-        seen = 0
+                counted["postures"] += 1
+                if hit := self.collide(q, T_object_palm, finger):
+                    wrong.append(f"{name}: {hit} collide at {np.round(q, 6).tolist()}")
+                    break
         for contact in solution.contacts:
-            if not contact.passed:
-                joint = self.hand.joint_index(contact.stops_joint)
-                q = end.copy()
-                q[joint] += FURTHER * self.hand.joints[joint].direction
-                assert self.collide(q, T_object_palm, self.hand.finger(contact.finger)), contact
-                seen += 1
-        return seen
+            if contact.passed or contact.stops_joint is None:
+                continue
+            counted["contacts"] += 1
+            joint = self.hand.joint_index(contact.stops_joint)
+            q = end.copy()
+            q[joint] += FURTHER * self.hand.joints[joint].direction
+            if self.collide(q, T_object_palm, self.hand.finger(contact.finger)):
+                continue
+            counted["shallow"] += 1
+            if self.core_gap(q, T_object_palm, self.hand.link_index(contact.link)) >= 0.0:
+                wrong.append(f"{contact.stops_joint} advanced: {contact.link} does not collide ({contact.kind})")
+        return counted, wrong
+
+    def check(self, solution: clench.GraspSolution) -> int:
+        """Assert that nothing collides on the way and that every contact stops its joint; return how many do."""
+        counted, wrong = self.wrong(solution)
+        assert not wrong, wrong
+        return counted["contacts"]

@@ -25,6 +25,7 @@ SHARED = Path(__file__).parents[3] / "shared" / "data"
 HANDS = {
     "Shadow": "hands/shadow_hand_mjcf/right_hand.xml",
     "Allegro": "hands/wonik_allegro_mjcf/right_hand.xml",
+    "Allegro (URDF)": "hands/allegro_urdf/allegro_hand_right.urdf",
     "LEAP": "hands/leap_hand_urdf/leap_hand_right.urdf",
     "Barrett": "hands/barrett_hand_urdf/bhand_model.urdf",
     "D'Claw": "hands/dclaw_urdf/dclaw_gripper.urdf",

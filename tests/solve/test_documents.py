@@ -191,6 +191,11 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     assert [p.name for p in tmp_path.iterdir()] == ["s.json"]
 
 
+def test_a_path_that_is_none_is_refused_in_a_sentence() -> None:
+    with pytest.raises(FileError, match="is no path of a file"):
+        write_atomically("a\0b", b"new")
+
+
 def test_a_good_solution_has_no_violations(solution: GraspSolution) -> None:
     assert solution.violations() == ()
     assert solution.is_valid()

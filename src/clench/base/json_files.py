@@ -78,6 +78,8 @@ def write_atomically(path: str | Path, content: bytes) -> None:
             os.fsync(file.fileno())
         Path(temporary).chmod(0o666 & ~_umask())
         Path(temporary).replace(target)
+    except ValueError as error:
+        raise FileError(path, f"is no path of a file ({error}).") from None
     except OSError as error:
         if temporary is not None:
             Path(temporary).unlink(missing_ok=True)

@@ -16,6 +16,7 @@ from clench.models.hand.hand import Hand
 from .candidates import FingerCandidate, Touch, closed_anew
 from .closing import ClosedHand, HandPlan
 from .exact import HandBodies
+from .lanes import links_that_may_meet
 from .plan import last_closing_joint
 from .scene import PackedObject
 
@@ -77,18 +78,23 @@ def close_together(
     speeds = {k: _link_speeds(hand, sets[k], bodies) for k in moving}
     meetings: dict[tuple[int, int], Meeting | None] = {}
     overlapping: set[int] = set()
+    since = 0.0
     while True:
         for a, b in combinations(moving, 2):
             if (a, b) not in meetings:
-                meetings[a, b] = _meeting(hand, (sets[a], sets[b]), (speeds[a], speeds[b]), bodies, apart)
+                meetings[a, b] = _meeting(hand, (sets[a], sets[b]), (speeds[a], speeds[b]), bodies, apart, since)
         found = [(m, a, b) for (a, b), m in meetings.items() if m is not None]
         overlapping |= {k for m, a, b in found if m.at == 0.0 for k in (a, b)}
         later = [row for row in found if row[0].at > 0.0]
         if not later:
             return [_finished(c, held[c.item], c.exact and k not in overlapping) for k, c in enumerate(sets)]
         first, a, b = min(later, key=lambda row: (row[0].at, row[0].links))
-        meetings = {pair: m for pair, m in meetings.items() if not {a, b} & set(pair)}
-        # Two links that met rest from there on, and until there move as they did: they do not meet again.
+        # Until there all move as they did.
+        since = first.at
+        meetings = {
+            pair: m for pair, m in meetings.items() if not {a, b} & set(pair) or (m is not None and m.at == 0.0)
+        }
+        # Two links that met rest from there on: they do not meet again.
         apart[first.links[0], first.links[1]] = apart[first.links[1], first.links[0]] = 0
         for k, own, other, sign in ((a, 0, 1, 1.0), (b, 1, 0, -1.0)):
             c = sets[k]
@@ -141,8 +147,9 @@ def _meeting(
     speeds: tuple[dict[int, FloatArray], dict[int, FloatArray]],
     bodies: HandBodies,
     apart: np.ndarray,
+    since: float,
 ) -> Meeting | None:
-    """Return where two fingers first meet that were free of each other, or that they overlap at the start.
+    """Return where two fingers first meet that are free of each other up to `since`, or overlap at the start.
 
     Steps as long as the gap of two links allows, at the fastest that any of their points approach each other, cannot
     pass a meeting. The pair that has come least far is looked at next.
@@ -152,8 +159,10 @@ def _meeting(
     ends = [_joint_ends(c) for c in pair]
     # What rests on both sides is judged with the whole hand.
     lasts = [{link: _last_end(own, e) for link, own in found.items()} for found, e in zip(speeds, ends, strict=True)]
-    last = {(m, r): max(lasts[0][m], lasts[1][r]) for m in speeds[0] for r in speeds[1] if apart[m, r]}
-    waiting = [(0.0, m, r, np.inf) for (m, r), end in last.items() if end > 0.0]
+    paths = [{link: s * e for link, s in found.items()} for found, e in zip(speeds, ends, strict=True)]
+    near = links_that_may_meet(hand, (pair[0].plan, pair[1].plan), (paths[0], paths[1]), bodies)
+    last = {(m, r): max(lasts[0][m], lasts[1][r]) for m, r in near if apart[m, r]}
+    waiting = [(since, m, r, np.inf) for (m, r), end in last.items() if end > since]
     heapify(waiting)
     out = np.empty(6)
     for looks in range(_LOOKS):
@@ -163,14 +172,14 @@ def _meeting(
         # Only joints that move still count.
         end, speed = last[m, r], float(speeds[0][m] @ (ends[0] > at) + speeds[1][r] @ (ends[1] > at))
         slack = _SLACK if away > _NEAR else 1.0
-        # A gap that is not below the bound is the bound itself, which has to be none of a touch.
-        bound = (end - at) * speed + 2.0 * _TOUCH
+        # A gap that is not below the bound may be smaller by the slack, and is enough for what is left of the motion.
+        bound = slack * ((end - at) * speed + 2.0 * _TOUCH)
         gap = link_gap(bodies.links, m, r, _poses(hand, pair, at), bound, slack, out)
         if gap <= _TOUCH or looks == _LOOKS - 1:
             return Meeting(at, (m, r), out[:3].copy(), out[3:].copy(), gap)
         # Links that are held where they met touch at the end of their motion.
         step = gap / (slack * speed)
-        if at + step < (1.0 - _ROUNDING) * end:
+        if gap < bound and at + step < (1.0 - _ROUNDING) * end:
             heappush(waiting, (at + step, m, r, gap))
     return None
 

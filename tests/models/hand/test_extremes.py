@@ -29,6 +29,7 @@ def test_what_they_start_from_loads(tmp_path):
             '<axis xyz="0 1e308 0"/><limit lower="-0.2"',
             "'thumb_a' has an axis",
         ),
+        ('mass value="0.02"', 'mass value="inf"', "the mass of link 'index_proximal' is not finite"),
         ('sphere radius="0.01"', 'sphere radius="1e10"', "a shape of link 'thumb' has lengths"),
     ],
 )

@@ -37,6 +37,8 @@ def refuse_extremes(compiled: CompiledModel) -> None:
         _check(compiled, int(m.jnt_bodyid[j]), m.jnt_pos[j], "a joint")
     for body in range(m.nbody):
         _check(compiled, body, m.body_pos[body], "its place")
+        if not math.isfinite(m.body_mass[body]):
+            raise HandError(f"{compiled.label}: the mass of link '{compiled.body_name(body)}' is not finite.")
     for geom in range(m.ngeom):
         mesh = int(m.geom_dataid[geom]) if m.geom_type[geom] == _mesh_type() else -1
         first = int(m.mesh_vertadr[mesh]) if mesh >= 0 else 0
