@@ -442,3 +442,12 @@ def test_output_that_nobody_reads_is_no_error() -> None:
     assert run.wait(timeout=60) == 0
     assert run.stderr.read() == b""
     run.stderr.close()
+
+
+def test_friction_or_mass_alone_print_the_forces(capsys):
+    assert main(["solve", "--hand", "robonaut2", "--object", "sphere:r=0.03", "--friction", "0.9"]) in (0, 1)
+    said = capsys.readouterr().out
+    assert "epsilon" in said
+    assert "any direction of gravity" in said or "every direction of gravity" in said
+    assert main(["solve", "--hand", "robonaut2", "--object", "sphere:r=0.03", "--mass", "-1"]) == 2
+    assert "--mass: expected a finite number of at least 0 kg" in capsys.readouterr().err

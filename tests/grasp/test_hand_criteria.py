@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
 from clench.base.pose import Pose
 from clench.grasp import criterion_registry
 from clench.grasp.calibration import Calibration
+from clench.grasp.candidates import combined_posture
 from clench.grasp.choice import choose
 from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import find_criterion
@@ -148,6 +150,87 @@ def test_any_way_is_no_less_than_one_way(chosen):
     one, any_way = (score(name, sets, setting) for name in ("actuation_force", "actuation_force_any_way"))
     assert one is not None
     assert any_way is None or any_way >= one - 1e-9
+
+
+def wrench_hull_torque(sets, setting, load, edges=64):
+    """Return the least worst torque that holds a load, by a linear program over fine polyhedra inside the cones.
+
+    Moments are taken about every joint that moves the touching link: a computation apart from ours.
+    """
+    hand, T = setting.hand, setting.T_palm_object
+    mass = mass_properties(setting.obj)
+    center = T[:3, :3] @ mass.center + T[:3, 3]
+    wrenches, torques, followers = [], [], {c.follower for c in hand.couplings}
+    q = combined_posture(hand, setting.start, sets)
+    for c in sets:
+        for t in c.holding:
+            n = -np.asarray(t.normal)
+            side = np.cross(n, [0.3, 0.5, 0.8])
+            side /= np.linalg.norm(side)
+            for angle in np.linspace(0.0, 2.0 * np.pi, edges, endpoint=False):
+                f = n + 0.5 * (np.cos(angle) * side + np.sin(angle) * np.cross(n, side))
+                arm = np.asarray(t.position) - center
+                wrenches.append(np.concatenate([f, np.cross(arm, f)]))
+                torques.append([moment(hand, q, j, t, f) for j in range(len(q)) if j not in followers])
+    W, R = np.array(wrenches).T, np.array(torques).T
+    ones = np.ones((len(R), 1))
+    found = linprog(
+        np.append(np.zeros(W.shape[1]), 1.0),
+        A_eq=np.hstack([W, np.zeros((6, 1))]),
+        b_eq=-np.asarray(load),
+        A_ub=np.vstack([np.hstack([R, -ones]), np.hstack([-R, -ones])]),
+        b_ub=np.zeros(2 * len(R)),
+        method="highs",
+    )
+    return found.fun if found.status == 0 else None
+
+
+def moment(hand, q, joint, touch, force, step=1e-6):
+    """Return the torque of a joint for a force on a link, by the work done over a small turn; followers turn along."""
+    shifted = []
+    for sign in (1.0, -1.0):
+        turned = q.copy()
+        turned[joint] += sign * step
+        for c in hand.couplings:
+            turned[c.follower] += c.ratio * (turned[c.leader] - q[c.leader])
+        before, after = (hand.link_poses(x)[touch.link] for x in (q, turned))
+        local = np.linalg.solve(before, np.append(touch.position, 1.0))
+        shifted.append((after @ local)[:3])
+    return float((shifted[0] - shifted[1]) @ force / (2.0 * step))
+
+
+def grip(chosen, **changes):
+    """Return three fingers around a ball, which hold it every way, and the setting."""
+    hand = clench.Hand.load("robonaut2")
+    sets, setting, _ = chosen(hand, MUG, mug_command(**changes))
+    return sets, setting
+
+
+def test_six_pulls_take_what_a_linear_program_finds(chosen):
+    sets, setting = grip(chosen)
+    pulls = np.vstack([np.eye(6)[:3], -np.eye(6)[:3]])
+    expected = max(wrench_hull_torque(sets, setting, pull) for pull in pulls)
+    assert score("actuation_force_six_pulls", sets, setting) == pytest.approx(expected, rel=3e-3)
+    assert score("actuation_force_six_pulls", sets, setting) <= expected + 1e-9
+
+
+def test_a_task_takes_what_a_linear_program_finds_and_is_told_in_the_world(chosen):
+    force, torque = np.array([1.0, 0.0, -2.0]), np.array([0.0, 0.02, 0.0])
+    sets, setting = grip(chosen, task_wrenches=({"force": tuple(force), "torque": tuple(torque)},))
+    R = mug_command().hand_pose.rotation
+    expected = wrench_hull_torque(sets, setting, np.concatenate([R.T @ force, R.T @ torque]))
+    assert score("actuation_force_task", sets, setting) == pytest.approx(expected, rel=3e-3)
+    assert score("actuation_force_task", sets, replace(setting, task=np.empty((0, 6)))) is None
+
+
+def test_the_worst_task_counts_and_limits_bind(chosen):
+    light, heavy = {"force": (0.0, 0.0, -1.0)}, {"force": (0.0, 0.0, -3.0)}
+    sets, setting = grip(chosen, task_wrenches=(heavy,))
+    one = score("actuation_force_task", sets, setting)
+    both = score("actuation_force_task", *grip(chosen, task_wrenches=(light, heavy)))
+    assert both == pytest.approx(one, rel=1e-6)
+    assert one == pytest.approx(3.0 * score("actuation_force", sets, setting), rel=1e-6)
+    assert score("actuation_force_task", *grip(chosen, task_wrenches=({"force": (0.0, 0.0, -3000.0)},))) is None
 
 
 def test_what_cannot_be_held_has_no_force(chosen):

@@ -44,6 +44,7 @@ def test_a_full_file_is_read_and_written_back(tmp_path):
         "opposition_grid": [0.0, 0.2],
         "criteria": {"range_of_motion": 1, "limit_distance": 0.5},
         "next_steps": [{"index_yaw": 0.1}, {}],
+        "task_wrenches": [{"force": [0, 0, -5], "torque": [0, 0.1, 0]}, {"force": [1, 0, 0]}],
         "seed": 7,
     }
     assert set(document) == set(KEYS)
@@ -118,6 +119,14 @@ def test_a_name_without_an_ending_is_a_preset(tmp_path):
         ("next_steps", {"index_yaw": 0.1}, "next_steps: expected a list of postures"),
         ("next_steps", [0.1], "next_steps[0]: expected an object"),
         ("next_steps", [{}, {"index_yaw": None}], "next_steps[1].index_yaw: expected a number in rad"),
+        ("task_wrenches", [], "task_wrenches: expected a list of at least one wrench to hold, got []"),
+        ("task_wrenches", None, "task_wrenches: expected a list of at least one wrench to hold, got None"),
+        ("task_wrenches", [[0, 0, 1]], "task_wrenches[0]: expected {'force': [x, y, z], 'torque': [x, y, z]}"),
+        ("task_wrenches", [{}], "task_wrenches[0]: expected {'force': [x, y, z], 'torque': [x, y, z]}"),
+        ("task_wrenches", [{"moment": [0, 0, 1]}], "task_wrenches[0]: expected {'force': [x, y, z], 'torque'"),
+        ("task_wrenches", [{"force": [0, 1]}], "task_wrenches[0].force: expected [x, y, z] in N, got [0, 1]"),
+        ("task_wrenches", [{"torque": [0, 1, "x"]}], "task_wrenches[0].torque[2]: expected a number, in Nm, got 'x'"),
+        ("task_wrenches", [{"force": [0, 0, 0]}], "task_wrenches[0]: expected a force or torque that is not 0"),
         ("opposition_grid", [], "opposition_grid: expected a list of at least one number"),
         ("seed", "one", "seed: expected a whole number"),
         ("plane", 3, "plane: unknown key; did you mean 'planes'?"),

@@ -30,6 +30,8 @@ class Setting:
         joint_weights: of the joints in the range of motion, shape (J,); None is 1 for all.
         obj: the object, its friction and mass; None where only its surface counts.
         gravity: its direction in the palm frame, unit, shape (3,).
+        task: what acts on the object in its task: force [N] and torque about the centre of mass [Nm] in the palm frame,
+            shape (N, 6).
         in_stages: fingers close proximal first, once, so that what stopped a joint can be found again.
         kept: what a criterion wants to keep from one set to the next; emptied with every solve.
     """
@@ -44,6 +46,7 @@ class Setting:
     obj: GraspObject | None = None
     gravity: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
     in_stages: bool = True
+    task: FloatArray = field(default_factory=lambda: np.empty((0, 6)))
     kept: dict[Any, Any] = field(default_factory=dict)
 
 

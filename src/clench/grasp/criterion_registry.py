@@ -24,7 +24,14 @@ from .finger_criteria import (
     RangeOfMotion,
     TouchingLinks,
 )
-from .hand_criteria import ActuationForce, ActuationForceAnyWay, Steadiness, TendonTension
+from .hand_criteria import (
+    ActuationForce,
+    ActuationForceAnyWay,
+    ActuationForceSixPulls,
+    ActuationForceTask,
+    Steadiness,
+    TendonTension,
+)
 
 #: Installed packages name their criteria under this group of entry points: `name = "module:Class"`.
 ENTRY_POINTS: Final = "clench.criteria"
@@ -46,6 +53,8 @@ _registry: dict[str, Criterion | HandCriterion] = {
         Steadiness(),
         ActuationForce(),
         ActuationForceAnyWay(),
+        ActuationForceSixPulls(),
+        ActuationForceTask(),
         TendonTension(),
     )
 }

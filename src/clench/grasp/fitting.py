@@ -85,7 +85,10 @@ def fit_weights(examples: Examples, penalty: float = PENALTY) -> Fit:
         raise CommandError("examples: no criterion has a score on every side of every example.")
     if _one_kind(examples.held):
         what, other = ("held", "dropped") if examples.held[0] else ("dropped", "held")
-        raise CommandError(f"examples: all {len(examples.held)} outcomes are {what}; expected some {other}, too.")
+        raise CommandError(
+            f"examples: all {len(examples.held)} outcomes are {what}, which says nothing about what makes a grasp hold; "
+            f"add some that were {other}, or give pairs alone."
+        )
     raw, intercept = likeliest(examples, penalty)
     if raw.max(initial=0.0) <= 0.0:
         listed = ", ".join(examples.names)

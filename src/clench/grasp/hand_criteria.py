@@ -1,12 +1,12 @@
 """The criteria of all fingers together: what forces their contacts resist and need (METHOD.md section 6).
 
 Contacts are those of the chosen sets that still touch, as points with friction. Forces are per newton of load, so no
-mass has to be known, and torque limits play no part.
+mass has to be known, and torque limits play no part; those of a task are in newtons, and inside the limits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import ClassVar, Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from .mechanics.actuation import Effort, least_effort
 from .mechanics.alternative_wrenches import AlternativeWrenches
 from .mechanics.contacts import ContactSet, make_contacts, pair_friction
 from .mechanics.held import HeldObject, held_by_contacts, held_by_hand
-from .mechanics.loads import GRAVITY, gravity_any_direction, weight
+from .mechanics.loads import GRAVITY, gravity_any_direction, six_pulls, task_wrench, weight
 from .mechanics.steadiness import EDGES
 from .mechanics.wrench_space import epsilon_l1
 
@@ -93,6 +93,37 @@ class ActuationForceAnyWay:
         return _worst_torque(chosen, setting, gravity_any_direction(_NEWTON))
 
 
+class ActuationForceSixPulls:
+    """Smallest worst joint torque that holds pulls along ±x, ±y, ±z of the palm, per newton of the pull."""
+
+    name: ClassVar[str] = "actuation_force_six_pulls"
+    unit: ClassVar[str] = "Nm/N"
+    source: ClassVar[str] = "Bicchi and Kumar, ICRA 2000"
+    scale: ClassVar[float] = 0.05
+    ideal: ClassVar[float] = 0.0
+    larger_is_better: ClassVar[bool] = False
+
+    def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
+        """Return the torque over six pulls of 1 N at the centre of mass, each alone [Nm per N]; None as above."""
+        return _worst_torque(chosen, setting, six_pulls(1.0))
+
+
+class ActuationForceTask:
+    """Smallest worst joint torque that holds the command's task wrenches, inside the joints' torque limits."""
+
+    name: ClassVar[str] = "actuation_force_task"
+    unit: ClassVar[str] = "Nm"
+    source: ClassVar[str] = "Bicchi and Kumar, ICRA 2000"
+    scale: ClassVar[float] = 0.1
+    ideal: ClassVar[float] = 0.0
+    larger_is_better: ClassVar[bool] = False
+
+    def score_hand(self, chosen: Sequence[FingerCandidate], setting: Setting) -> float | None:
+        """Return the torque [Nm]; None without task wrenches, or where one cannot be held inside all limits."""
+        held = _held(chosen, setting) if len(setting.task) else None
+        return None if held is None else _worst(held, [task_wrench(w[:3], w[3:], held.length)[0] for w in setting.task])
+
+
 class TendonTension:
     """Smallest worst tendon tension that holds 1 N of the object's weight; tendons are kept taut."""
 
@@ -115,8 +146,18 @@ class TendonTension:
 def _worst_torque(chosen: Sequence[FingerCandidate], setting: Setting, loads: FloatArray) -> float | None:
     """Return the smallest worst torque over loads, without regard to torque limits; None when one cannot be held."""
     held = _held(chosen, setting)
-    plans = [] if held is None else [least_effort(held.without_limits(), load) for load in loads]
-    return max((p.worst_torque for p in plans if p), default=None) if plans and all(plans) else None
+    return None if held is None else _worst(held.without_limits(), loads)
+
+
+def _worst(held: HeldObject, loads: Iterable[FloatArray]) -> float | None:
+    """Return the smallest worst torque over loads [Nm]; None when one of them cannot be held."""
+    worst = 0.0
+    for load in loads:
+        plan = least_effort(held, load)
+        if plan is None:
+            return None
+        worst = max(worst, plan.worst_torque)
+    return worst
 
 
 def _held(chosen: Sequence[FingerCandidate], setting: Setting) -> HeldObject | None:

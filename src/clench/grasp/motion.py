@@ -77,6 +77,13 @@ def next_postures(hand: Hand, command: GraspCommand) -> tuple[FloatArray, ...]:
     return tuple(postures)
 
 
+def task_wrenches(command: GraspCommand, T_world_palm: Pose) -> FloatArray:
+    """Return what acts on the object in its task in the palm frame: force [N] and torque [Nm], shape (N, 6)."""
+    parts = [[w.get(part, (0.0, 0.0, 0.0)) for part in ("force", "torque")] for w in command.task_wrenches]
+    there: FloatArray = np.array(parts, dtype=np.float64).reshape(-1, 2, 3) @ T_world_palm.rotation
+    return there.reshape(-1, 6)
+
+
 def decompose(hand: Hand, q: FloatArray) -> dict[str, dict[str, float]]:
     """Return a posture as its two motions, by joint name [rad]; upstream joints count as posture."""
     closing = {j.name: float(a) for j, a in zip(hand.joints, q, strict=True) if j.role is JointRole.CLOSING}

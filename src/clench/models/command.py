@@ -47,6 +47,8 @@ class GraspCommand:
         opposition_grid: offsets [rad] added to the thumb's first posture joint as alternatives.
         criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.
         next_steps: postures [rad] by joint name that the hand goes to after the grasp, for the criteria about them.
+        task_wrenches: what acts on the object in its task, `force` [N] and `torque` [Nm] in the world about the centre
+            of mass, for the criterion about it; each is held alone.
         seed: recorded with the result; nothing random depends on it.
     """
 
@@ -68,6 +70,7 @@ class GraspCommand:
     collision_source: CollisionSource | None = None
     criteria: Mapping[str, float] | Path | str | None = None
     next_steps: tuple[Mapping[str, float], ...] = ()
+    task_wrenches: tuple[Mapping[str, tuple[float, ...]], ...] = ()
     seed: int | None = None
 
     @classmethod

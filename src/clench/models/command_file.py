@@ -30,7 +30,7 @@ LIMIT_TOLERANCE: Final = 1e-9
 KEYS: Final = (
     *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "speeds", "planes"),
     *("full_width", "yaw_grid", "open_variants", "opposition_grid", "check_sets", "measure", "collision_source"),
-    *("criteria", "next_steps", "seed"),
+    *("criteria", "next_steps", "task_wrenches", "seed"),
 )
 
 
@@ -114,6 +114,8 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     _numbers(command.opposition_grid, "opposition_grid", "offsets in rad")
     for i, step in enumerate(_steps(command.next_steps, "next_steps")):
         _check_step(hand, step, f"next_steps[{i}]")
+    if command.task_wrenches:
+        _wrenches(command.task_wrenches, "task_wrenches")
     if command.collision_source is not None:
         _choice(command.collision_source, CollisionSource, "collision_source")
     for key in ("full_width", "check_sets", "measure"):
@@ -193,6 +195,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "collision_source": lambda v, key: _choice(v, CollisionSource, key),
         "criteria": lambda v, key: _criteria(v, key, folder),
         "next_steps": _steps,
+        "task_wrenches": _wrenches,
         "seed": _whole,
     }
     # null stands for "not given" where the default is None.
@@ -287,6 +290,29 @@ def _steps(value: Any, key: str) -> tuple[dict[str, float], ...]:
     if not isinstance(value, (list, tuple)):
         raise CommandError(f"{key}: expected a list of postures, got {_shown(value)}.")
     return tuple(_weights(step, f"{key}[{i}]", "a number in rad") for i, step in enumerate(value))
+
+
+def _wrenches(value: Any, key: str) -> tuple[dict[str, tuple[float, ...]], ...]:
+    if not isinstance(value, (list, tuple)) or not value:
+        raise CommandError(f"{key}: expected a list of at least one wrench to hold, got {_shown(value)}.")
+    return tuple(_wrench(wrench, f"{key}[{i}]") for i, wrench in enumerate(value))
+
+
+def _wrench(value: Any, key: str) -> dict[str, tuple[float, ...]]:
+    units = {"force": "N", "torque": "Nm"}
+    if not isinstance(value, Mapping) or not value or set(value) - set(units):
+        raise CommandError(
+            f"{key}: expected {{'force': [x, y, z], 'torque': [x, y, z]}} or one of them, got {_shown(value)}."
+        )
+    found = {}
+    for part, unit in units.items():
+        numbers = _numbers(value.get(part, (0.0, 0.0, 0.0)), f"{key}.{part}", f"in {unit}")
+        if len(numbers) != 3:
+            raise CommandError(f"{key}.{part}: expected [x, y, z] in {unit}, got {_shown(value[part])}.")
+        found[part] = numbers
+    if not any(any(numbers) for numbers in found.values()):
+        raise CommandError(f"{key}: expected a force or torque that is not 0.")
+    return found
 
 
 def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | Path | str:

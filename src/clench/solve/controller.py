@@ -23,7 +23,7 @@ from clench.grasp.depths import hand_depths
 from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
 from clench.grasp.explaining import explain_choice
 from clench.grasp.feasibility import judge_sets
-from clench.grasp.motion import alternatives, asked_fingers, next_postures, open_posture, palm_pose
+from clench.grasp.motion import alternatives, asked_fingers, next_postures, open_posture, palm_pose, task_wrenches
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
 from clench.grasp.scene import PackedObject, pack_object
 from clench.grasp.sequence import close_in_sequence
@@ -185,6 +185,7 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         problem.obj,
         problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
         not problem.together and problem.command.rounds == 1,
+        task_wrenches(problem.command, problem.T_world_palm),
     )
 
 

@@ -64,7 +64,7 @@ def solve(
     pose_error: tuple[float, float] | None = None,
     explain: bool = False,
     forces: bool = False,
-    mass: float = 0.2,
+    mass: float | None = None,
     friction: float | None = None,
     strict: bool = False,
     json: bool = False,
@@ -88,8 +88,9 @@ def solve(
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
         explain: print the alternative sets with their scores, and why the chosen ones won.
         forces: print how steady the grasp is, and the forces that hold the object.
-        mass: of the object, for the forces [kg].
-        friction: of links on the object, for the forces; by default what hand file and object say, else 0.5.
+        mass: of the object, for the forces, which it prints [kg]; 0.2 by default.
+        friction: of links on the object, for the forces, which it prints; by default what hand file and object say,
+            else 0.5. The choice takes those of hand file and object.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """
@@ -101,13 +102,15 @@ def solve(
     from clench.grasp.mechanics.loads import check_mass
     from clench.kernels.warming import warm_up
     from clench.solve.pareto import hand_front
+    from clench.solve.quality import DEFAULT_MASS
 
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
-    check_mass(mass)
+    forces = forces or mass is not None or friction is not None
+    mass = DEFAULT_MASS if mass is None else check_mass(mass, "--mass")
     if friction is not None:
-        check_friction(friction)
+        check_friction(friction, "--friction")
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     if command is not None:

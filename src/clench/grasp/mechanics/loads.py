@@ -94,14 +94,14 @@ def check_loads(loads: ArrayLike) -> FloatArray:
     return rows
 
 
-def check_mass(mass: float) -> float:
-    """Return a mass [kg].
+def check_mass(mass: float, key: str = "mass") -> float:
+    """Return a mass [kg]; `key` names it in messages.
 
     Raises:
         CommandError: not finite, or below 0.
     """
     if not (isinstance(mass, Real) and np.isfinite(mass) and mass >= 0.0):
-        raise CommandError(f"mass: expected a finite number of at least 0 kg, got {mass!r}.")
+        raise CommandError(f"{key}: expected a finite number of at least 0 kg, got {mass!r}.")
     return float(mass)
 
 
