@@ -86,7 +86,7 @@ def fit_weights(examples: Examples, penalty: float = PENALTY) -> Fit:
     if _one_kind(examples.held):
         what, other = ("held", "dropped") if examples.held[0] else ("dropped", "held")
         raise CommandError(
-            f"examples: all {len(examples.held)} outcomes are {what}, which says nothing about what makes a grasp hold; "
+            f"examples: all {len(examples.held)} outcomes are {what}, which does not tell what makes grasps hold; "
             f"add some that were {other}, or give pairs alone."
         )
     raw, intercept = likeliest(examples, penalty)
