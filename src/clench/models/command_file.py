@@ -304,7 +304,7 @@ def _wrench(value: Any, key: str) -> dict[str, tuple[float, ...]]:
         raise CommandError(
             f"{key}: expected {{'force': [x, y, z], 'torque': [x, y, z]}} or one of them, got {_shown(value)}."
         )
-    found = {}
+    found: dict[str, tuple[float, ...]] = {}
     for part, unit in units.items():
         numbers = _numbers(value.get(part, (0.0, 0.0, 0.0)), f"{key}.{part}", f"in {unit}")
         if len(numbers) != 3:
