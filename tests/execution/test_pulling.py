@@ -110,11 +110,9 @@ def test_the_same_every_time(pincer: Hand, pinch: GraspSolution, ball: GraspObje
 
 def test_an_obstacle_under_the_object_does_not_carry_it(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
     shell = Body("tray", (Shape(ShapeKind.BOX, (0.05, 0.05, 0.002), Pose([0, 0, 0.0225])),), BodyRole.OBSTACLE)
-    q = posture(pinch.joint_angles, pincer, "joint_angles")
     hold = replace(FIRM, squeeze=0.0, duration=0.3)
-    alone, beside = (
-        hold_and_pull(pinch, pincer, obj, hold, start=q, reached=q) for obj in (ball, ball.with_body(shell))
-    )
+    way = plan_trajectory(pinch, pincer)
+    alone, beside = (hold_and_pull(pinch, pincer, obj, hold, way) for obj in (ball, ball.with_body(shell)))
     assert alone.to_dict() == beside.to_dict()
 
 

@@ -78,10 +78,10 @@ def test_a_pinch_is_reached(pincer: Hand, pinch: GraspSolution, ball: GraspObjec
 
 
 def test_fingers_touch_at_the_same_moment(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
-    report = execute(pinch, SimulatedHand(pincer, ball, contact_tolerance=2e-4))
+    report = execute(pinch, SimulatedHand(pincer, ball))
     times = list(report.first_touch.values())
     assert None not in times
-    assert max(times) - min(times) <= 0.1
+    assert max(times) - min(times) <= 0.005
 
 
 def test_the_watcher_sees_the_motion(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:

@@ -41,12 +41,24 @@ def test_it_starts_open_and_ends_at_the_touch(pincer: Hand, pinch: GraspSolution
     np.testing.assert_array_equal(trajectory.at(1e9), trajectory.positions[-1])
 
 
+def accelerations(trajectory: Trajectory) -> np.ndarray:
+    """Twice the second divided differences: for a smooth path, accelerations somewhere between three way-points."""
+    rates = np.diff(trajectory.positions, axis=0) / np.diff(trajectory.times)[:, None]
+    return np.abs(np.diff(rates, axis=0)) / (0.5 * (trajectory.times[2:] - trajectory.times[:-2]))[:, None]
+
+
+@pytest.mark.parametrize("acceleration", [10.0, 1e5])
 @pytest.mark.parametrize("speed", [1.0, 0.25])
-def test_limits_hold_and_the_slowest_finger_reaches_its_own(pincer: Hand, pinch: GraspSolution, speed: float) -> None:
-    trajectory = plan_trajectory(pinch, pincer, speed=speed)
+def test_limits_hold_and_one_of_them_is_reached(
+    pincer: Hand, pinch: GraspSolution, speed: float, acceleration: float
+) -> None:
+    trajectory = plan_trajectory(pinch, pincer, speed=speed, acceleration=acceleration)
     np.testing.assert_array_equal(trajectory.velocity_limits, [3.0, DEFAULT_SPEED, 1.0])
     share = speeds(trajectory).max(axis=0) / trajectory.velocity_limits
-    assert share.max() == pytest.approx(speed, rel=1e-9)
+    used = accelerations(trajectory).max() / acceleration
+    assert share.max() <= speed * (1.0 + 1e-9)
+    assert used <= 1.0 + 1e-6
+    assert share.max() == pytest.approx(speed, rel=1e-6) or used == pytest.approx(1.0, rel=1e-3)
 
 
 def test_all_fingers_arrive_together_and_slowly(pincer: Hand, pinch: GraspSolution) -> None:
@@ -112,6 +124,13 @@ def test_a_hand_that_need_not_move(pincer: Hand, pinch: GraspSolution) -> None:
     trajectory = plan_trajectory(replace(pinch, joint_angles=pinch.open_angles), pincer)
     assert trajectory.duration == 0.0
     assert trajectory.to_dict()["points"] == [{"time": 0.0, "phase": "touch", "positions": [0.0, 0.0, 0.0]}]
+
+
+@pytest.mark.parametrize("key", ["acceleration", "clearance"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_bad_acceleration_and_clearance(pincer: Hand, pinch: GraspSolution, key: str, value: float) -> None:
+    with pytest.raises(CommandError, match=f"{key}: expected a finite number above 0"):
+        plan_trajectory(pinch, pincer, **{key: value})
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 1.5, np.nan, 5e-324])

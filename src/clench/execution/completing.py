@@ -11,7 +11,8 @@ from clench.solve.quality import DEFAULT_MASS, grasp_quality
 from clench.solve.solution import GraspSolution
 from clench.solve.squeezing import plan_squeeze
 
-from .pregrasp import CLEARANCE, plan_pregrasp
+from .landing import CLEARANCE
+from .pregrasp import plan_pregrasp
 
 
 def complete(

@@ -8,6 +8,7 @@ import os
 import sys
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,10 @@ from clench.base.errors import ObjectError
 from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray
 from clench.models.mesh import TriangleMesh
+from clench.models.objects.grasp_object import Body, GraspObject
+from clench.models.objects.loading import in_source
+from clench.models.shapes import CollisionSource, ShapeKind
+from clench.models.tessellation import convex_hull
 
 #: A mesh whose volume misses its hull's by less than this fraction is convex [-].
 CONVEX_FRACTION = 1e-4
@@ -54,6 +59,30 @@ def convex_pieces(mesh: TriangleMesh, name: str, *, show_progress: bool = False)
         pieces = _decomposed(mesh, name, show_progress)
         _keep(file, pieces)
     return pieces
+
+
+def in_pieces(obj: GraspObject, *, show_progress: bool = False) -> GraspObject:
+    """Return an object as the engine collides it, so that solver and simulation see the same shapes.
+
+    Args:
+        obj: the object; a body of meshes that is not convex and comes without pieces is decomposed.
+        show_progress: show a bar meanwhile.
+
+    Raises:
+        ObjectError: a mesh is flat.
+    """
+    return replace(
+        obj,
+        bodies=tuple(in_source(_with_pieces(body, show_progress), CollisionSource.ENGINE) for body in obj.bodies),
+        collision_source=CollisionSource.ENGINE,
+    )
+
+
+def _with_pieces(body: Body, show_progress: bool) -> Body:
+    if body.pieces or any(shape.kind is not ShapeKind.MESH for shape in body.shapes):
+        return body
+    hulls = [h for s in body.shapes for h in convex_pieces(s.to_mesh(), body.name, show_progress=show_progress)]
+    return replace(body, pieces=tuple(convex_hull(TriangleMesh(vertices, [])) for vertices in hulls))
 
 
 def hull_of(vertices: FloatArray, name: str) -> tuple[FloatArray, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -15,20 +16,30 @@ from clench.grasp.mechanics.contacts import ContactModel, check_friction
 LIGHTEST = 1e-3
 
 
+class HoldTest(StrEnum):
+    """Name the hold tests."""
+
+    PULLS = "pulls"
+    """no gravity; the object is pulled along six directions, each time anew"""
+    LIFT = "lift"
+    """the object stands on a table under gravity, and the palm moves up"""
+
+
 @dataclass(frozen=True)
 class Hold:
-    """Tell how a grasp is tested: the object is released, squeezed as planned, and pulled in six directions.
+    """Tell how a grasp is tested: the hand closes on a free object, squeezes as planned, and pulls or lifts it.
 
-    The values unless told otherwise, but for the time step and the servos, are those of the six-direction test of
-    DexGraspBench (https://github.com/JYChen18/DexGraspBench).
+    The values unless told otherwise, but for the time step and the servos, are those of DexGraspBench
+    (https://github.com/JYChen18/DexGraspBench).
 
     Args:
         mass: of the object [kg]. friction: of all contacts with the object [-].
         torsion: torsional friction of these contacts [m]. contact_model: of the squeeze plan; only "soft" counts on it.
         squeeze: how much of the planned forces is applied, 0 for none [-].
         pull: force on the centre of mass per mass [N/kg]. duration: of each pull [s].
-        max_distance: of the centre of mass from where it was held [m], and
+        max_distance: of the centre of mass from where the object stood before the hand closed [m], and
         max_angle: of the object [rad]: from there on it is dropped.
+        test: see `HoldTest`. height: of the lift [m].
 
     Raises:
         CommandError: a value that is not finite or out of range.
@@ -43,6 +54,8 @@ class Hold:
     duration: float = 2.0
     max_distance: float = 0.05
     max_angle: float = float(np.deg2rad(15.0))
+    test: HoldTest | str = HoldTest.PULLS
+    height: float = 0.1
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -53,11 +66,13 @@ class Hold:
             raise CommandError(
                 f"hold: contact_model: expected one of {', '.join(ContactModel)}, got {self.contact_model!r}."
             )
+        if self.test not in list(HoldTest):
+            raise CommandError(f"hold: test: expected one of {', '.join(HoldTest)}, got {self.test!r}.")
         for key in ("torsion", "squeeze"):
             value = getattr(self, key)
             if not (np.isfinite(value) and value >= 0.0):
                 raise CommandError(f"hold: {key}: expected a finite number of at least 0, got {value!r}.")
-        for key in ("pull", "duration", "max_distance", "max_angle"):
+        for key in ("pull", "duration", "max_distance", "max_angle", "height"):
             value = getattr(self, key)
             if not (np.isfinite(value) and value > 0.0):
                 raise CommandError(f"hold: {key}: expected a finite number above 0, got {value!r}.")
@@ -65,24 +80,38 @@ class Hold:
 
 @dataclass(frozen=True)
 class ObjectMotion:
-    """Hold how far the object is from where it was held: its centre of mass [m], and its rotation [rad]."""
+    """Hold how far an object moved: its centre of mass [m], and its rotation [rad]."""
 
     distance: float
     angle: float
 
+    def within(self, distance: float, angle: float) -> bool:
+        """Tell whether it moved less than a distance [m] and turned less than an angle [rad]."""
+        return self.distance < distance and self.angle < angle
+
 
 @dataclass(frozen=True)
 class Pulled:
-    """Hold what one pull did.
+    """Hold what one pull, or the lift, did.
 
     Args:
-        held: the object stayed within the limits. motion: at the end of the pull, or when it was dropped.
-        time: how long it was pulled [s].
+        held: the object stayed within the limits. motion: at the end, or when it was dropped.
+        farthest: the largest distance and the largest angle on the way.
+        time: how long it was pulled, or lifted and held up [s].
     """
 
     held: bool
     motion: ObjectMotion
+    farthest: ObjectMotion
     time: float
+
+
+@dataclass(frozen=True)
+class FingerForce:
+    """Compare how hard a finger presses with the plan: sums of normal forces [N]."""
+
+    planned: float
+    measured: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +120,13 @@ class HoldReport:
 
     Args:
         held: the object was held in every direction. reason: one sentence.
-        settings: of the test. plan: what the squeeze plan says of the mass in every direction of gravity.
+        settings: of the test. plan: what the squeeze plan says of the mass.
         planned: whether that plan is feasible; else what there is of it is applied.
         torques: told to the joints beyond the touch [Nm], by name. angles: of the joints after the squeeze [rad].
-        squeezed: motion by the squeeze, before the first pull.
-        pulls: by direction in the world, "+x" to "-z"; motions count from where the object was held.
+        first_touch: when each finger first touched the free object [s], None when it did not; from the pregrasp on.
+        closed: motion from the pregrasp to the touch. squeezed: motion from there by the squeeze.
+        forces: of every finger, squeezed, before the first pull.
+        pulls: by direction in the world, "+x" to "-z", or "lift"; motions count from before the hand closed.
     """
 
     held: bool
@@ -105,8 +136,21 @@ class HoldReport:
     planned: bool
     torques: Mapping[str, float]
     angles: Mapping[str, float]
+    first_touch: Mapping[str, float | None]
+    closed: ObjectMotion
     squeezed: ObjectMotion
+    forces: Mapping[str, FingerForce]
     pulls: Mapping[str, Pulled]
+
+    @property
+    def touch_spread(self) -> float | None:
+        """Time between the first and the last finger's first touch [s]; None unless two fingers touched."""
+        times = [time for time in self.first_touch.values() if time is not None]
+        return max(times) - min(times) if len(times) > 1 else None
+
+    def held_within(self, distance: float, angle: float) -> bool:
+        """Tell whether the object never moved as far as a distance [m] or turned as far as an angle [rad]."""
+        return self.held and all(pulled.farthest.within(distance, angle) for pulled in self.pulls.values())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, `hold` in schema `clench.execution/1`."""
@@ -118,6 +162,10 @@ class HoldReport:
             "planned": self.planned,
             "torques": dict(self.torques),
             "angles": dict(self.angles),
+            "first_touch": dict(self.first_touch),
+            "touch_spread": self.touch_spread,
+            "closed": asdict(self.closed),
             "squeezed": asdict(self.squeezed),
+            "forces": {finger: asdict(force) for finger, force in self.forces.items()},
             "pulls": {direction: asdict(pulled) for direction, pulled in self.pulls.items()},
         }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Final
 
 import numpy as np
 
@@ -14,10 +13,9 @@ from clench.models.hand.hand import Finger, Hand
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
+from .landing import CLEARANCE
 from .trajectory import Trajectory, plan_trajectory
 
-#: Clearance of the pregrasp unless another is asked for [m].
-CLEARANCE: Final = 0.005
 #: Steps in which the closing path is walked back, and halvings that find the place within a step.
 _STEPS = 100
 _HALVINGS = 30

@@ -1,4 +1,4 @@
-"""The hold test in simulation: release the object, squeeze as planned, pull it in six directions."""
+"""The hold test in simulation: close on a free object, squeeze as planned, pull it in six directions or lift it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import SqueezePlan, plan_squeeze
+from clench.solve.squeezing import DOWN, SqueezePlan, plan_squeeze
 
-from .hold import Hold, HoldReport, ObjectMotion, Pulled
+from .hold import FingerForce, Hold, HoldReport, HoldTest, ObjectMotion, Pulled
 from .scene import TIMESTEP, Scene, build_scene
+from .touching import TouchWatch
+from .trajectory import Trajectory
 
-#: How long the squeeze takes to build up, and how long it then stands [s].
-SQUEEZING, STANDING = 0.4, 0.2
+#: How long the hand stands still at the touch, how long the squeeze takes to build up, and how long it then stands [s].
+SETTLING, SQUEEZING, STANDING = 0.1, 0.4, 0.2
+#: How long the palm takes to move up [s].
+LIFTING = 0.4
 #: How often the object is looked at while it is pulled [s].
 LOOK_INTERVAL = 0.02
 #: The directions of the pulls in the world.
@@ -29,21 +33,21 @@ DIRECTIONS = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Test:
-    """Hold the scene of a test, the command to its servos [rad], shape (J,), and where the object was held."""
+class _Place:
+    """Hold where an object is: its centre of mass [m], shape (3,), and its rotation, shape (3, 3)."""
 
-    scene: Scene
-    command: FloatArray
     center: FloatArray
     rotation: FloatArray
 
-    def motion(self, data: Any) -> ObjectMotion:
-        body = self.scene.object_body
-        turned = data.xmat[body].reshape(3, 3) @ self.rotation.T
+    def motion_to(self, other: _Place) -> ObjectMotion:
+        turned = other.rotation @ self.rotation.T
         # From sine and cosine: the cosine alone cannot tell angles below 1e-8 from 0.
         sine = np.linalg.norm([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
         angle = float(np.arctan2(sine, np.trace(turned) - 1.0))
-        return ObjectMotion(float(np.linalg.norm(data.xipos[body] - self.center)), angle)
+        return ObjectMotion(float(np.linalg.norm(other.center - self.center)), angle)
+
+    def raised(self, height: float) -> _Place:
+        return _Place(self.center + np.array([0.0, 0.0, height]), self.rotation)
 
 
 def hold_and_pull(
@@ -51,19 +55,18 @@ def hold_and_pull(
     hand: Hand,
     obj: GraspObject,
     hold: Hold,
+    trajectory: Trajectory,
     *,
-    start: FloatArray,
-    reached: FloatArray,
     show_progress: bool = False,
 ) -> HoldReport:
-    """Release the object at the touch, squeeze it, and pull it in six directions, each from the same squeeze.
+    """Close from the pregrasp on a free object, squeeze it, and pull it in six directions from there, or lift it.
 
-    There is no gravity, the palm stays where it is, and obstacles are taken away. The planned forces hold the mass in
-    any direction; the servo of every joint is told the angle at which it exerts its share of them at the touch.
+    Obstacles are taken away. The planned forces hold the mass, when pulled in any direction; the servo of every joint
+    is told the angle at which it exerts its share of them at the touch.
 
     Args:
         solution: the solution. hand: the hand. obj: the object, at its pose. hold: the test.
-        start: posture [rad], shape (J,), at which the palm is placed. reached: posture at the touch [rad], shape (J,).
+        trajectory: the way to the touch, from its pregrasp on; all of it where it has none.
         show_progress: show a bar while convex pieces are computed.
 
     Raises:
@@ -71,41 +74,48 @@ def hold_and_pull(
     """
     import mujoco
 
-    graspable = tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE)
-    alone = replace(obj, bodies=graspable)
-    plan = plan_squeeze(
-        solution,
-        hand,
-        alone,
-        mass=hold.mass,
-        gravity=None,
-        contact_model=hold.contact_model,
-        friction=hold.friction,
-        torsion=hold.torsion,
+    alone = replace(obj, bodies=tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE))
+    plan = _plan(solution, hand, alone, hold)
+    scene = build_scene(
+        hand, alone, solution.hand_pose, trajectory.positions[0], free=hold, show_progress=show_progress
     )
-    scene = build_scene(hand, alone, solution.hand_pose, start, free=hold, show_progress=show_progress)
     computed = posture(solution.joint_angles, hand, "joint_angles")
     torques = hold.squeeze * joint_torques(plan, hand, computed)
-    stiffness = scene.model.actuator_gainprm[:, 0]
+    count = len(hand.joints)
+    command = computed + torques / scene.model.actuator_gainprm[:count, 0]
     data = mujoco.MjData(scene.model)
-    data.qpos[scene.qpos] = reached
-    mujoco.mj_forward(scene.model, data)
-    body = scene.object_body
-    test = _Test(scene, computed + torques / stiffness, data.xipos[body].copy(), data.xmat[body].reshape(3, 3).copy())
-    _squeeze(test, data, computed)
-    squeezed, stable = test.motion(data), _stable(data)
-    pulls = {name: _pull(test, data, direction, hold) for name, direction in DIRECTIONS.items()} if stable else {}
-    names = hand.joint_names
+    watch = TouchWatch(scene, hand)
+    before = _close(scene, data, trajectory, watch)
+    touch = _place_of(scene, data)
+    _squeeze(scene, data, (computed, command), watch)
+    squeezed, stable = _place_of(scene, data), _stable(data)
+    pulls = _tested(scene, data, hold, before) if stable else {}
     return HoldReport(
         held=stable and all(pulled.held for pulled in pulls.values()),
         reason=_sentence(pulls, hold),
         settings=hold,
         plan=plan.text,
         planned=plan.feasible,
-        torques=dict(zip(names, torques.tolist(), strict=True)),
-        angles=dict(zip(names, data.qpos[scene.qpos].tolist(), strict=True)),
-        squeezed=squeezed,
+        torques=dict(zip(hand.joint_names, torques.tolist(), strict=True)),
+        angles=dict(zip(hand.joint_names, data.qpos[scene.qpos].tolist(), strict=True)),
+        first_touch=watch.first,
+        closed=before.motion_to(touch),
+        squeezed=touch.motion_to(squeezed),
+        forces=_forces(plan, hold, watch.normal_forces(data)),
         pulls=pulls,
+    )
+
+
+def _plan(solution: GraspSolution, hand: Hand, obj: GraspObject, hold: Hold) -> SqueezePlan:
+    return plan_squeeze(
+        solution,
+        hand,
+        obj,
+        mass=hold.mass,
+        gravity=DOWN if hold.test == HoldTest.LIFT else None,
+        contact_model=hold.contact_model,
+        friction=hold.friction,
+        torsion=hold.torsion,
     )
 
 
@@ -123,39 +133,93 @@ def joint_torques(plan: SqueezePlan, hand: Hand, q: FloatArray) -> FloatArray:
     return np.asarray(J.T @ plan.found.plan.forces.reshape(-1))
 
 
-def _squeeze(test: _Test, data: Any, touch: FloatArray) -> None:
+def _forces(plan: SqueezePlan, hold: Hold, measured: dict[str, float]) -> dict[str, FingerForce]:
+    planned = dict.fromkeys(measured, 0.0)
+    if plan.found.plan is not None:
+        for contact, force in zip(plan.grasp.contacts, plan.found.plan.forces, strict=True):
+            if contact.finger in planned:
+                planned[contact.finger] += hold.squeeze * float(force[2])
+    return {finger: FingerForce(planned[finger], measured[finger]) for finger in measured}
+
+
+def _close(scene: Scene, data: Any, trajectory: Trajectory, watch: TouchWatch) -> _Place:
+    """Close from the pregrasp to the touch; return where the object was before."""
     import mujoco
 
+    begin = trajectory.pregrasp or 0
+    at = float(trajectory.times[begin])
+    count = len(trajectory.joints)
+    data.qpos[scene.qpos] = trajectory.positions[begin]
+    data.ctrl[:count] = trajectory.positions[begin]
+    mujoco.mj_forward(scene.model, data)
+    before = _place_of(scene, data)
+    for _ in range(round((trajectory.duration - at + SETTLING) / TIMESTEP)):
+        data.ctrl[:count] = trajectory.at(at + data.time)
+        mujoco.mj_step(scene.model, data)
+        watch.look(data)
+    mujoco.mj_forward(scene.model, data)
+    return before
+
+
+def _squeeze(scene: Scene, data: Any, ends: tuple[FloatArray, FloatArray], watch: TouchWatch) -> None:
+    import mujoco
+
+    touch, command = ends
     for step in range(round((SQUEEZING + STANDING) / TIMESTEP)):
         done = min(1.0, (step + 1) * TIMESTEP / SQUEEZING)
-        data.ctrl[:] = touch + done * (test.command - touch)
-        mujoco.mj_step(test.scene.model, data)
-    mujoco.mj_forward(test.scene.model, data)
+        data.ctrl[: len(touch)] = touch + done * (command - touch)
+        mujoco.mj_step(scene.model, data)
+        watch.look(data)
+    mujoco.mj_forward(scene.model, data)
 
 
-def _pull(test: _Test, squeezed: Any, direction: FloatArray, hold: Hold) -> Pulled:
+def _tested(scene: Scene, squeezed: Any, hold: Hold, before: _Place) -> dict[str, Pulled]:
     import mujoco
 
-    model = test.scene.model
-    data = mujoco.MjData(model)
-    mujoco.mj_copyData(data, model, squeezed)
-    data.xfrc_applied[test.scene.object_body, :3] = hold.pull * hold.mass * direction
-    steps, every = max(1, round(hold.duration / TIMESTEP)), round(LOOK_INTERVAL / TIMESTEP)
-    taken, motion = 0, test.motion(data)
+    tests = {"lift": np.zeros(3)} if hold.test == HoldTest.LIFT else DIRECTIONS
+    found = {}
+    for name, direction in tests.items():
+        data = mujoco.MjData(scene.model)
+        mujoco.mj_copyData(data, scene.model, squeezed)
+        data.xfrc_applied[scene.object_body, :3] = hold.pull * hold.mass * direction
+        found[name] = _pull(scene, data, hold, before)
+    return found
+
+
+def _pull(scene: Scene, data: Any, hold: Hold, before: _Place) -> Pulled:
+    """Simulate a pull, or the lift; the object is compared with where it was before, raised with the palm."""
+    import mujoco
+
+    lifted = hold.test == HoldTest.LIFT
+    duration = hold.duration + (LIFTING if lifted else 0.0)
+    steps, every = max(1, round(duration / TIMESTEP)), round(LOOK_INTERVAL / TIMESTEP)
+    taken, height = 0, 0.0
+    motion = farthest = before.motion_to(_place_of(scene, data))
     while taken < steps and _within(motion, hold):
         for _ in range(min(every, steps - taken)):
-            mujoco.mj_step(model, data)
             taken += 1
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
+            if lifted:
+                part = min(1.0, taken * TIMESTEP / LIFTING)
+                data.ctrl[-1] = hold.height * part * part * (3.0 - 2.0 * part)
+            mujoco.mj_step(scene.model, data)
+        mujoco.mj_kinematics(scene.model, data)
+        mujoco.mj_comPos(scene.model, data)
         if not _stable(data):
-            return Pulled(False, motion, taken * TIMESTEP)
-        motion = test.motion(data)
-    return Pulled(_within(motion, hold), motion, taken * TIMESTEP)
+            return Pulled(False, motion, farthest, taken * TIMESTEP)
+        if lifted:
+            height = float(data.qpos[scene.lift])
+        motion = before.raised(height).motion_to(_place_of(scene, data))
+        farthest = ObjectMotion(max(farthest.distance, motion.distance), max(farthest.angle, motion.angle))
+    return Pulled(_within(motion, hold), motion, farthest, taken * TIMESTEP)
+
+
+def _place_of(scene: Scene, data: Any) -> _Place:
+    body = scene.object_body
+    return _Place(data.xipos[body].copy(), data.xmat[body].reshape(3, 3).copy())
 
 
 def _within(motion: ObjectMotion, hold: Hold) -> bool:
-    return motion.distance < hold.max_distance and motion.angle < hold.max_angle
+    return motion.within(hold.max_distance, hold.max_angle)
 
 
 def _stable(data: Any) -> bool:
@@ -169,10 +233,14 @@ def _stable(data: Any) -> bool:
 def _sentence(pulls: dict[str, Pulled], hold: Hold) -> str:
     if not pulls:
         return "Not tested: the simulation did not stay finite while the object was squeezed."
-    force = f"{hold.pull * hold.mass:.3g} N"
+    far = max(p.farthest.distance for p in pulls.values())
+    turned = np.rad2deg(max(p.farthest.angle for p in pulls.values()))
+    moved = f"it moved by up to {far * 1e3:.2g} mm and {turned:.2g}°, closing and squeeze included."
     lost = [name for name, pulled in pulls.items() if not pulled.held]
+    if hold.test == HoldTest.LIFT:
+        how = f"when lifted by {hold.height:g} m"
+        return f"Dropped {how}." if lost else f"Held {how}; {moved}"
+    force = f"{hold.pull * hold.mass:.3g} N"
     if lost:
         return f"Dropped when pulled with {force} along {', '.join(lost)}."
-    far = max(p.motion.distance for p in pulls.values())
-    turned = np.rad2deg(max(p.motion.angle for p in pulls.values()))
-    return f"Held against {force} in six directions; it moved by up to {far * 1e3:.2g} mm and {turned:.2g}°."
+    return f"Held against {force} in six directions; {moved}"

@@ -10,20 +10,24 @@ import numpy as np
 
 from clench.base.errors import HandError
 from clench.base.pose import FloatArray, Pose, invert
+from clench.grasp.mechanics.loads import GRAVITY
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 from .convex_pieces import convex_pieces, hull_of
-from .hold import Hold
+from .hold import Hold, HoldTest
 
 PREFIX = "hand/"
 BASE = "hand base"
+LIFT = "lift"
 TIMESTEP = 0.002
 #: Bandwidth of the servos [rad/s]: fast beside the motion, slow beside the time step.
 SERVO_BANDWIDTH = 100.0
 #: Least inertia that a servo moves [kg m²], for links whose model gives next to none.
 ARMATURE = 1e-3
+#: Nearer than that is touching [m]: the engine lists such pairs as contacts, forces begin at 0.
+TOUCHING = 1e-5
 #: Elements of a hand's model that would compete with the servos, and settings that the scene makes.
 _REPLACED = ("actuator", "sensor", "tendon", "equality", "keyframe", "option", "size", "statistic", "visual")
 _ALL_BITS = 0x7FFFFFFF
@@ -40,6 +44,7 @@ class Scene:
         link_geoms: colliding geoms of every link.
         object_body: body of the object and its obstacles. object_geoms: its geoms.
         approximated: names of the bodies whose simulated shape is only near the object's.
+        lift: address of the palm's way up, -1 without one.
     """
 
     model: Any
@@ -49,6 +54,7 @@ class Scene:
     object_body: int
     object_geoms: tuple[int, ...]
     approximated: tuple[str, ...]
+    lift: int = -1
 
 
 def build_scene(
@@ -60,7 +66,7 @@ def build_scene(
     free: Hold | None = None,
     show_progress: bool = False,
 ) -> Scene:
-    """Place a hand and an object in a scene without gravity.
+    """Place a hand and an object in a scene without gravity, or for a lift on a table, with gravity on the object.
 
     The model's own actuators, tendons, equalities and sensors are left out: every joint has a position servo of
     `SERVO_BANDWIDTH`, within its effort limit, and coupling holds because trajectories obey it. Joint friction, springs
@@ -80,11 +86,12 @@ def build_scene(
     import mujoco
 
     spec = mujoco.MjSpec()
-    spec.option.gravity = np.zeros(3)
+    lifted = free is not None and free.test == HoldTest.LIFT
+    spec.option.gravity = np.array([0.0, 0.0, -GRAVITY if lifted else 0.0])
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    _add_hand(spec, hand)
+    _add_hand(spec, hand, lifted)
     if free is not None:
         # Without these, friction of the engine creeps: a held object slides out slowly.
         spec.option.impratio = 10.0
@@ -99,12 +106,12 @@ def build_scene(
         share = free.mass / model.body_mass[scene.object_body]
         model.body_mass[scene.object_body] *= share
         model.body_inertia[scene.object_body] *= share
-    _tune(scene, hand)
+    _tune(scene)
     _place(scene, hand, hand_pose, q)
     return scene
 
 
-def _add_hand(spec: Any, hand: Hand) -> None:
+def _add_hand(spec: Any, hand: Hand, lifted: bool) -> None:
     import mujoco
 
     if not hand.spec_xml:
@@ -113,7 +120,12 @@ def _add_hand(spec: Any, hand: Hand) -> None:
     for joint in list(child.joints):
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             child.delete(joint)
-    base = spec.worldbody.add_body(name=BASE)
+    root = spec.worldbody
+    if lifted:
+        # Its mass is next to nothing beside the hand's; a body that moves must have one.
+        root = spec.worldbody.add_body(name=LIFT, mass=1e-3, inertia=[1e-6] * 3, explicitinertial=True)
+        root.add_joint(name=LIFT, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
+    base = root.add_body(name=BASE)
     spec.attach(child, frame=base.add_frame(), prefix=PREFIX)
     bodies = {body.name for body in spec.bodies}
     for a, b in hand.allowed_pairs:
@@ -131,6 +143,11 @@ def _add_hand(spec: Any, hand: Hand) -> None:
         if joint.effort:
             actuator.forcelimited = True
             actuator.forcerange = [-joint.effort, joint.effort]
+    if lifted:
+        for body in spec.bodies:
+            body.gravcomp = 1.0
+        lift = spec.add_actuator(name=LIFT, target=LIFT, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        lift.set_to_position(kp=1.0, kv=0.0)
 
 
 def _without_replaced(xml: str) -> str:
@@ -147,6 +164,8 @@ def _add_object(spec: Any, obj: GraspObject, free: Hold | None, show_progress: b
     surface = _surface(free)
     if free is not None:
         base.add_freejoint()
+        if free.test == HoldTest.LIFT:
+            _add_table(spec, lowest(obj), surface)
     approximated = []
     for number, body in enumerate(obj.bodies):
         pieces = _pieces(body, obj.collision_source, show_progress)
@@ -159,6 +178,19 @@ def _add_object(spec: Any, obj: GraspObject, free: Hold | None, show_progress: b
         if count > sum(1 for hulls in pieces.values() if hulls):
             approximated.append(body.name)
     return tuple(approximated)
+
+
+def _add_table(spec: Any, height: float, surface: dict[str, Any]) -> None:
+    import mujoco
+
+    place = {"pos": [0.0, 0.0, height], "size": [2.0, 2.0, 0.1]}
+    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, **place, **surface)
+
+
+def lowest(obj: GraspObject) -> float:
+    """Return the height of the lowest point of an object in the world [m]."""
+    meshes = [shape.to_mesh(1e-5) for body in obj.bodies for shape in body.shapes]
+    return min(float(obj.pose.apply(mesh.vertices)[:, 2].min()) for mesh in meshes)
 
 
 def _pieces(body: Body, source: CollisionSource, show_progress: bool) -> dict[int, tuple[FloatArray, ...]]:
@@ -201,7 +233,13 @@ def _add_primitive(base: Any, shape: Shape, name: str, surface: dict[str, Any]) 
 
 def _surface(free: Hold | None) -> dict[str, Any]:
     """Return how the object's geoms touch: anything that touches at all, as stiffly as the time step allows."""
-    found = {"contype": _ALL_BITS, "conaffinity": _ALL_BITS, "priority": 1, "solref": [2 * TIMESTEP, 1.0]}
+    found: dict[str, Any] = {
+        "contype": _ALL_BITS,
+        "conaffinity": _ALL_BITS,
+        "priority": 1,
+        "solref": [2 * TIMESTEP, 1.0],
+    }
+    found["gap"] = TOUCHING
     if free is not None:
         found |= {"condim": 4, "friction": [free.friction, free.torsion, 0.0]}
     return found
@@ -218,6 +256,7 @@ def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
     colliding = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     owner = model.geom_bodyid
     object_body = index(mujoco.mjtObj.mjOBJ_BODY, "object")
+    lift = index(mujoco.mjtObj.mjOBJ_JOINT, LIFT)
     return Scene(
         model=model,
         qpos=model.jnt_qposadr[joints],
@@ -226,10 +265,11 @@ def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
         object_body=object_body,
         object_geoms=tuple(np.flatnonzero(owner == object_body).tolist()),
         approximated=approximated,
+        lift=int(model.jnt_qposadr[lift]) if lift >= 0 else -1,
     )
 
 
-def _tune(scene: Scene, hand: Hand) -> None:
+def _tune(scene: Scene) -> None:
     """Give every servo the same bandwidth, critically damped, and take passive forces away."""
     import mujoco
 
@@ -241,7 +281,7 @@ def _tune(scene: Scene, hand: Hand) -> None:
     model.jnt_stiffness[:] = 0.0
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
-    for i in range(len(hand.joints)):
+    for i in range(model.nu):
         inertia = float(model.dof_M0[model.jnt_dofadr[model.actuator_trnid[i, 0]]])
         stiffness = SERVO_BANDWIDTH**2 * inertia
         model.actuator_gainprm[i, 0] = stiffness

@@ -18,16 +18,17 @@ from .hold import Hold, HoldReport
 from .pulling import hold_and_pull
 from .report import ContactReached, ExecutionReport, JointReached
 from .scene import TIMESTEP, Scene, body_pose, build_scene
+from .touching import TouchWatch
 from .trajectory import Trajectory
 
 #: How long the hand stands still after the motion [s], so that the servos settle.
 SETTLING = 0.4
-#: How often touches are looked for [s].
+#: How often the posture is noted [s].
 WATCH_INTERVAL = 0.02
 
 
 class SimulatedHand:
-    """Move a hand in simulation, with the palm fixed and the object held in place until the touch.
+    """Move a hand in simulation, with the palm fixed and the object held in place.
 
     The simulated object is made of convex pieces and its contacts are a little soft, so angles and contacts are reached
     up to tolerances, which the report names.
@@ -38,9 +39,9 @@ class SimulatedHand:
         angle_tolerance: largest difference to the computed angles that counts as reached [rad].
         contact_tolerance: largest distance that counts as touching [m].
         show_progress: show a bar while convex pieces are computed.
-        hold: once the touch is reached, release the object, squeeze it as planned, and pull it in six directions;
+        hold: once the touch is reached, do it again with a free object, squeeze it as planned, and pull or lift it;
             without it the object stays where it is.
-        on_step: called with time [s], joint angles [rad] in model order, shape (J,), whenever touches are looked for.
+        on_step: called with time [s], joint angles [rad] in model order, shape (J,), every 20 ms and at the end.
     """
 
     name = "simulated"
@@ -80,7 +81,8 @@ class SimulatedHand:
         obj = self.obj.posed(solution.object_pose)
         start = trajectory.positions[0]
         scene = build_scene(self.hand, obj, solution.hand_pose, start, show_progress=self.show_progress)
-        data, first_touch, history = self._run(scene, trajectory)
+        watch = TouchWatch(scene, self.hand)
+        data, history = self._run(scene, trajectory, watch)
         reached = np.array(data.qpos[scene.qpos])
         joints = {
             name: JointReached(float(c), float(r))
@@ -97,7 +99,7 @@ class SimulatedHand:
         )
         error = float(np.abs(reached - computed).max(initial=0.0))
         success, reason = self._judge(solution, joints, contacts, error)
-        held = self._held(solution, obj, start, reached) if success else None
+        held = self._held(solution, obj, trajectory) if success else None
         if held is not None:
             success, reason = held.held, f"{reason} {held.reason}"
         return ExecutionReport(
@@ -107,7 +109,7 @@ class SimulatedHand:
             joints=joints,
             contacts=contacts,
             touched_links=touched,
-            first_touch=first_touch,
+            first_touch=watch.first,
             duration=float(data.time),
             largest_angle_error=error,
             angle_tolerance=self.angle_tolerance,
@@ -117,57 +119,47 @@ class SimulatedHand:
             hold=held,
         )
 
-    def _held(
-        self, solution: GraspSolution, obj: GraspObject, start: FloatArray, reached: FloatArray
-    ) -> HoldReport | None:
+    def _held(self, solution: GraspSolution, obj: GraspObject, trajectory: Trajectory) -> HoldReport | None:
         if self.hold is None:
             return None
-        return hold_and_pull(
-            solution, self.hand, obj, self.hold, start=start, reached=reached, show_progress=self.show_progress
-        )
+        return hold_and_pull(solution, self.hand, obj, self.hold, trajectory, show_progress=self.show_progress)
 
     def _notes_on_hold(self, held: HoldReport | None) -> tuple[str, ...]:
         if self.hold is None:
             return ()
         if held is None:
             return ("Holding was not tested: the touch was not reached.",)
-        notes = ["The object was held in place until the touch, so closing did not move it; there is no gravity."]
+        notes = ["Angles and contacts are of a run with the object held in place; for the hold test it was free."]
         if not held.planned:
             notes.append(f"The squeeze is not one that holds: {held.plan}")
         return tuple(notes)
 
-    def _run(self, scene: Scene, trajectory: Trajectory) -> tuple[Any, dict[str, float | None], ExecutionHistory]:
-        """Simulate the motion; return the final state, when each finger first touched, and the samples on the way."""
+    def _run(self, scene: Scene, trajectory: Trajectory, watch: TouchWatch) -> tuple[Any, ExecutionHistory]:
+        """Simulate the motion; return the final state and the samples on the way."""
         import mujoco
 
         data = mujoco.MjData(scene.model)
         data.qpos[scene.qpos] = trajectory.positions[0]
         data.ctrl[:] = trajectory.positions[0]
         mujoco.mj_forward(scene.model, data)
-        first: dict[str, float | None] = {finger.name: None for finger in self.hand.fingers}
         times: list[float] = []
         measured: list[FloatArray] = []
         every = round(WATCH_INTERVAL / TIMESTEP)
         for step in range(int(np.ceil((trajectory.duration + SETTLING) / TIMESTEP)) + 1):
             if step % every == 0:
-                self._watch(scene, data, first)
+                if self.on_step is not None:
+                    self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
                 times.append(float(data.time))
                 measured.append(np.array(data.qpos[scene.qpos]))
             data.ctrl[:] = trajectory.at(data.time)
             mujoco.mj_step(scene.model, data)
+            watch.look(data)
         mujoco.mj_forward(scene.model, data)
-        self._watch(scene, data, first)
-        commanded = np.array([trajectory.at(time) for time in times])
-        return data, first, ExecutionHistory(trajectory.joints, np.array(times), commanded, np.array(measured))
-
-    def _watch(self, scene: Scene, data: Any, first: dict[str, float | None]) -> None:
+        watch.look(data)
         if self.on_step is not None:
             self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
-        for finger in self.hand.fingers:
-            if first[finger.name] is None and any(
-                nearest(scene, data, link, self.contact_tolerance)[0] <= self.contact_tolerance for link in finger.links
-            ):
-                first[finger.name] = float(data.time)
+        commanded = np.array([trajectory.at(time) for time in times])
+        return data, ExecutionHistory(trajectory.joints, np.array(times), commanded, np.array(measured))
 
     def _contact(
         self, scene: Scene, data: Any, contact: Contact, hand_pose: Pose, T_palm_link: FloatArray

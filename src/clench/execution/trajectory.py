@@ -15,8 +15,13 @@ from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import DEFAULT_SPEED, Hand, JointRole
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
+
+from .landing import CLEARANCE, LANDING_SPEED, is_clear, plan_landing
+from .timing import ACCELERATION, TimedPath, time_path
 
 SCHEMA = "clench.trajectory/1"
 #: No smaller fraction of the velocity limits makes sense, or can be computed with [-].
@@ -30,6 +35,11 @@ ROUNDING = 1e-12
 #: Joints that move less than this stand still [rad].
 STILL = 1e-9
 
+#: Where the way from a pregrasp is not clear, one nearer to the touch is tried: shares of the clearance [-].
+_CLEARANCES = (1.0, 0.4, 0.1)
+#: Times [s], shape (N,), and postures [rad], shape (N, J).
+_Part = tuple[FloatArray, FloatArray]
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -41,6 +51,7 @@ class Trajectory:
         times: of the way-points [s], shape (N,), rising from 0.
         positions: joint angles [rad], shape (N, J); the first is the open hand, the last the touch.
         velocity_limits: of the joints [rad/s], shape (J,).
+        pregrasp: number of the way-point from which all contacts are reached at once; None when there is none.
     """
 
     hand: str
@@ -49,6 +60,7 @@ class Trajectory:
     times: FloatArray
     positions: FloatArray
     velocity_limits: FloatArray
+    pregrasp: int | None = None
 
     @property
     def duration(self) -> float:
@@ -63,13 +75,17 @@ class Trajectory:
         """Return the JSON form, schema `clench.trajectory/1`."""
         last = len(self.times) - 1
         phases = ["open", *["closing"] * (last - 1), "touch"] if last else ["touch"]
+        pregrasp = None
+        if self.pregrasp is not None:
+            pregrasp = dict(zip(self.joints, self.positions[self.pregrasp].tolist(), strict=True))
+            phases[self.pregrasp : last] = ["pregrasp", *["landing"] * (last - 1 - self.pregrasp)]
         return {
             "schema": SCHEMA,
             "hand": self.hand,
             "object": self.object,
             "joints": list(self.joints),
             "velocity_limits": self.velocity_limits.tolist(),
-            "pregrasp": None,
+            "pregrasp": pregrasp,
             "points": [
                 {"time": float(t), "phase": phase, "positions": q.tolist()}
                 for t, phase, q in zip(self.times, phases, self.positions, strict=True)
@@ -94,22 +110,35 @@ class Trajectory:
         return _read(read_json(path), str(path))
 
 
-def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) -> Trajectory:
-    """Time the path on which a solution was computed, so that all fingers touch at the same moment, slowly.
+def plan_trajectory(
+    solution: GraspSolution,
+    hand: Hand,
+    *,
+    obj: GraspObject | None = None,
+    speed: float = 1.0,
+    acceleration: float = ACCELERATION,
+    clearance: float = CLEARANCE,
+) -> Trajectory:
+    """Time a path to the touch, so that all fingers touch at the same moment, slowly.
 
-    Every finger goes through its closing path joint by joint, as computed: a straight line in joint space could meet
-    the object before the contacts do. The slowest finger sets the duration, the others are slowed down to it. Posture
-    joints that differ between the open hand and the solution move first. Where all joints closed at once, they do so
-    here, each until it was held: fingers that move at the same time may be in each other's way otherwise.
+    With the object, the hand goes to a pregrasp off it, and from there straight to all contacts at once, at 10 mm/s.
+    The way to the pregrasp is a straight line in joint space where the exact depth shows that to be clear, else every
+    finger goes joint by joint. Without the object, or where none of this is clear, every finger goes through its
+    closing path as it was computed; then a finger's later joints close after its first ones touched. The slowest finger
+    sets the duration, the others are slowed down to it. Posture joints that differ between the open hand and the
+    solution move first. Where all joints closed at once, they do so here, each until it was held.
 
     Args:
         solution: the solution.
         hand: the hand it was computed for.
+        obj: the object it was computed for.
         speed: fraction of the velocity limits to use, above 0 and up to 1.
+        acceleration: largest of every joint [rad/s²].
+        clearance: of the pregrasp [m]; less where the way from there is not clear.
 
     Raises:
-        CommandError: the solution is of another hand, lacks a joint, has more than one round, or `speed` is out of
-            range.
+        CommandError: the solution is of another hand, lacks a joint, has more than one round; or `speed`,
+            `acceleration` or `clearance` is out of range.
     """
     if solution.rounds != 1:
         raise CommandError(
@@ -118,34 +147,81 @@ def plan_trajectory(solution: GraspSolution, hand: Hand, *, speed: float = 1.0) 
         )
     if not SLOWEST <= speed <= 1.0:
         raise CommandError(f"speed: expected a fraction above 0 and up to 1, at least {SLOWEST:g}, got {speed}.")
-    start, end = (
-        posture(solution.open_angles, hand, "open_angles"),
-        posture(solution.joint_angles, hand, "joint_angles"),
-    )
+    for key, value in (("acceleration", acceleration), ("clearance", clearance)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise CommandError(f"{key}: expected a finite number above 0, got {value!r}.")
     limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
+    pace = limits * speed, np.full(len(limits), float(acceleration))
+    end = posture(solution.joint_angles, hand, "joint_angles")
+    if obj is not None:
+        for share in _CLEARANCES:
+            found = _landed(solution, hand, obj, pace, share * clearance)
+            if found is not None:
+                return _made(solution, hand, found, limits, pregrasp=len(found[0][0]) - 1)
+    return _made(solution, hand, [_way(solution, hand, end, pace, straight=False)], limits)
+
+
+def _landed(
+    solution: GraspSolution, hand: Hand, obj: GraspObject, pace: tuple[FloatArray, FloatArray], clearance: float
+) -> list[_Part] | None:
+    """Return the way to a pregrasp and the straight line from there to all contacts at once; None when not clear."""
+    end = posture(solution.joint_angles, hand, "joint_angles")
+    landing = plan_landing(solution, hand, clearance)
+    if landing is None:
+        return None
+    source = CollisionSource(solution.collision_source)
+    if not is_clear(solution, hand, obj, [landing, end], source):
+        return None
+    slow = np.minimum(pace[0], np.abs(end - landing) * (LANDING_SPEED / clearance))
+    last = _joined([time_path([np.array([landing, end])], slow, pace[1])], end, [range(len(end))])
+    for straight in (True, False):
+        way = _way(solution, hand, landing, pace, straight=straight)
+        if is_clear(solution, hand, obj, list(way[1]), source):
+            return [way, last]
+    return None
+
+
+def _made(
+    solution: GraspSolution, hand: Hand, parts: list[_Part], limits: FloatArray, pregrasp: int | None = None
+) -> Trajectory:
+    times, positions = parts[0]
+    for later, path in parts[1:]:
+        times = np.concatenate([times[:-1], times[-1] + later])
+        positions = np.vstack([positions[:-1], path])
+    if pregrasp is not None and pregrasp == len(times) - 1:
+        pregrasp = None  # nothing touches, so there is nothing to stand off
+    return Trajectory(solution.hand, solution.object, hand.joint_names, times, positions, limits, pregrasp)
+
+
+def _way(
+    solution: GraspSolution, hand: Hand, end: FloatArray, pace: tuple[FloatArray, FloatArray], *, straight: bool
+) -> _Part:
+    """Return times and postures from the open hand to a posture: in one line, or as the fingers closed."""
+    start = posture(solution.open_angles, hand, "open_angles")
     turned, opening = _preparation(hand, start, end)
-    if _closed_at_once(solution):
+    if straight:
+        stages = [[np.array([turned, end])]] * len(hand.fingers)
+    elif _closed_at_once(solution):
         stages = [_path_at_once(solution, hand, turned, end)] * len(hand.fingers)
     else:
         stages = [list(_stages(hand, f.joints, turned, end)) for f in hand.fingers]
-    timed = [_timed(found, limits * speed) for found in stages]
-    duration = max((times[-1] for times, _ in timed), default=0.0)
-    grid = _distinct(np.concatenate([np.zeros(1), *(_stretched(times, duration) for times, _ in timed)]))
-    positions = np.tile(turned, (len(grid), 1))
-    for finger, (times, path) in zip(hand.fingers, timed, strict=True):
-        for j in finger.joints:
-            if np.ptp(path[:, j]) > 0.0:
-                positions[:, j] = np.interp(grid, _stretched(times, duration), path[:, j])
+    before = time_path(opening, *pace)
+    times, path = _joined([before], turned, [range(len(end))])
+    grid, positions = _joined([time_path(found, *pace) for found in stages], end, [f.joints for f in hand.fingers])
+    return np.concatenate([times[:-1], times[-1] + grid]), np.vstack([path[:-1], positions])
+
+
+def _joined(paths: list[TimedPath], end: FloatArray, joints: Sequence[Sequence[int]]) -> _Part:
+    """Return times and postures of paths that are gone through at the same time, each by some of the joints."""
+    duration = max((path.duration for path in paths), default=0.0)
+    grid = _distinct(np.concatenate([np.zeros(1), *(path.samples(duration) for path in paths)]))
+    positions = np.tile(paths[0].corners[0] if paths else end, (len(grid), 1))
+    for own, path in zip(joints, paths, strict=True):
+        moved = [j for j in own if np.ptp(path.corners[:, j]) > 0.0]
+        if moved:
+            positions[:, moved] = np.array([path.stretched_at(t, duration) for t in grid])[:, moved]
     positions[-1] = end
-    before, lead_in = _timed(opening, limits * speed)
-    return Trajectory(
-        hand=solution.hand,
-        object=solution.object,
-        joints=hand.joint_names,
-        times=np.concatenate([before[:-1], before[-1] + grid]),
-        positions=np.vstack([lead_in[:-1], positions]),
-        velocity_limits=limits,
-    )
+    return grid, positions
 
 
 def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
@@ -242,27 +318,11 @@ def _eased(start: FloatArray, end: FloatArray) -> FloatArray:
     return path
 
 
-def _timed(stages: list[FloatArray], limits: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Join stages to one path, as fast as the limits allow; return times (n,) [s] and way-points (n, J)."""
-    times, path = [0.0], [stages[0][0]]
-    for stage in stages:
-        step = float((np.abs(np.diff(stage, axis=0)) / limits).max(initial=0.0))
-        if step == 0.0:
-            continue
-        times += [times[-1] + step * (k + 1) for k in range(len(stage) - 1)]
-        path += list(stage[1:])
-    return np.array(times), np.array(path)
-
-
 def _distinct(values: FloatArray) -> FloatArray:
     """Return values in order, from 0 on; of those that differ by rounding alone, the first."""
     ordered = np.unique(values)
     distinct: FloatArray = ordered[np.diff(ordered, prepend=-np.inf) > ROUNDING * ordered[-1]]
     return distinct
-
-
-def _stretched(times: FloatArray, duration: float) -> FloatArray:
-    return times * (duration / times[-1]) if times[-1] > 0.0 else times
 
 
 class _PointForm(msgspec.Struct):
@@ -306,4 +366,5 @@ def _read(data: Any, source: str) -> Trajectory:
         times=np.array([p.time for p in form.points]),
         positions=np.array([p.positions for p in form.points]).reshape(len(form.points), count),
         velocity_limits=np.array(form.velocity_limits),
+        pregrasp=next((i for i, point in enumerate(form.points) if point.phase == "pregrasp"), None),
     )

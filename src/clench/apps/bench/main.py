@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
 
 from clench.apps.cli.parsing import parse_call
 from clench.apps.cli.results import print_json
-from clench.base.errors import CommandError, UnknownNameError
+from clench.base.errors import CommandError, FileError, UnknownNameError
 
 from .report import BenchReport
 
@@ -119,7 +120,51 @@ def steadiness(
     return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 
-BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose, "steadiness": steadiness}
+def hold(
+    *,
+    hand: tuple[str, ...] = ("robonaut2",),
+    object: tuple[str, ...] = ("ball", "bottle"),
+    scale: float = 1.0,
+    poses: int = 100,
+    best: int = 5,
+    others: int = 5,
+    test: Literal["pulls", "lift"] = "pulls",
+    mass: float = 0.1,
+    friction: float = 0.6,
+    seed: int = 0,
+    table: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Select the best of many grasps by our own criteria, and see in simulation whether they hold.
+
+    Args:
+        hand: built-in names, or paths to .urdf or .xml files.
+        object: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
+        scale: multiplies the objects' lengths, e.g. 0.001 for meshes in millimetres.
+        poses: approach poses per hand and object.
+        best: how many of the grasps are tried, the best by score.
+        others: grasps over all scores that are tried besides, to see what the score is worth.
+        test: pull in six directions without gravity, or lift from a table.
+        mass: of the object, kg.
+        friction: of its contacts.
+        seed: of the approach poses.
+        table: file for a table (Markdown).
+        json: print one JSON document on standard output.
+    """
+    from clench.execution.hold import Hold
+
+    from .holding import HoldBench, bench_hold
+
+    for key, count, least in (("poses", poses, 1), ("best", best, 1), ("others", others, 0), ("seed", seed, 0)):
+        if count < least:
+            raise CommandError(f"--{key}: expected at least {least}, got {count}.")
+    if table is not None and not table.parent.is_dir():
+        raise FileError(table, f"cannot be written (no folder '{table.parent}').")
+    asked = HoldBench(poses, best, others, seed, Hold(mass=mass, friction=friction, test=test))
+    return _print(bench_hold(hand, object, scale, asked, table, show_progress=not json), json)
+
+
+BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose, "steadiness": steadiness, "hold": hold}
 
 
 def _at_least(least: int, **counts: int) -> None:

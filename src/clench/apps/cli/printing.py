@@ -149,7 +149,7 @@ def print_report(report: ExecutionReport) -> None:
         for c in report.contacts:
             table.add_row(_plain(c.finger), _plain(c.link), _millimetres(c.gap), _millimetres(c.displacement))
         console.print(table)
-    times = ", ".join(f"{n} {t:.2f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
+    times = ", ".join(f"{n} {t:.3f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
     if times:
         console.print(f"first touch: {_plain(times)}")
     if report.hold is not None:
@@ -158,19 +158,23 @@ def print_report(report: ExecutionReport) -> None:
 
 
 def _print_hold(console: Console, hold: HoldReport) -> None:
-    asked, squeezed = hold.settings, hold.squeezed
+    asked = hold.settings
+    lifted = asked.test == "lift"
+    load = f"lifted {asked.height:g} m" if lifted else f"{asked.pull * asked.mass:g} N for {asked.duration:g} s"
     console.print(
-        f"hold: {asked.mass:g} kg, friction {asked.friction:g}, torsion {asked.torsion:g} m, "
-        f"{asked.pull * asked.mass:g} N for {asked.duration:g} s; "
+        f"hold: {asked.mass:g} kg, friction {asked.friction:g}, torsion {asked.torsion:g} m, {load}; "
         f"dropped from {_millimetres(asked.max_distance)} mm or {np.rad2deg(asked.max_angle):.3g}° on"
     )
     console.print(f"plan: {_plain(hold.plan)}")
-    table = _table("object, from where it was held", "after", "held", "moved [mm]", "turned [deg]")
-    table.add_row("squeeze", "", _millimetres(squeezed.distance), f"{np.rad2deg(squeezed.angle):.2f}")
+    table = _table("free object", "after", "held", "moved [mm]", "turned [deg]")
+    for step, motion in (("closing", hold.closed), ("squeeze alone", hold.squeezed)):
+        table.add_row(step, "", _millimetres(motion.distance), f"{np.rad2deg(motion.angle):.2f}")
     for direction, pulled in hold.pulls.items():
         moved = _millimetres(pulled.motion.distance), f"{np.rad2deg(pulled.motion.angle):.2f}"
-        table.add_row(f"pull {direction}", "yes" if pulled.held else "no", *moved)
+        table.add_row(direction if lifted else f"pull {direction}", "yes" if pulled.held else "no", *moved)
     console.print(table)
+    if hold.touch_spread is not None:
+        console.print(f"fingers touched the free object within {hold.touch_spread * 1e3:.0f} ms")
 
 
 def print_choice(solution: GraspSolution) -> None:

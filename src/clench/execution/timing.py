@@ -1,0 +1,104 @@
+"""Time straight pieces of a joint path under velocity and acceleration limits (Ruckig)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+
+#: Largest acceleration of a joint unless another is asked for [rad/s²]: models do not say.
+ACCELERATION: Final = 10.0
+#: Two directions whose unit vectors differ by less are one straight line [-].
+_STRAIGHT: Final = 1e-9
+#: Way-points of a timed path are this far apart, and at every corner [s].
+SAMPLE: Final = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class TimedPath:
+    """Hold a path of straight lines in joint space, each gone through from rest to rest, as fast as limits allow.
+
+    Args:
+        corners: ends of the lines [rad], shape (N, J). times: when they are reached [s], shape (N,), from 0.
+        profiles: how far along every line the joints are [-], N - 1 profiles of Ruckig.
+    """
+
+    corners: FloatArray
+    times: FloatArray
+    profiles: tuple[Any, ...]
+
+    @property
+    def duration(self) -> float:
+        """Time from the first corner to the last [s]."""
+        return float(self.times[-1])
+
+    def at(self, time: float) -> FloatArray:
+        """Return the angles at a time [s], shape (J,); before the start the first, after the end the last."""
+        k = int(np.searchsorted(self.times, time, side="right")) - 1
+        if k < 0 or k >= len(self.profiles):
+            return np.array(self.corners[0 if k < 0 else -1])
+        part = float(self.profiles[k].at_time(time - self.times[k])[0][0])
+        line: FloatArray = self.corners[k] + part * (self.corners[k + 1] - self.corners[k])
+        return line
+
+    def samples(self, duration: float) -> FloatArray:
+        """Return times [s] at which the path, stretched to a duration [s], is looked at; corners among them."""
+        if not self.duration > 0.0:
+            return np.zeros(1)
+        count = max(1, int(np.ceil(duration / SAMPLE)))
+        return np.concatenate([self.times * (duration / self.duration), np.linspace(0.0, duration, count + 1)])
+
+    def stretched_at(self, time: float, duration: float) -> FloatArray:
+        """Return the angles at a time [s] of the path slowed down evenly to a duration [s], shape (J,)."""
+        return self.at(time * (self.duration / duration) if duration > 0.0 else 0.0)
+
+
+def time_path(stages: Sequence[FloatArray], velocity: FloatArray, acceleration: FloatArray) -> TimedPath:
+    """Time the lines that stages consist of.
+
+    A joint that changes its speed at a corner stands still there: on an exact path any other speed would need an
+    infinite acceleration.
+
+    Args:
+        stages: way-points that follow each other [rad], each of shape (n, J).
+        velocity: largest of every joint [rad/s], shape (J,). acceleration: the same [rad/s²].
+    """
+    corners = _corners(np.vstack(list(stages)))
+    profiles = tuple(_profile(b - a, velocity, acceleration) for a, b in pairwise(corners))
+    times = np.concatenate([np.zeros(1), np.cumsum([profile.duration for profile in profiles])])
+    return TimedPath(corners, times, profiles)
+
+
+def _corners(points: FloatArray) -> FloatArray:
+    """Return the ends of the straight lines of a path, shape (N, J); points that repeat are one."""
+    kept = [points[0]]
+    for point in points[1:]:
+        step = point - kept[-1]
+        length = float(np.linalg.norm(step))
+        if length == 0.0:
+            continue
+        if len(kept) > 1:
+            before = kept[-1] - kept[-2]
+            if np.abs(step / length - before / np.linalg.norm(before)).max() <= _STRAIGHT:
+                kept[-1] = point
+                continue
+        kept.append(point)
+    return np.array(kept)
+
+
+def _profile(step: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> Any:
+    """Return the fastest motion from 0 to 1 along a line, at rest at both ends."""
+    import ruckig
+
+    moved = np.abs(step)
+    asked, profile = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    asked.current_position, asked.target_position = [0.0], [1.0]
+    asked.max_velocity = [float((velocity[moved > 0.0] / moved[moved > 0.0]).min())]
+    asked.max_acceleration = [float((acceleration[moved > 0.0] / moved[moved > 0.0]).min())]
+    ruckig.Ruckig(1).calculate(asked, profile)
+    return profile

@@ -1,0 +1,47 @@
+"""Timing under limits: closed forms of a trapezoid, stops at corners, stretching."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clench.execution.timing import time_path
+
+
+def timed(points: list[list[float]], velocity: float = 1.0, acceleration: float = 10.0):
+    count = len(points[0])
+    return time_path([np.array(points)], np.full(count, velocity), np.full(count, acceleration))
+
+
+def test_a_short_line_is_a_triangle_and_a_long_one_a_trapezoid() -> None:
+    """From rest to rest: 2 sqrt(d / a) where the speed limit is not reached, else d / v + v / a."""
+    assert timed([[0.0], [0.05]]).duration == pytest.approx(2.0 * np.sqrt(0.05 / 10.0))
+    assert timed([[0.0], [2.0]]).duration == pytest.approx(2.0 / 1.0 + 1.0 / 10.0)
+
+
+def test_the_joint_nearest_to_its_limit_sets_the_time() -> None:
+    path = time_path([np.array([[0.0, 0.0], [1.0, 3.0]])], np.array([1.0, 2.0]), np.array([1e6, 1e6]))
+    assert path.duration == pytest.approx(1.5, rel=1e-3)
+
+
+def test_points_on_a_line_are_no_corners_and_repeated_ones_nothing() -> None:
+    assert timed([[0.0, 0.0], [0.3, 0.6], [0.3, 0.6], [1.0, 2.0]]).duration == timed([[0.0, 0.0], [1.0, 2.0]]).duration
+    assert timed([[0.4], [0.4]]).duration == 0.0
+    np.testing.assert_array_equal(timed([[0.4], [0.4]]).at(1.0), [0.4])
+
+
+def test_it_stands_still_at_a_corner_and_turns_back() -> None:
+    path = timed([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.5]])
+    assert len(path.times) == 4
+    step = 1e-5
+    for k, t in enumerate(path.times):
+        np.testing.assert_allclose(path.at(t), path.corners[k], atol=1e-12)
+        assert np.abs(path.at(t + step) - path.at(t - step)).max() / (2 * step) < 2e-4
+
+
+def test_stretching_is_even() -> None:
+    path = timed([[0.0], [1.0]])
+    for share in (0.0, 0.3, 1.0):
+        at = path.stretched_at(share * 7.0, 7.0)
+        np.testing.assert_allclose(at, path.at(share * path.duration), atol=1e-12)
+    assert {0.0, 7.0} <= set(path.samples(7.0).tolist())
