@@ -14,10 +14,10 @@ command = clench.GraspCommand(
     hand_pose=clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5]),
     planes=1,
     yaw_grid=(0.0, 0.1, -0.1, 0.2, -0.2),  # alternatives to choose among [rad]
-    opposition_grid=(0.0, 0.2, -0.2),
+    opposition_grid=(0.0, 0.2, -0.2, 0.4, -0.4),
     criteria={"range_of_motion": 1.0},
 )
-weights = [0.03, 0.1, 0.3, 1.0, 3.0]
+weights = [0.1, 0.3, 1.0, 2.0, 5.0, 10.0, 20.0]
 solutions = sweep_weight(hand, mug, command, "steadiness", weights)
 steadiness = [solution.choice["hand_scores"]["steadiness"] for solution in solutions]
 for weight, steady, solution in zip(weights, steadiness, solutions, strict=True):

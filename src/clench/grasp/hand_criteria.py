@@ -24,6 +24,8 @@ from .mechanics.loads import GRAVITY, gravity_any_direction, six_pulls, task_wre
 from .mechanics.steadiness import EDGES
 from .mechanics.wrench_space import epsilon_l1
 
+#: Where the directions are kept in which judged sets were weakest.
+_WEAKEST: Final = "weakest"
 #: Mass whose weight is 1 N [kg].
 _NEWTON: Final = 1.0 / GRAVITY
 
@@ -42,7 +44,10 @@ class Steadiness:
         if setting.obj is None:
             return None
         wrenches = np.vstack([np.empty((0, 6)), *(_wrenches(c, setting) for c in chosen)])
-        return epsilon_l1(wrenches).radius
+        ball = epsilon_l1(wrenches)
+        if ball.weakest is not None:
+            setting.kept.setdefault(_WEAKEST, []).append(ball.weakest)
+        return ball.radius
 
     def prepare(self, candidates: Sequence[FingerCandidate], setting: Setting) -> None:
         """Find the wrenches of every set, all at once, which takes a tenth of the time of one by one."""
@@ -60,7 +65,7 @@ class Steadiness:
             wrenches = [[_wrenches(c, setting) for c in group] for group in groups]
             setting.kept[key] = AlternativeWrenches(wrenches)
         alternatives: AlternativeWrenches = setting.kept[key]
-        return alternatives.bound(places)
+        return alternatives.bound(places, setting.kept.pop(_WEAKEST, ()))
 
 
 class ActuationForce:

@@ -94,6 +94,54 @@ def test_two_soft_fingers_on_a_sphere_or_a_box(half: float, length: float, frict
     assert np.cos(np.pi / edges) * round_cones - 1e-12 <= found <= round_cones + 1e-12
 
 
+@pytest.mark.parametrize("friction", [1e-3, 1e-4])
+@pytest.mark.parametrize("arm", [1.0, 0.7])
+def test_three_fingers_around_a_sphere_with_little_friction(friction: float, arm: float) -> None:
+    """For little friction epsilon is mu / sqrt(1 + 4 / arm^2), arm being the radius over the length scale.
+
+    A finger at p with inward normal -p and tangents t, z exerts (-p + a t + b z, arm (a z - b t)), |(a, b)| <= mu. The
+    farthest y with y w <= 1 for all of them: its part along the plane of the fingers shifts the load to one of them,
+    s_i = 1 + y p_i, with sum 3; the others are of size 1 / mu and obey |(y_vz, y_z - arm y_v t_i)| <= s_i / mu. Being
+    convex, its length is largest at a corner, s = (0, 0, 3): there y_z = 1 / mu and |y_v| = 2 / (arm mu).
+    """
+    angles = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
+    p = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
+    wrenches = edge_wrenches(make_contacts(p, -p, friction), np.zeros(3), 1.0 / arm, 8)
+    expected = friction / np.sqrt(1.0 + 4.0 / arm**2)
+    assert epsilon_l1(wrenches).radius == pytest.approx(expected, rel=1.2 * friction)
+
+
+@pytest.mark.parametrize("friction", [1e-3, 1e-4])
+@pytest.mark.parametrize(("half", "apart"), [(0.5, 0.4), (0.8, 0.3)])
+def test_a_thumb_against_two_fingers_on_a_box_with_little_friction(friction: float, half: float, apart: float) -> None:
+    """For little friction epsilon is mu / sqrt(1 + 1 / B^2 + 4 / C^2): thumb at -B x, fingers at B x ± C y.
+
+    As on the sphere: loads s with s_0 / 2 + (s_1 + s_2) / 4 = 1, and y of size 1 / mu with |y_z + B y_vy| <= s_0 / mu,
+    |y_z - B y_vy ± C y_vx| <= s_i / mu. The longest is at s = (0, 4, 0): (1, 1 / B, 2 / C) / mu.
+    """
+    p = np.array([[-half, 0.0, 0.0], [half, apart, 0.0], [half, -apart, 0.0]])
+    inward = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    wrenches = edge_wrenches(make_contacts(p, inward, friction), np.zeros(3), 1.0, 8)
+    expected = friction / np.sqrt(1.0 + 1.0 / half**2 + 4.0 / apart**2)
+    assert epsilon_l1(wrenches).radius == pytest.approx(expected, rel=1.2 * friction)
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.5, 1.0])
+@pytest.mark.parametrize("shape", ["sphere", "box"])
+def test_three_fingers_agree_with_linear_programs(friction: float, shape: str) -> None:
+    angles = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
+    p = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
+    inward = -p
+    if shape == "box":
+        p = np.array([[-0.5, 0.0, 0.0], [0.5, 0.4, 0.0], [0.5, -0.4, 0.0]])
+        inward = np.sign(-p) * [1.0, 0.0, 0.0]
+    wrenches = edge_wrenches(make_contacts(p, inward, friction), np.zeros(3), 1.0, 6)
+    starts = np.vstack([-wrenches.reshape(-1, 6), np.random.default_rng(1).normal(size=(40, 6))])
+    found = epsilon_l1(wrenches).radius
+    assert found > 0.03
+    assert found == pytest.approx(epsilon_by_programs(wrenches, starts), abs=1e-6)
+
+
 def test_linf_of_few_fingers_is_the_hull_of_all_sums() -> None:
     rng = np.random.default_rng(3)
     for count in (2, 3):

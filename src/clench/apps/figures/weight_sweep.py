@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from string import ascii_uppercase
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SIZE: Final = (1560, 560)
-_PICTURE: Final = (470, 480)
+_PICTURE: Final = (470, 470)
 _PLOT: Final = 520
 
 
@@ -59,57 +60,76 @@ def draw_sweep(
     weights: Sequence[float],
     path: Path,
 ) -> Path:
-    """Write a figure of two criteria over the weight of the first, and of the grasps at the least and the most weight.
+    """Write a figure of two criteria over the weight of the first, and of the grasps at the first and the last weight.
 
     Args:
         hand, obj: what was solved. solutions: of `sweep_weight`, one for every weight. criteria: the one whose weight
-            changed, and one that pays for it. weights: above 0. path: the PNG file.
+            changed, and one that pays for it. weights: above 0, rising. path: the PNG file.
     """
     figure = style.new_figure(*_SIZE)
     width, height = _SIZE
-    plot = figure.add_axes((80 / width, 70 / height, (_PLOT - 160) / width, (height - 150) / height))
-    _draw_steps(plot, solutions, criteria, weights)
-    style.write(figure, 0.5, 1.0 - 22 / height, _title(hand, obj, criteria[0]), fontsize=13, ha="center")
-    ends = [(solutions[0], weights[0]), (solutions[-1], weights[-1])]
-    surfaces = [(hand_surface(hand, s, COARSE).corners, object_surface(obj, s, COARSE).corners) for s, _ in ends]
-    focus = np.concatenate([body.reshape(-1, 3) for body, _ in surfaces] + [surfaces[0][1].reshape(-1, 3)])
-    towards = viewpoints(*surfaces[1], focus, ends[1][0])[0]
-    for k, (solution, weight) in enumerate(ends):
-        left = _PLOT + 20 + k * (_PICTURE[0] + 40)
-        axes = figure.add_axes((left / width, 20 / height, _PICTURE[0] / width, _PICTURE[1] / height))
-        _draw_grasp(axes, hand, obj, solution, towards, focus)
-        scores = solve_scores(solution)
+    letters = _letters(solutions)
+    for row, name in enumerate(criteria):
+        low = 80 + (1 - row) * 210
+        plot = figure.add_axes((80 / width, low / height, (_PLOT - 120) / width, 180 / height))
+        _draw_values(plot, [solve_scores(s)[name] for s in solutions], weights, name, letters)
+        if row:
+            plot.set_xlabel(f"weight of {criteria[0]} (the others keep theirs)")
+        else:
+            plot.tick_params(labelbottom=False)
+    title = f"{hand.name} on {obj.name}: how much {criteria[0]} counts decides which grasp is chosen"
+    style.write(figure, 0.5, 1.0 - 22 / height, title, fontsize=13, ha="center")
+    ends = (0, len(solutions) - 1)
+    surfaces = [(hand_surface(hand, s, COARSE).corners, object_surface(obj, s, COARSE).corners) for s in solutions]
+    focus = np.concatenate([surfaces[k][0].reshape(-1, 3) for k in ends] + [surfaces[0][1].reshape(-1, 3)])
+    towards = viewpoints(*surfaces[-1], focus, solutions[-1])[0]
+    for place, k in enumerate(ends):
+        left = _PLOT + 20 + place * (_PICTURE[0] + 40)
+        axes = figure.add_axes((left / width, 5 / height, _PICTURE[0] / width, _PICTURE[1] / height))
+        _draw_grasp(axes, hand, obj, solutions[k], towards, focus)
+        scores = solve_scores(solutions[k])
         told = ", ".join(f"{n} {scores[n]:.3g} {find_criterion(n, 'sweep').unit}" for n in criteria)
-        style.write(figure, (left + _PICTURE[0] / 2) / width, (height - 52) / height, _end(weight, told), ha="center")
+        head = f"{letters[k]}, chosen at weight {weights[k]:g}" + (_changed(solutions) if place else "")
+        middle = (left + _PICTURE[0] / 2) / width
+        style.write(figure, middle, 1.0 - 52 / height, head, ha="center", fontsize=11, fontweight="bold")
+        style.write(figure, middle, 1.0 - 72 / height, told, ha="center")
     return style.save_figure(figure, path)
 
 
-def _title(hand: Hand, obj: GraspObject, name: str) -> str:
-    return f"{hand.name} on {obj.name}: more weight on {name}"
+def _letters(solutions: Sequence[GraspSolution]) -> list[str]:
+    """Return a letter for every solution, the same for the same sets, in the order in which they come."""
+    sets = [tuple(f.chosen for f in s.fingers.values()) for s in solutions]
+    known = list(dict.fromkeys(sets))
+    return [f"grasp {ascii_uppercase[known.index(chosen) % 26]}" for chosen in sets]
 
 
-def _end(weight: float, told: str) -> str:
-    return f"weight {weight:g}: {told}"
+def _changed(solutions: Sequence[GraspSolution]) -> str:
+    """Return which fingers take another set at the last weight than at the first."""
+    first, last = solutions[0].fingers, solutions[-1].fingers
+    names = [name for name in last if last[name].chosen != first[name].chosen]
+    return f": {' and '.join(names)} elsewhere" if names else ": the same"
 
 
-def _draw_steps(
-    plot: Axes, solutions: Sequence[GraspSolution], criteria: tuple[str, str], weights: Sequence[float]
-) -> None:
-    """Draw the values of two criteria over the weight, each against an axis of its own."""
-    for axes, name, color, line in (
-        (plot, criteria[0], style.CHOSEN, "-"),
-        (plot.twinx(), criteria[1], style.JOINT_COLORS[0], "--"),
-    ):
-        c = find_criterion(name, "sweep")
-        values = [solve_scores(s)[name] for s in solutions]
-        axes.plot(weights, values, line, color=color, marker="o", drawstyle="steps-post", lw=2.0)
-        better = "more" if c.larger_is_better else "less"
-        axes.set_ylabel(f"{name} [{c.unit}], {better} is better", color=color)
-        axes.tick_params(axis="y", colors=color)
-        axes.margins(y=0.12)
+def _draw_values(plot: Axes, values: Sequence[float], weights: Sequence[float], name: str, letters: list[str]) -> None:
+    """Draw the values of a criterion over the weight, with a band for every grasp that is chosen."""
+    c = find_criterion(name, "sweep")
+    places = np.log10(np.asarray(weights))
+    borders = 10.0 ** np.concatenate([[places[0] - 0.15], (places[1:] + places[:-1]) / 2.0, [places[-1] + 0.15]])
+    known = list(dict.fromkeys(letters))
+    for letter in known:
+        own = [k for k in range(len(letters)) if letters[k] == letter]
+        color = style.JOINT_COLORS[known.index(letter) % len(style.JOINT_COLORS)]
+        for k in own:
+            plot.axvspan(borders[k], borders[k + 1], color=style.mixed(color, style.PAPER, 0.8), lw=0)
+            plot.plot([borders[k], borders[k + 1]], [values[k]] * 2, color=color, lw=3.0)
+        plot.plot([weights[k] for k in own], [values[k] for k in own], "o", color=color, ms=7)
+        middle = 10.0 ** (np.log10([borders[own[0]], borders[own[-1] + 1]]).mean())
+        plot.annotate(letter, (middle, 0.9), xycoords=("data", "axes fraction"), ha="center", va="center", color=color)
     plot.set_xscale("log")
-    plot.set_xlabel(f"weight of {criteria[0]}")
-    plot.grid(alpha=0.3)
+    plot.set_xlim(borders[0], borders[-1])
+    plot.margins(y=0.35)
+    plot.set_title(f"{name} [{c.unit}], {'more' if c.larger_is_better else 'less'} is better", fontsize=10, loc="left")
+    plot.grid(alpha=0.3, axis="y")
 
 
 def _draw_grasp(

@@ -41,13 +41,18 @@ class AlternativeWrenches:
         grid: FloatArray = reduce(np.maximum.outer, np.split(each, self._last))
         return grid
 
-    def bound(self, places: tuple[int, ...]) -> FloatArray:
-        """Return values that no combination's epsilon exceeds, near that of one of them."""
+    def bound(self, places: tuple[int, ...], weakest: Sequence[FloatArray] = ()) -> FloatArray:
+        """Return values that no combination's epsilon exceeds, near that of one of them.
+
+        Args:
+            places: of its sets. weakest: directions in which others are known to be weakest, shape (6,) each.
+        """
+        known = [self.reach(direction) for direction in weakest]
         wrenches = np.vstack([sets[p] for sets, p in zip(self._wrenches, places, strict=True)])
         if not len(wrenches):
-            return self.reach(np.eye(6)[0])
+            return reduce(np.minimum, known, self.reach(np.eye(6)[0]))
         directions, reach = weak_directions(wrenches, _STARTS, self._weakest)
         least = int(reach.argmin())
         if reach[least] > 0.0:
             self._weakest = directions[least]
-        return self.reach(directions[least])
+        return reduce(np.minimum, known, self.reach(directions[least]))
