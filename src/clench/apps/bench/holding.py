@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import clench
-from clench.base.json_files import write_atomically
+from clench.base.json_files import write_atomically, write_json
 from clench.execution.convex_pieces import in_pieces
 from clench.execution.hold import Hold, HoldTest
 from clench.execution.scene import lowest
@@ -26,6 +27,7 @@ from .trying import Trial, try_grasp
 
 #: Stricter limits on the object's motion: name, distance [m], angle [rad].
 STRICT = (("10mm_5deg", 0.01, float(np.deg2rad(5.0))), ("5mm_5deg", 0.005, float(np.deg2rad(5.0))))
+TRIALS_SCHEMA = "clench.hold-trials/1"
 #: Where the file with a Markdown table has a column: heading, key.
 _COLUMNS = (
     ("tried", "tried"),
@@ -59,13 +61,21 @@ class HoldBench:
     hold: Hold
 
 
+@dataclass(frozen=True)
+class HoldFiles:
+    """Say where more is written: a Markdown table, and all trials (JSON, schema `clench.hold-trials/1`)."""
+
+    table: Path | None = None
+    trials: Path | None = None
+
+
 def bench_hold(
-    hands: Sequence[str], objects: Sequence[str], scale: float, asked: HoldBench, file: Path | None, show_progress: bool
+    hands: Sequence[str], objects: Sequence[str], scale: float, asked: HoldBench, files: HoldFiles, show_progress: bool
 ) -> BenchReport:
     """Sample, select and try grasps for every hand and object.
 
     Args:
-        hands, objects: models. scale: of the objects. asked: what is tried. file: gets the Markdown table.
+        hands, objects: models. scale: of the objects. asked: what is tried. files: where it is written.
         show_progress: show a bar.
     """
     loaded_hands = [clench.Hand.load(model) for model in hands]
@@ -75,16 +85,19 @@ def bench_hold(
     report.values |= settings | {f"hold_{key}": value for key, value in asdict(asked.hold).items()}
     names = [_label(model) for model in objects]
     cases = [(hand, obj, name) for hand in loaded_hands for obj, name in zip(loaded, names, strict=True)]
-    rows = []
+    rows, kept = [], list[dict[str, Any]]()
     with _progress(len(cases) * _work(asked), show_progress) as tick:
         for number, (hand, obj, name) in enumerate(cases):
             tick(0, f"{hand.name}, {name}")
-            values = _case(hand, obj, asked, lambda: tick(1, None))
+            trials, values = _case(hand, obj, asked, lambda: tick(1, None))
+            kept += [{"hand": hand.name, "object": name, **trial.to_dict()} for trial in trials]
             tick(-((number + 1) * _work(asked)), None)
             report.values |= {f"{hand.name}.{name}.{key}": value for key, value in values.items()}
             rows.append((hand.name, name, values))
-    if file is not None:
-        write_atomically(file, _markdown(rows).encode())
+    if files.table is not None:
+        write_atomically(files.table, _markdown(rows).encode())
+    if files.trials is not None:
+        write_json(files.trials, {"schema": TRIALS_SCHEMA, "trials": kept}, "trials")
     return report
 
 
@@ -95,14 +108,16 @@ def _label(model: str) -> str:
 
 
 def _work(asked: HoldBench) -> int:
-    return asked.poses + (SOLVED + 1) * (asked.best + asked.others) + asked.best + asked.others
+    return asked.poses + (SOLVED + 1) * asked.best + 3 * asked.others
 
 
-def _case(hand: Hand, obj: GraspObject, asked: HoldBench, tick: Callable[[], None]) -> dict[str, Value]:
-    """Return what came of one hand and one object, flat."""
+def _case(
+    hand: Hand, obj: GraspObject, asked: HoldBench, tick: Callable[[], None]
+) -> tuple[list[Trial], dict[str, Value]]:
+    """Return the trials of one hand and one object, and what came of them, flat."""
     if asked.hold.test == HoldTest.LIFT:
         obj = obj.with_body(table(lowest(obj)))
-    sampled = sample_grasps(hand, obj, asked.poses, asked.best + asked.others, asked.seed, asked.hold.friction, tick)
+    sampled = sample_grasps(hand, obj, asked.poses, (asked.best, asked.others), asked.seed, asked.hold.friction, tick)
     best, rest = sampled.grasps[: asked.best], sampled.grasps[asked.best :]
     step = max(1, len(rest) // asked.others) if asked.others else 1
     others = rest[::-1][::step][: asked.others]
@@ -112,7 +127,7 @@ def _case(hand: Hand, obj: GraspObject, asked: HoldBench, tick: Callable[[], Non
         tick()
     values: dict[str, Value] = dict(sorted(sampled.kinds.items()))
     values["grasps"] = len(sampled.grasps)
-    return values | _of_best(trials[: len(best)]) | _of_score(trials)
+    return trials, values | _of_best(trials[: len(best)]) | _of_score(trials)
 
 
 def _of_best(trials: Sequence[Trial]) -> dict[str, Value]:

@@ -133,6 +133,7 @@ def hold(
     friction: float = 0.6,
     seed: int = 0,
     table: Path | None = None,
+    trials: Path | None = None,
     json: bool = False,
 ) -> int:
     """Select the best of many grasps by our own criteria, and see in simulation whether they hold.
@@ -149,19 +150,21 @@ def hold(
         friction: of its contacts.
         seed: of the approach poses.
         table: file for a table (Markdown).
+        trials: file for every grasp that was tried, with its reports (JSON).
         json: print one JSON document on standard output.
     """
     from clench.execution.hold import Hold
 
-    from .holding import HoldBench, bench_hold
+    from .holding import HoldBench, HoldFiles, bench_hold
 
     for key, count, least in (("poses", poses, 1), ("best", best, 1), ("others", others, 0), ("seed", seed, 0)):
         if count < least:
             raise CommandError(f"--{key}: expected at least {least}, got {count}.")
-    if table is not None and not table.parent.is_dir():
-        raise FileError(table, f"cannot be written (no folder '{table.parent}').")
+    for file in (table, trials):
+        if file is not None and not file.parent.is_dir():
+            raise FileError(file, f"cannot be written (no folder '{file.parent}').")
     asked = HoldBench(poses, best, others, seed, Hold(mass=mass, friction=friction, test=test))
-    return _print(bench_hold(hand, object, scale, asked, table, show_progress=not json), json)
+    return _print(bench_hold(hand, object, scale, asked, HoldFiles(table, trials), show_progress=not json), json)
 
 
 BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose, "steadiness": steadiness, "hold": hold}

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import clench
+from clench.grasp.mechanics.held import HeldObject
 from clench.grasp.mechanics.steadiness import epsilon, epsilon_bound
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
@@ -17,15 +18,15 @@ from clench.solve.solution import GraspSolution, SolutionStatus
 
 #: Preshapes of the thumb that share the poses; the first is the open hand.
 PRESHAPES = 10
-#: Of every grasp that is wanted so many are solved over the whole width, the most promising first.
+#: Of every grasp that is wanted of the best so many are solved over the whole width, the most promising first.
 SOLVED = 3
-#: The score is computed at this share of the test's friction, so that it leaves a margin [-].
-FRICTION_SHARE = 0.5
+#: The score is a mean over these shares of the test's friction, so that a margin in it counts [-].
+FRICTION_SHARES = (0.5, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class GradedGrasp:
-    """Hold a solution with its score: epsilon, for L1, 8 edges, at half of the test's friction [N per N]."""
+    """Hold a solution with its score: mean of epsilon (L1, 8 edges) at the test's friction and at half of it [N/N]."""
 
     solution: GraspSolution
     score: float
@@ -40,12 +41,19 @@ class Sampled:
 
 
 def sample_grasps(
-    hand: Hand, obj: GraspObject, poses: int, wanted: int, seed: int, friction: float, tick: Callable[[], None]
+    hand: Hand,
+    obj: GraspObject,
+    poses: int,
+    wanted: tuple[int, int],
+    seed: int,
+    friction: float,
+    tick: Callable[[], None],
 ) -> Sampled:
     """Solve approach poses quickly, on one plane, then the best of them over the whole width, and grade these.
 
     Args:
-        hand, obj: what grasps what. poses: how many approaches. wanted: how many grasps are needed in the end.
+        hand, obj: what grasps what. poses: how many approaches. wanted: how many grasps are needed in the
+            end, of the best and of all others.
         seed: of poses and preshapes. friction: of the test [-]. tick: called after every solve.
     """
     kinds: Counter[str] = Counter()
@@ -59,8 +67,8 @@ def sample_grasps(
             tick()
             kinds[f"sampled_{solution.status.value}"] += 1
             if solution.status is SolutionStatus.GRASP:
-                held = hold(solution, hand, obj, friction=FRICTION_SHARE * friction).held
-                quick.append((epsilon_bound(held), GraspCommand(hand_pose=pose, preshape=preshape)))
+                promise = _mean(epsilon_bound, solution, hand, obj, friction)
+                quick.append((promise, GraspCommand(hand_pose=pose, preshape=preshape)))
     quick.sort(key=lambda found: -found[0])
     grasps: list[GradedGrasp] = []
     for _, command in _spread(quick, wanted):
@@ -77,12 +85,18 @@ def sample_grasps(
 
 
 def score_of(solution: GraspSolution, hand: Hand, obj: GraspObject, friction: float) -> float:
-    """Return the score of a solution [N per N]: epsilon at a share of the test's friction [-]."""
-    return epsilon(hold(solution, hand, obj, friction=FRICTION_SHARE * friction).held).radius
+    """Return the score of a solution [N/N], see `GradedGrasp`, for the friction of the test [-]."""
+    return _mean(lambda held: epsilon(held).radius, solution, hand, obj, friction)
 
 
-def _spread(quick: list[tuple[float, GraspCommand]], wanted: int) -> list[tuple[float, GraspCommand]]:
-    """Return the best, and as many from the rest, evenly spaced, so that the score can be judged on both."""
-    best, rest = quick[: SOLVED * wanted], quick[SOLVED * wanted :]
-    step = max(1, len(rest) // wanted) if rest else 1
-    return [*best, *rest[::step][:wanted]]
+def _mean(
+    measure: Callable[[HeldObject], float], solution: GraspSolution, hand: Hand, obj: GraspObject, friction: float
+) -> float:
+    held = (hold(solution, hand, obj, friction=share * friction).held for share in FRICTION_SHARES)
+    return sum(map(measure, held)) / len(FRICTION_SHARES)
+
+
+def _spread(quick: list[tuple[float, GraspCommand]], wanted: tuple[int, int]) -> list[tuple[float, GraspCommand]]:
+    """Return the best, and some of the rest, evenly spaced, so that the score can be judged on both."""
+    best, rest = (SOLVED * wanted[0], 2 * wanted[1])
+    return [*quick[:best], *quick[best :: max(1, (len(quick) - best) // max(rest, 1))][:rest]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,10 +49,12 @@ class Trial:
     """Hold what came of a grasp.
 
     Args:
-        score: our own, see `GradedGrasp`. simultaneous: a way is known on which all contacts are reached at once.
+        solution: the grasp. score: our own, see `GradedGrasp`.
+        simultaneous: a way is known on which all contacts are reached at once.
         measures: at the grasp's posture. report: at the settings asked for. harder: held under other ones, by name.
     """
 
+    solution: GraspSolution
     score: float
     simultaneous: bool
     measures: GraspMeasures
@@ -75,6 +77,20 @@ class Trial:
             return "lost_in_the_squeeze"
         return "lost_in_the_pull"
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is kept of a trial: the grasp, what was measured, and the reports of all tests."""
+        return {
+            "hand_pose": self.solution.hand_pose.to_dict(),
+            "joint_angles": dict(self.solution.joint_angles),
+            "open_angles": dict(self.solution.open_angles),
+            "score": self.score,
+            "kind": self.kind,
+            "simultaneous": self.simultaneous,
+            "measures": asdict(self.measures),
+            "hold": self.report.to_dict(),
+            "harder": {name: report.to_dict() for name, report in self.harder.items()},
+        }
+
 
 def try_grasp(
     solution: GraspSolution, score: float, hand: Hand, obj: GraspObject, hold: Hold, *, harder: bool
@@ -86,6 +102,7 @@ def try_grasp(
     """
     trajectory = plan_trajectory(solution, hand, obj=obj)
     return Trial(
+        solution,
         score,
         trajectory.pregrasp is not None,
         measure_grasp(solution, hand, obj),
