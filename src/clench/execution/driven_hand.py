@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from clench.base.errors import ClenchError, UnknownNameError
+from clench.base.errors import ClenchError, CommandError, UnknownNameError
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -16,6 +16,7 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, check_tensions, command_limits, slowed_down
+from .driven_squeeze import DrivenSqueeze, squeeze_by_driver
 from .driver import DriverError, HandDriver, HandState, TendonDriver
 from .following import CLOSEST, HORIZON, Followed, Follower, TimedPlan
 from .history import ExecutionHistory
@@ -42,6 +43,8 @@ class DrivenHand:
         max_age: oldest state of the hand on which a command may be based [s].
         max_deviation: how far a joint may be from where it was told to be, on the way [rad].
         settling: how long the hand may take to arrive after the trajectory's end [s].
+        squeeze: share of the angle offsets of the solution's squeeze plan that joints are told beyond the touch, 0 for
+            none [-]; a solution without a plan is not squeezed (see `clench.complete`).
         stay_connected: leave the driver connected at the end, for hands that let go when it leaves; call
             `driver.disconnect` later.
     """
@@ -58,8 +61,11 @@ class DrivenHand:
         max_age: float = 0.5,
         max_deviation: float = 0.5,
         settling: float = 2.0,
+        squeeze: float = 1.0,
         stay_connected: bool = False,
     ) -> None:
+        if not (np.isfinite(squeeze) and squeeze >= 0.0):
+            raise CommandError(f"squeeze: expected a finite number of at least 0, got {squeeze!r}.")
         self._hand = hand
         self.driver = driver
         self.joint_map = joint_map or JointMap()
@@ -69,6 +75,7 @@ class DrivenHand:
         self.max_age = max_age
         self.max_deviation = max_deviation
         self.settling = settling
+        self.squeeze = squeeze
         self.stay_connected = stay_connected
         self._stopping = threading.Event()
 
@@ -109,7 +116,12 @@ class DrivenHand:
             check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
             arrived = {joint.name: 0.2 * self.angle_tolerance * abs(joint.scale) for joint in mapped.values()}
             followed = Follower(self.driver, check, self._stopping, self.settling, arrived).follow(plan)
-            pulled = self._pull(solution) if followed.trouble is None else ""
+            squeezed = DrivenSqueeze()
+            if followed.trouble is None:
+                squeezed = squeeze_by_driver(
+                    solution, self.hand, self.driver, mapped, check, self._stopping, self.squeeze
+                )
+            pulled = self._pull(solution) if _untroubled(followed, squeezed) else ""
         except DriverError as error:
             return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}")
         except ClenchError:
@@ -121,7 +133,7 @@ class DrivenHand:
             if not self.stay_connected:
                 with suppress(Exception):  # what the hand did is known, however the line closes
                     self.driver.disconnect()
-        return self._report(followed, mapped, computed, (_way(way), pulled))
+        return self._report(followed, squeezed, mapped, computed, (_way(way), squeezed.text, pulled))
 
     def _check_joints(self, mapped: Mapping[str, MappedJoint]) -> None:
         for name, joint in mapped.items():
@@ -170,7 +182,12 @@ class DrivenHand:
         return f"The tendons were told the tensions of the squeeze plan, up to {tensions.max():.3g} N."
 
     def _report(
-        self, followed: Followed, mapped: Mapping[str, MappedJoint], computed: FloatArray, notes: tuple[str, ...]
+        self,
+        followed: Followed,
+        squeezed: DrivenSqueeze,
+        mapped: Mapping[str, MappedJoint],
+        computed: FloatArray,
+        notes: tuple[str, ...],
     ) -> ExecutionReport:
         history = _history(followed, mapped)
         joints = {
@@ -179,6 +196,8 @@ class DrivenHand:
         }
         error = max((abs(joint.error) for joint in joints.values()), default=None)
         success, reason = self._judge(followed, joints, error)
+        if success and squeezed.followed is not None and squeezed.followed.trouble is not None:
+            success, reason = False, f"While squeezing: {_stopped(squeezed.followed)}"
         return ExecutionReport(
             actuator=self.name,
             success=success,
@@ -193,17 +212,25 @@ class DrivenHand:
 
     def _judge(self, followed: Followed, joints: Mapping[str, JointReached], error: float | None) -> tuple[bool, str]:
         if followed.trouble is not None:
-            told = (
-                "it was seen to stand still"
-                if followed.stopped
-                else (f"that was not confirmed; it was told nothing beyond {HORIZON:g} s")
-            )
-            return False, f"{followed.trouble} The hand was told to stop: {told}."
+            return False, _stopped(followed)
         if error is None or error > self.angle_tolerance:
             worst = max(joints, key=lambda name: abs(joints[name].error))
             far = f"joint '{worst}' is {abs(joints[worst].error):.3g} rad from its computed angle"
             return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad."
         return True, f"Every joint is within {error:.2g} rad of its computed angle."
+
+
+def _stopped(followed: Followed) -> str:
+    told = (
+        "it was seen to stand still"
+        if followed.stopped
+        else f"that was not confirmed; it was told nothing beyond {HORIZON:g} s"
+    )
+    return f"{followed.trouble} The hand was told to stop: {told}."
+
+
+def _untroubled(followed: Followed, squeezed: DrivenSqueeze) -> bool:
+    return followed.trouble is None and (squeezed.followed is None or squeezed.followed.trouble is None)
 
 
 def _way(way: float) -> str:

@@ -32,14 +32,15 @@ class ActuatorOptions:
     to: str | None
     record: Path | None
     hold: Hold | None = None
+    squeeze: float | None = None
 
 
 #: Which options mean something to which actuator; any other that is given is refused.
 _TAKEN: dict[str, tuple[str, ...]] = {
     "simulated": ("hold",),
-    "ros2": ("controller", "joint_states", "interface", "joint_map"),
-    "orca": ("joint_map", "config"),
-    "orca-mock": ("joint_map", "config"),
+    "ros2": ("controller", "joint_states", "interface", "joint_map", "squeeze"),
+    "orca": ("joint_map", "config", "squeeze"),
+    "orca-mock": ("joint_map", "config", "squeeze"),
     "signal": ("to", "record"),
 }
 
@@ -67,7 +68,10 @@ def make_actuator(
         return clench.ReadySignal(hand, options.record, options.to, obj=obj, timeout=options.timeout)
     joint_map = None if options.joint_map is None else clench.JointMap.load(options.joint_map)
     driver = _driver(name, options)
-    return clench.DrivenHand(hand, driver, joint_map=joint_map, obj=obj, connect_timeout=options.timeout)
+    squeeze = 1.0 if options.squeeze is None else options.squeeze
+    return clench.DrivenHand(
+        hand, driver, joint_map=joint_map, obj=obj, connect_timeout=options.timeout, squeeze=squeeze
+    )
 
 
 def make_hold(hold: bool, mass: float | None, friction: float | None) -> Hold | None:

@@ -30,6 +30,7 @@ def execute(
     interface: Interface | None = None,
     joint_map: Path | None = None,
     config: Path | None = None,
+    squeeze: float | None = None,
     timeout: float = 5.0,
     to: str | None = None,
     record: Path | None = None,
@@ -58,6 +59,7 @@ def execute(
         interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
         joint_map: ros2, orca: TOML file with the controller's joint names, units, offsets and limits.
         config: orca: the hand's config.yaml.
+        squeeze: ros2, orca: share of the squeeze plan's angle offsets that is told beyond the touch (1).
         timeout: seconds to look for the controller.
         to: signal: file:PATH, tcp:HOST:PORT, unix:PATH or topic:NAME.
         record: signal: record (SQLite file) that the solution is appended to.
@@ -84,7 +86,9 @@ def execute(
         scale=scale,
         collision_source=the_solution.object_collision_source,
     )
-    options = ActuatorOptions(controller, joint_states, interface, joint_map, config, timeout, to, record, tested)
+    options = ActuatorOptions(
+        controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze
+    )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
         report = clench.execute(the_solution, moved, speed=speed, force=force)
