@@ -287,3 +287,88 @@ def test_no_trajectory_is_made_up_where_joints_were_gone_through_again():
     with pytest.raises(clench.ClenchError, match="rounds"):
         plan_trajectory(again, hand)
     assert clench.complete(again, hand, bar(0.06, 0.02)).pregrasp is None
+
+
+ORDERS = ("proximal-first", "together", "fingertip")
+WEIGHTS = {"range_of_motion": 1.0, "touching_links": 0.1}
+
+
+def summed(solution):
+    """Return the weighted sum of the chosen sets' scores, worked out anew."""
+    chosen = [f.candidates[f.chosen].scores for f in solution.fingers.values()]
+    return sum(0.1 * s["touching_links"] - s["range_of_motion"] for s in chosen)
+
+
+@pytest.mark.parametrize("orders", [ORDERS, ORDERS[::-1], ORDERS[1:]])
+def test_of_several_orders_the_best_solution_is_kept(orders):
+    pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
+    hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
+    command = clench.GraspCommand(hand_pose=pose, planes=1, criteria=WEIGHTS, orders=orders)
+    alone = {o: clench.solve(hand, mug, clench.GraspCommand(pose, planes=1, criteria=WEIGHTS, order=o)) for o in orders}
+    solution = clench.solve(hand, mug, command)
+    said = solution.choice["orders"]
+    statuses = ["grasp", "partial", "no_contact", "blocked"]
+    best = max(
+        orders, key=lambda o: (alone[o].is_valid(), -statuses.index(alone[o].status.value), round(summed(alone[o]), 9))
+    )
+    assert said["chosen"] == best
+    assert solution.joint_angles == alone[best].joint_angles
+    assert {o: c["total"] for o, c in said["compared"].items()} == pytest.approx({o: summed(alone[o]) for o in orders})
+    assert {c.order for f in solution.fingers.values() for c in f.candidates} == {best}
+    assert said["text"].startswith(f"{best} ")
+    assert clench.GraspSolution.from_dict(solution.to_dict()).choice["orders"] == said
+
+
+def test_a_touch_that_only_one_order_allows_wins():
+    """The rod is met by the first link: with `fingertip` that is a miss, whatever the motion costs."""
+    solution = solve(three_links(upper=1.2), bar(0.03, 0.02), orders=("fingertip", "together"))
+    assert solution.choice["orders"]["chosen"] == "together"
+    assert solution.choice["orders"]["text"] == (
+        f"together comes before fingertip because it is a valid {solution.status.value}."
+    )
+
+
+def test_equal_orders_keep_the_first():
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    for orders in (("proximal-first", "together"), ("together", "proximal-first")):
+        said = solve(three_links(upper=1.0), free, orders=orders).choice["orders"]
+        assert said["chosen"] == orders[0]
+        assert said["text"] == f"{orders[0]} and {orders[1]} score the same; the first goes before the second."
+
+
+def test_an_order_that_the_hand_does_not_allow_is_left_out_and_said():
+    builder = HandBuilder().finger(
+        "index",
+        [along_x(0.007, 0.04)] * 2,
+        [0.04, 0.04],
+        base=mount((0, 0, 0)),
+        upper=1.2,
+        axes=[[0, 1, 0], [0, 1, 0.3]],
+    )
+    hand, rod = builder.hand(), bar(0.03, 0.02)
+    with pytest.raises(clench.ClenchError, match="not parallel"):
+        solve(hand, rod, order="together")
+    said = solve(hand, rod, orders=("together", "proximal-first")).choice["orders"]
+    assert said["chosen"] == "proximal-first"
+    assert "not parallel" in said["compared"]["together"]["refused"]
+    assert said["text"] == "proximal-first is the only order that could be solved."
+    with pytest.raises(clench.ClenchError, match="not parallel"):
+        solve(hand, rod, orders=("together", "fingertip"))
+
+
+def test_a_record_has_one_entry_and_an_error_of_the_pose_keeps_the_order(tmp_path):
+    hand, rod = three_links(upper=1.2), bar(0.06, 0.02)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, orders=("proximal-first", "together"))
+    with clench.Record(tmp_path / "r.sqlite") as record:
+        solution = clench.solve(hand, rod, command, record=record)
+        assert len(record) == 1
+    report = clench.pose_error(hand, rod, command, 1e-3, 0.0, solution=solution)
+    single = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, order=solution.choice["orders"]["chosen"])
+    assert report.measured == pytest.approx(clench.pose_error(hand, rod, single, 1e-3, 0.0).measured)
+
+
+def test_what_is_wrong_with_the_command_is_said_once():
+    with pytest.raises(clench.ClenchError, match="preshape"):
+        solve(three_links(), bar(0.03, 0.02), orders=("proximal-first", "together"), preshape={"index_0": 9.0})
+    with pytest.raises(clench.ClenchError, match="steadines"):
+        solve(three_links(), bar(0.03, 0.02), orders=("proximal-first",), criteria={"steadines": 1.0})

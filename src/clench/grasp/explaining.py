@@ -131,7 +131,7 @@ def _finger_text(finger: FingerChoice, group: Sequence[FingerCandidate], choice:
         return f"{name} is {-lead:.3g} behind {other} by itself; with the sets of the other fingers it is the best."
     if lead == 0.0:
         return f"{name} and {other} score the same; the full width goes first, then the first set."
-    return f"{name} leads {other} by {lead:.3g}; {_decided(gains, best.scores, group[second].scores)}"
+    return f"{name} leads {other} by {lead:.3g}; {say_what_decided(gains, best.scores, group[second].scores)}"
 
 
 def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
@@ -153,7 +153,7 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     gains = _gains(pairs, choice)
     ours = {n: sum(a.get(n, 0.0) for a, _ in pairs) for n in gains}
     theirs = {n: sum(b.get(n, 0.0) for _, b in pairs) for n in gains}
-    return f"The chosen sets lead the next best ({swapped}) by {lead:.3g}; {_decided(gains, ours, theirs)}"
+    return f"The chosen sets lead the next best ({swapped}) by {lead:.3g}; {say_what_decided(gains, ours, theirs)}"
 
 
 def _doubt(choice: HandChoice) -> str:
@@ -175,7 +175,7 @@ def _gains(pairs: Sequence[tuple[Mapping[str, float], Mapping[str, float]]], cho
     return gains
 
 
-def _decided(gains: Mapping[str, float], ours: Mapping[str, float], theirs: Mapping[str, float]) -> str:
+def say_what_decided(gains: Mapping[str, float], ours: Mapping[str, float], theirs: Mapping[str, float]) -> str:
     """Return the sentence about the criterion that adds most to the lead."""
     name = max(gains, key=lambda n: gains[n])
     unit = find_criterion(name, "choice").unit

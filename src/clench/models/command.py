@@ -35,6 +35,7 @@ class GraspCommand:
         preshape: angles [rad] by joint name: posture joints, and open values of closing joints.
         fingers: names of the fingers that close, in order; None is all.
         order, rounds: closing order, and how often it is gone through; 0 rounds: until nothing moves any more.
+        orders: alternatives, used instead of `order`: each is solved by itself, and the best solution is kept.
         speeds: how fast joints close relative to each other where all move at once, by name of a free joint; 1 if not
             named.
         planes: number of curl planes per finger.
@@ -58,6 +59,7 @@ class GraspCommand:
     preshape: Mapping[str, float] = field(default_factory=dict)
     fingers: tuple[str, ...] | None = None
     order: ClosingOrder = ClosingOrder.PROXIMAL_FIRST
+    orders: tuple[ClosingOrder, ...] = ()
     rounds: int = 1
     speeds: Mapping[str, float] = field(default_factory=dict)
     planes: int = 5

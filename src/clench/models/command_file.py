@@ -28,7 +28,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 LIMIT_TOLERANCE: Final = 1e-9
 
 KEYS: Final = (
-    *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "rounds", "speeds", "planes"),
+    *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "orders", "rounds", "speeds", "planes"),
     *("full_width", "yaw_grid", "open_variants", "opposition_grid", "check_sets", "measure", "collision_source"),
     *("criteria", "next_steps", "task_wrenches", "seed"),
 )
@@ -80,7 +80,7 @@ def command_to_dict(command: GraspCommand) -> dict[str, Any]:
         elif isinstance(value, Mapping):
             value = dict(value)
         elif isinstance(value, tuple):
-            value = [dict(v) if isinstance(v, Mapping) else v for v in value]
+            value = [dict(v) if isinstance(v, Mapping) else str(v) if isinstance(v, StrEnum) else v for v in value]
         elif isinstance(value, (Path, StrEnum)):
             value = str(value)
         document[key] = value
@@ -101,6 +101,8 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     for finger in _names(command.fingers, "fingers") or ():
         hand.finger(finger)
     _choice(command.order, ClosingOrder, "order")
+    if command.orders:
+        _orders(command.orders, "orders")
     _count(command.rounds, "rounds", least=0)
     if command.order != ClosingOrder.PROXIMAL_FIRST and command.rounds != 1:
         raise CommandError(
@@ -183,6 +185,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "preshape": lambda v, key: _weights(v, key, "a number in rad"),
         "fingers": _names,
         "order": lambda v, key: _choice(v, ClosingOrder, key),
+        "orders": _orders,
         "rounds": lambda v, key: _count(v, key, least=0),
         "speeds": lambda v, key: _weights(v, key, "a relative speed above 0"),
         "planes": _count,
@@ -313,6 +316,11 @@ def _wrench(value: Any, key: str) -> dict[str, tuple[float, ...]]:
     if not any(any(numbers) for numbers in found.values()):
         raise CommandError(f"{key}: expected a force or torque that is not 0.")
     return found
+
+
+def _orders(value: Any, key: str) -> tuple[ClosingOrder, ...]:
+    names = _names(value, key) or ()
+    return tuple(_choice(name, ClosingOrder, f"{key}[{i}]") for i, name in enumerate(names))
 
 
 def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | Path | str:

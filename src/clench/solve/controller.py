@@ -36,6 +36,7 @@ from clench.models.shapes import CollisionSource
 
 from .assembly import Answer, assemble
 from .certificate import certify
+from .orders import best_order
 from .solution import GraspSolution
 
 if TYPE_CHECKING:
@@ -94,6 +95,18 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     Raises:
         ClenchError: a command that does not fit the hand, or a hand that no plane can close.
     """
+    if command.orders:
+        check_command(hand, command)
+        solution = best_order(command, lambda single: solve(hand, obj, single))
+    else:
+        solution = _solve_order(hand, obj, command)
+    if record is not None:
+        record.append(solution)
+    return solution
+
+
+def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSolution:
+    """Solve a command in its one closing order."""
     clock = _Clock()
     problem = make_problem(hand, obj, command)
     calibration = calibration_of(command.criteria)
@@ -121,10 +134,7 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     clock.lap("sequence")
     answer = judge_answer(problem, fingers, chosen, best, exact, explained)
     clock.lap("judge")
-    solution = assemble(answer, problem, clock.stages())
-    if record is not None:
-        record.append(solution)
-    return solution
+    return assemble(answer, problem, clock.stages())
 
 
 def finger_sets(problem: Problem) -> list[list[FingerCandidate]]:

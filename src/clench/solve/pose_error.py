@@ -16,6 +16,7 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
 from .controller import solve
+from .orders import settled
 from .sensitivity import Sensitivity, sensitivity
 from .solution import GraspSolution, SolutionStatus
 
@@ -118,6 +119,7 @@ def pose_error(
         if not (np.isfinite(value) and 0.0 <= value <= most):
             raise CommandError(f"pose error: expected a {key} of 0 or more{_most(most)}, got {value}.")
     solution = solve(hand, obj, command) if solution is None else solution
+    command = settled(command, solution)
     at = np.array([solution.joint_angles[name] for name in hand.joint_names])
     touching = _touching(solution)
     sizes = np.repeat([translation, rotation], 3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,6 +15,7 @@ from .execute import execute
 
 if TYPE_CHECKING:
     from clench.base.pose import Pose
+    from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
@@ -56,7 +57,7 @@ def solve(
     scale: float = 1.0,
     collision_source: Source | None = None,
     planes: int | None = None,
-    order: Order | None = None,
+    order: tuple[Order, ...] = (),
     criteria: str | None = None,
     seed: int = 0,
     out: Path | None = None,
@@ -80,7 +81,7 @@ def solve(
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
         collision_source: geometry of the hand to solve for.
         planes: curl planes per finger.
-        order: in which the joints close.
+        order: in which the joints close; several are solved one by one, and the best is kept.
         criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
         seed: of the approach pose; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
@@ -101,6 +102,7 @@ def solve(
     from clench.grasp.mechanics.contacts import check_friction
     from clench.grasp.mechanics.loads import check_mass
     from clench.kernels.warming import warm_up
+    from clench.solve.orders import settled
     from clench.solve.pareto import hand_front
     from clench.solve.quality import DEFAULT_MASS
 
@@ -119,12 +121,13 @@ def solve(
         the_command = clench.GraspCommand(hand_pose=first_approach(the_hand, the_object, seed), seed=seed)
     if planes is not None:
         the_command = replace(the_command, planes=planes)
-    if order is not None:
-        the_command = replace(the_command, order=clench.ClosingOrder(order))
+    if order:
+        the_command = in_orders(the_command, order)
     if criteria is not None:
         the_command = replace(the_command, criteria=criteria)
     warm_up()
     solution = clench.solve(the_hand, the_object, the_command)
+    the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
     if json or forces or out is not None or record is not None:
         solution = clench.complete(solution, the_hand, the_object, mass=mass, friction=friction)
@@ -282,6 +285,16 @@ def first_approach(hand: Hand, obj: GraspObject, seed: int) -> Pose:
     if not len(poses):
         raise CommandError(f"No approach pose of hand '{hand.name}' on '{obj.name}' for seed {seed}; give --command.")
     return poses[0]
+
+
+def in_orders(command: GraspCommand, names: Sequence[Order]) -> GraspCommand:
+    """Return a command for one closing order, or for several as alternatives."""
+    from dataclasses import replace
+
+    from clench.models.command import ClosingOrder
+
+    orders = tuple(map(ClosingOrder, names))
+    return replace(command, order=orders[0], orders=()) if len(orders) == 1 else replace(command, orders=orders)
 
 
 def loadable(model: str) -> str:

@@ -194,6 +194,9 @@ def print_choice(solution: GraspSolution) -> None:
             out.print(_plain(f"{name}: {choice['fingers'][name]['text']}"))
             if choice["fingers"][name]["closed_again"]:
                 out.print(_plain(f"{name} met another finger and was closed again; its sum is that of before."))
+    if "orders" in choice:
+        out.print(_orders_table(choice["orders"]))
+        out.print(_plain(choice["orders"]["text"]))
     front = hand_front(solution)
     if len(front) > 1:
         out.print(_front_table(front))
@@ -270,6 +273,15 @@ def _finger_table(finger: FingerResult, choice: Mapping[str, Any]) -> Table:
         scores = [_score(candidate, name) for name in names]
         row = (mark, where, str(candidate.posture), *scores, f"{said['totals'][i]:.4f}", candidate.status.value)
         result.add_row(*map(_plain, row))
+    return result
+
+
+def _orders_table(orders: Mapping[str, Any]) -> Table:
+    """List the closing orders that were solved, or why they could not be."""
+    result = _table("closing orders (* chosen)", "", "order", "status", "sum")
+    for name, said in orders["compared"].items():
+        status, total = (said["refused"], "") if "refused" in said else (said["status"], f"{said['total']:.4f}")
+        result.add_row(*map(_plain, ("*" if name == orders["chosen"] else "", name, status, total)))
     return result
 
 

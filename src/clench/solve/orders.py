@@ -1,0 +1,135 @@
+"""Closing orders as alternatives: every order is solved by itself, and the best of the solutions is kept.
+
+An order is a matter of the whole hand: in `together` and `fingertip` all fingers close at once, and hold each other, so
+orders are not mixed over the fingers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from clench.base.errors import ClenchError
+from clench.grasp.explaining import say_what_decided
+from clench.models.command import ClosingOrder, GraspCommand
+
+from .examples import solve_scores
+from .solution import GraspSolution, SolutionStatus
+
+#: What puts one order before another, whatever the scores, strongest first; as `_Solved.rank` lists them.
+_TIERS: Final = (
+    "is a valid {status}",
+    "ends as {status}",
+    "is inside the limits of the calibration",
+    "has a value for every criterion",
+)
+_BEST_FIRST: Final = (
+    SolutionStatus.GRASP,
+    SolutionStatus.PARTIAL,
+    SolutionStatus.NO_CONTACT,
+    SolutionStatus.BLOCKED,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Hold the solution of one order, its scores by criterion, and what each adds to its weighted sum [-]."""
+
+    order: ClosingOrder
+    solution: GraspSolution
+    scores: Mapping[str, float]
+    worth: Mapping[str, float]
+
+    @property
+    def total(self) -> float:
+        """The weighted sum [-]."""
+        return sum(self.worth.values())
+
+    @property
+    def rank(self) -> tuple[bool, int, bool, int, float]:
+        """What is larger for the better order."""
+        solution = self.solution
+        place = -_BEST_FIRST.index(solution.status)
+        return solution.is_valid(), place, _inside_limits(solution), len(self.worth), round(self.total, 9)
+
+
+def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolution]) -> GraspSolution:
+    """Return the best of the solutions of a command's orders; its `choice` says how they compare.
+
+    Orders that the hand does not allow are left out, and said; of equal ones the first wins.
+
+    Args:
+        command: with at least one of `orders`. solve: solves a command of one order.
+
+    Raises:
+        ClenchError: no order can be solved; what the first says.
+    """
+    solved: list[_Solved] = []
+    refused: dict[ClosingOrder, ClenchError] = {}
+    for order in command.orders:
+        try:
+            solved.append(_judged(order, solve(replace(command, order=order, orders=()))))
+        except ClenchError as error:
+            refused[order] = error
+    if not solved:
+        raise refused[command.orders[0]]
+    ranked = sorted(solved, key=lambda s: s.rank, reverse=True)
+    best = ranked[0]
+    compared: dict[str, Any] = {str(s.order): _described(s) for s in solved}
+    compared |= {str(order): {"refused": str(error)} for order, error in refused.items()}
+    text = _text(best, ranked[1]) if len(ranked) > 1 else f"{best.order} is the only order that could be solved."
+    choice = {**(best.solution.choice or {}), "orders": {"chosen": str(best.order), "text": text, "compared": compared}}
+    stages = dict.fromkeys(stage for s in solved for stage in s.solution.timing)
+    timing = {stage: sum(s.solution.timing.get(stage, 0.0) for s in solved) for stage in stages}
+    return replace(best.solution, choice=choice, timing=timing)
+
+
+def settled(command: GraspCommand, solution: GraspSolution) -> GraspCommand:
+    """Return a command with the order that a solution of it was closed in."""
+    orders = (solution.choice or {}).get("orders")
+    if not command.orders or orders is None:
+        return command
+    return replace(command, order=ClosingOrder(orders["chosen"]), orders=())
+
+
+def _judged(order: ClosingOrder, solution: GraspSolution) -> _Solved:
+    scores, worth = solve_scores(solution), {}
+    for name, c in (solution.choice or {}).get("criteria", {}).items():
+        if name in scores:
+            sign = 1.0 if c["better"] == "more" else -1.0
+            worth[name] = sign * c["weight"] * scores[name] / c["scale"]
+    return _Solved(order, solution, scores, worth)
+
+
+def _inside_limits(solution: GraspSolution) -> bool:
+    choice = solution.choice or {}
+    chosen = [f.candidates[f.chosen].scores for f in solution.fingers.values() if f.candidates]
+    for name, c in choice.get("criteria", {}).items():
+        values = [scores[name] for scores in (*chosen, choice["final_hand_scores"]) if name in scores]
+        limit = c["limit"]
+        if limit is not None and not all(v >= limit if c["better"] == "more" else v <= limit for v in values):
+            return False
+    return True
+
+
+def _described(solved: _Solved) -> dict[str, Any]:
+    return {
+        "status": solved.solution.status.value,
+        "valid": solved.solution.is_valid(),
+        "scores": {name: solved.scores[name] for name in solved.worth},
+        "total": solved.total,
+    }
+
+
+def _text(best: _Solved, second: _Solved) -> str:
+    """Return the sentence that says why an order won."""
+    for what, ours, theirs in zip(_TIERS, best.rank, second.rank, strict=False):
+        if ours != theirs:
+            said = what.format(status=best.solution.status.value)
+            return f"{best.order} comes before {second.order} because it {said}."
+    lead = best.total - second.total
+    gains = {name: worth - second.worth[name] for name, worth in best.worth.items() if name in second.worth}
+    if best.rank == second.rank or not gains:
+        return f"{best.order} and {second.order} score the same; the first goes before the second."
+    return f"{best.order} leads {second.order} by {lead:.3g}; {say_what_decided(gains, best.scores, second.scores)}"
