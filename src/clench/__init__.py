@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from clench.execution.drivers.orca import OrcaDriver
     from clench.execution.drivers.ros2 import Ros2Driver
     from clench.execution.executing import Actuator, execute
+    from clench.execution.filming import Film
     from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
     from clench.execution.formats.grasp_posture import GraspPosture
     from clench.execution.formats.mcap_log import write_log
@@ -77,6 +78,7 @@ _HOMES = {
     "ExecutionHistory": "clench.execution.history",
     "ExecutionReport": "clench.execution.report",
     "FileError": "clench.base.errors",
+    "Film": "clench.execution.filming",
     "Finding": "clench.models.hand.findings",
     "FindingCode": "clench.models.hand.findings",
     "FingerResult": "clench.solve.solution",
@@ -148,6 +150,7 @@ __all__ = [
     "ExecutionHistory",
     "ExecutionReport",
     "FileError",
+    "Film",
     "Finding",
     "FindingCode",
     "FingerResult",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from clench.execution.executing import execute
 from clench.execution.hold import Hold
 from clench.execution.pulling import hold_and_pull, joint_torques
 from clench.execution.report import ExecutionReport
-from clench.execution.scene import build_scene
+from clench.execution.scene import build_scene, lowest
 from clench.execution.simulation import SimulatedHand
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
@@ -85,6 +86,89 @@ def test_without_a_squeeze_the_object_falls_freely(pincer: Hand, pinch: GraspSol
     assert free.motion.distance == pytest.approx(expected, rel=1e-3)
 
 
+def test_the_free_object_hardly_moves_while_the_hand_closes(
+    pincer: Hand, pinch: GraspSolution, ball: GraspObject
+) -> None:
+    """From the pregrasp all fingers arrive at once, so nothing pushes the object aside."""
+    held = carried_out(pinch, pincer, ball, replace(FIRM, duration=0.1)).hold
+    assert held is not None
+    assert held.closed.distance < 5e-5
+    assert held.touch_spread is not None
+    assert held.touch_spread <= 0.005
+    assert set(held.first_touch) == {"thumb", "index"}
+    for force in held.forces.values():
+        assert force.measured == pytest.approx(force.planned, rel=0.15)
+    assert held.held_within(0.005, np.deg2rad(5.0))
+    assert not held.held_within(1e-9, np.deg2rad(5.0))
+
+
+def test_motions_count_from_before_the_hand_closed(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
+    """A trajectory that closes one finger only pushes the ball away, and that alone is a drop."""
+    way = plan_trajectory(pinch, pincer, obj=ball)
+    positions = way.positions.copy()
+    positions[:, 1:] = 0.0
+    positions[:, 0] *= 2.5
+    held = hold_and_pull(pinch, pincer, ball, replace(FIRM, squeeze=0.0), replace(way, positions=positions))
+    assert held.closed.distance > 0.01
+    assert held.pulls["+x"].farthest.distance >= held.closed.distance
+    assert not held.held
+
+
+def on_a_table(pinch: GraspSolution, ball: GraspObject, tilt: float) -> tuple[GraspSolution, GraspObject]:
+    """Return the pinch with the palm beside the ball and its fingers pointing down by an angle [rad]."""
+    sine, cosine = np.sin(tilt), np.cos(tilt)
+    T = np.eye(4)
+    T[:3, :3] = np.array([[0.0, sine, cosine], [1.0, 0.0, 0.0], [0.0, cosine, -sine]])
+    T[2, 3] = 0.2
+    palm = Pose.from_matrix(T)
+    old, place = pinch.hand_pose, palm @ pinch.hand_pose.inverse() @ ball.pose
+    contacts = tuple(
+        replace(
+            c,
+            position=palm.apply(old.inverse().apply(c.position)),
+            normal=palm.rotation @ old.rotation.T @ c.normal,
+        )
+        for c in pinch.contacts
+    )
+    return replace(pinch, hand_pose=palm, object_pose=place, contacts=contacts), ball.posed(place)
+
+
+def test_lifted_from_a_table(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
+    solution, placed = on_a_table(pinch, ball, np.deg2rad(15.0))
+    way = plan_trajectory(solution, pincer, obj=placed)
+    lift = replace(FIRM, test="lift", duration=0.5)
+    held = hold_and_pull(solution, pincer, placed, lift, way)
+    assert held.held, held.reason
+    assert set(held.pulls) == {"lift"}
+    assert held.pulls["lift"].time == pytest.approx(0.9)
+    assert held.pulls["lift"].farthest.distance < 3e-3
+    assert "Held when lifted by 0.1 m" in held.reason
+    left = hold_and_pull(solution, pincer, placed, replace(lift, squeeze=0.0), way)
+    assert not left.held
+    assert left.reason == "Dropped when lifted by 0.1 m."
+    # It stays where it stands while the palm goes up, until it is 5 cm behind.
+    assert left.pulls["lift"].motion.distance == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_hand_that_would_be_in_the_table_is_not_tested(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
+    """Straight down, the fingers reach 8.8 cm from the palm and the ball's lowest point is 7 cm from it."""
+    solution, placed = on_a_table(pinch, ball, np.deg2rad(90.0))
+    way = plan_trajectory(solution, pincer, obj=placed)
+    held = hold_and_pull(solution, pincer, placed, replace(FIRM, test="lift"), way)
+    assert not held.held
+    assert held.pulls == {}
+    found = re.fullmatch(r"Not tested: the hand would be (.*) mm deep in the table\.", held.reason)
+    assert found is not None, held.reason
+    q = posture(pinch.joint_angles, pincer, "joint_angles")
+    thumb = pincer.link_poses(q)[1]
+    lowest_point = (thumb @ np.array([0.0, 0.0, 0.08, 1.0]))[2] + 0.008
+    assert float(found[1]) >= (lowest_point - 0.07) * 1e3 - 0.1
+
+
+def test_the_table_is_under_the_lowest_point(ball: GraspObject) -> None:
+    assert lowest(ball) == pytest.approx(ball.pose.position[2] - 0.02, abs=2e-5)
+
+
 def test_a_slippery_ball_is_dropped(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
     report = carried_out(pinch, pincer, ball, replace(FIRM, friction=0.001))
     assert report.hold is not None
@@ -147,6 +231,8 @@ def test_a_free_object_weighs_what_was_asked(pincer: Hand, pinch: GraspSolution,
         ({"pull": 0.0}, r"hold: pull: expected a finite number above 0, got 0.0"),
         ({"duration": float("inf")}, r"hold: duration: .* got inf"),
         ({"max_angle": -1.0}, r"hold: max_angle: .* got -1.0"),
+        ({"test": "shake"}, r"hold: test: expected one of pulls, lift, got 'shake'"),
+        ({"height": 0.0}, r"hold: height: expected a finite number above 0, got 0.0"),
         ({"contact_model": "firm"}, r"hold: contact_model: expected one of point, soft, got 'firm'"),
     ],
 )

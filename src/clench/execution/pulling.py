@@ -15,8 +15,9 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 from clench.solve.squeezing import DOWN, SqueezePlan, plan_squeeze
 
+from .filming import Film
 from .hold import FingerForce, Hold, HoldReport, HoldTest, ObjectMotion, Pulled
-from .scene import TIMESTEP, Scene, build_scene
+from .scene import TABLE, TIMESTEP, Scene, build_scene
 from .touching import TouchWatch
 from .trajectory import Trajectory
 
@@ -24,6 +25,8 @@ from .trajectory import Trajectory
 SETTLING, SQUEEZING, STANDING = 0.1, 0.4, 0.2
 #: How long the palm takes to move up [s].
 LIFTING = 0.4
+#: A hand that would be deeper in the table is not tested [m].
+TABLE_OVERLAP = 1e-3
 #: How often the object is looked at while it is pulled [s].
 LOOK_INTERVAL = 0.02
 #: The directions of the pulls in the world.
@@ -57,6 +60,7 @@ def hold_and_pull(
     hold: Hold,
     trajectory: Trajectory,
     *,
+    film: Film | None = None,
     show_progress: bool = False,
 ) -> HoldReport:
     """Close from the pregrasp on a free object, squeeze it, and pull it in six directions from there, or lift it.
@@ -67,10 +71,11 @@ def hold_and_pull(
     Args:
         solution: the solution. hand: the hand. obj: the object, at its pose. hold: the test.
         trajectory: the way to the touch, from its pregrasp on; all of it where it has none.
+        film: takes pictures of closing, squeeze, and the last pull or the lift.
         show_progress: show a bar while convex pieces are computed.
 
     Raises:
-        HandError, ObjectError: see `build_scene`. CommandError: see `plan_squeeze`.
+        HandError, ObjectError: see `build_scene`. CommandError: see `plan_squeeze`. ClenchError: nothing can be drawn.
     """
     import mujoco
 
@@ -84,15 +89,16 @@ def hold_and_pull(
     count = len(hand.joints)
     command = computed + torques / scene.model.actuator_gainprm[:count, 0]
     data = mujoco.MjData(scene.model)
-    watch = TouchWatch(scene, hand)
+    sunk = _in_table(scene, (trajectory.positions[trajectory.pregrasp or 0], computed))
+    watch = TouchWatch(scene, hand, film)
     before = _close(scene, data, trajectory, watch)
     touch = _place_of(scene, data)
     _squeeze(scene, data, (computed, command), watch)
     squeezed, stable = _place_of(scene, data), _stable(data)
-    pulls = _tested(scene, data, hold, before) if stable else {}
+    pulls = _tested(scene, data, hold, before, film) if stable and sunk <= TABLE_OVERLAP else {}
     return HoldReport(
-        held=stable and all(pulled.held for pulled in pulls.values()),
-        reason=_sentence(pulls, hold),
+        held=bool(pulls) and all(pulled.held for pulled in pulls.values()),
+        reason=_sentence(pulls, hold, sunk),
         settings=hold,
         plan=plan.text,
         planned=plan.feasible,
@@ -153,11 +159,14 @@ def _close(scene: Scene, data: Any, trajectory: Trajectory, watch: TouchWatch) -
     data.ctrl[:count] = trajectory.positions[begin]
     mujoco.mj_forward(scene.model, data)
     before = _place_of(scene, data)
+    if watch.film is not None:
+        watch.film.begin(scene, data)
     for _ in range(round((trajectory.duration - at + SETTLING) / TIMESTEP)):
         data.ctrl[:count] = trajectory.at(at + data.time)
         mujoco.mj_step(scene.model, data)
         watch.look(data)
     mujoco.mj_forward(scene.model, data)
+    watch.still("touch", data)
     return before
 
 
@@ -171,9 +180,10 @@ def _squeeze(scene: Scene, data: Any, ends: tuple[FloatArray, FloatArray], watch
         mujoco.mj_step(scene.model, data)
         watch.look(data)
     mujoco.mj_forward(scene.model, data)
+    watch.still("squeeze", data)
 
 
-def _tested(scene: Scene, squeezed: Any, hold: Hold, before: _Place) -> dict[str, Pulled]:
+def _tested(scene: Scene, squeezed: Any, hold: Hold, before: _Place, film: Film | None) -> dict[str, Pulled]:
     import mujoco
 
     tests = {"lift": np.zeros(3)} if hold.test == HoldTest.LIFT else DIRECTIONS
@@ -182,11 +192,11 @@ def _tested(scene: Scene, squeezed: Any, hold: Hold, before: _Place) -> dict[str
         data = mujoco.MjData(scene.model)
         mujoco.mj_copyData(data, scene.model, squeezed)
         data.xfrc_applied[scene.object_body, :3] = hold.pull * hold.mass * direction
-        found[name] = _pull(scene, data, hold, before)
+        found[name] = _pull(scene, data, hold, before, film if name == [*tests][-1] else None)
     return found
 
 
-def _pull(scene: Scene, data: Any, hold: Hold, before: _Place) -> Pulled:
+def _pull(scene: Scene, data: Any, hold: Hold, before: _Place, film: Film | None) -> Pulled:
     """Simulate a pull, or the lift; the object is compared with where it was before, raised with the palm."""
     import mujoco
 
@@ -202,6 +212,8 @@ def _pull(scene: Scene, data: Any, hold: Hold, before: _Place) -> Pulled:
                 part = min(1.0, taken * TIMESTEP / LIFTING)
                 data.ctrl[-1] = hold.height * part * part * (3.0 - 2.0 * part)
             mujoco.mj_step(scene.model, data)
+            if film is not None:
+                film.look(data)
         mujoco.mj_kinematics(scene.model, data)
         mujoco.mj_comPos(scene.model, data)
         if not _stable(data):
@@ -210,6 +222,8 @@ def _pull(scene: Scene, data: Any, hold: Hold, before: _Place) -> Pulled:
             height = float(data.qpos[scene.lift])
         motion = before.raised(height).motion_to(_place_of(scene, data))
         farthest = ObjectMotion(max(farthest.distance, motion.distance), max(farthest.angle, motion.angle))
+    if film is not None:
+        film.still("end", data)
     return Pulled(_within(motion, hold), motion, farthest, taken * TIMESTEP)
 
 
@@ -230,7 +244,24 @@ def _stable(data: Any) -> bool:
     return not any(data.warning[kind].number for kind in kinds)
 
 
-def _sentence(pulls: dict[str, Pulled], hold: Hold) -> str:
+def _in_table(scene: Scene, postures: tuple[FloatArray, ...]) -> float:
+    """Return how deep the hand is in the table in the worst of some postures [m], 0 without a table."""
+    import mujoco
+
+    table = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_GEOM, TABLE)
+    data, deepest = mujoco.MjData(scene.model), 0.0
+    for q in postures if table >= 0 else ():
+        data.qpos[scene.qpos] = q
+        mujoco.mj_forward(scene.model, data)
+        geoms = data.contact.geom
+        mine = (geoms == table).any(axis=1) & ~np.isin(geoms, scene.object_geoms).any(axis=1)
+        deepest = max(deepest, -float(data.contact.dist[mine].min(initial=0.0)))
+    return deepest
+
+
+def _sentence(pulls: dict[str, Pulled], hold: Hold, sunk: float) -> str:
+    if sunk > TABLE_OVERLAP:
+        return f"Not tested: the hand would be {sunk * 1e3:.2g} mm deep in the table."
     if not pulls:
         return "Not tested: the simulation did not stay finite while the object was squeezed."
     far = max(p.farthest.distance for p in pulls.values())

@@ -21,6 +21,7 @@ from .hold import Hold, HoldTest
 PREFIX = "hand/"
 BASE = "hand base"
 LIFT = "lift"
+TABLE = "table"
 TIMESTEP = 0.002
 #: Bandwidth of the servos [rad/s]: fast beside the motion, slow beside the time step.
 SERVO_BANDWIDTH = 100.0
@@ -30,6 +31,8 @@ ARMATURE = 1e-3
 TOUCHING = 1e-5
 #: Elements of a hand's model that would compete with the servos, and settings that the scene makes.
 _REPLACED = ("actuator", "sensor", "tendon", "equality", "keyframe", "option", "size", "statistic", "visual")
+#: Of the object in pictures: red, green, blue, and how solid.
+COLOR = (0.93, 0.55, 0.2, 1.0)
 _ALL_BITS = 0x7FFFFFFF
 
 
@@ -91,6 +94,7 @@ def build_scene(
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    _light(spec)
     _add_hand(spec, hand, lifted)
     if free is not None:
         # Without these, friction of the engine creeps: a held object slides out slowly.
@@ -109,6 +113,15 @@ def build_scene(
     _tune(scene)
     _place(scene, hand, hand_pose, q)
     return scene
+
+
+def _light(spec: Any) -> None:
+    """Make pictures bright, on a white ground."""
+    import mujoco
+
+    spec.visual.headlight.ambient, spec.visual.headlight.diffuse = [0.45] * 3, [0.55] * 3
+    sky = {"type": mujoco.mjtTexture.mjTEXTURE_SKYBOX, "builtin": mujoco.mjtBuiltin.mjBUILTIN_FLAT}
+    spec.add_texture(name="sky", width=16, height=96, rgb1=[1.0] * 3, rgb2=[1.0] * 3, **sky)
 
 
 def _add_hand(spec: Any, hand: Hand, lifted: bool) -> None:
@@ -183,8 +196,8 @@ def _add_object(spec: Any, obj: GraspObject, free: Hold | None, show_progress: b
 def _add_table(spec: Any, height: float, surface: dict[str, Any]) -> None:
     import mujoco
 
-    place = {"pos": [0.0, 0.0, height], "size": [2.0, 2.0, 0.1]}
-    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, **place, **surface)
+    own = {"pos": [0.0, 0.0, height], "size": [2.0, 2.0, 0.1], "rgba": [0.8, 0.82, 0.85, 1.0]}
+    spec.worldbody.add_geom(name=TABLE, type=mujoco.mjtGeom.mjGEOM_PLANE, **(surface | own))
 
 
 def lowest(obj: GraspObject) -> float:
@@ -239,7 +252,7 @@ def _surface(free: Hold | None) -> dict[str, Any]:
         "priority": 1,
         "solref": [2 * TIMESTEP, 1.0],
     }
-    found["gap"] = TOUCHING
+    found |= {"gap": TOUCHING, "rgba": COLOR}
     if free is not None:
         found |= {"condim": 4, "friction": [free.friction, free.torsion, 0.0]}
     return found

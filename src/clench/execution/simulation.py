@@ -13,6 +13,7 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import Contact, FingerStatus, GraspSolution
 
+from .filming import Film
 from .history import ExecutionHistory
 from .hold import Hold, HoldReport
 from .pulling import hold_and_pull
@@ -41,6 +42,7 @@ class SimulatedHand:
         show_progress: show a bar while convex pieces are computed.
         hold: once the touch is reached, do it again with a free object, squeeze it as planned, and pull or lift it;
             without it the object stays where it is.
+        film: takes pictures: of the hold test where there is one, else of closing.
         on_step: called with time [s], joint angles [rad] in model order, shape (J,), every 20 ms and at the end.
     """
 
@@ -55,6 +57,7 @@ class SimulatedHand:
         contact_tolerance: float = 0.001,
         show_progress: bool = False,
         hold: Hold | None = None,
+        film: Film | None = None,
         on_step: Callable[[float, FloatArray], None] | None = None,
     ) -> None:
         self._hand = hand
@@ -63,6 +66,7 @@ class SimulatedHand:
         self.contact_tolerance = contact_tolerance
         self.show_progress = show_progress
         self.hold = hold
+        self.film = film
         self.on_step = on_step
 
     @property
@@ -81,7 +85,7 @@ class SimulatedHand:
         obj = self.obj.posed(solution.object_pose)
         start = trajectory.positions[0]
         scene = build_scene(self.hand, obj, solution.hand_pose, start, show_progress=self.show_progress)
-        watch = TouchWatch(scene, self.hand)
+        watch = TouchWatch(scene, self.hand, self.film if self.hold is None else None)
         data, history = self._run(scene, trajectory, watch)
         reached = np.array(data.qpos[scene.qpos])
         joints = {
@@ -122,7 +126,9 @@ class SimulatedHand:
     def _held(self, solution: GraspSolution, obj: GraspObject, trajectory: Trajectory) -> HoldReport | None:
         if self.hold is None:
             return None
-        return hold_and_pull(solution, self.hand, obj, self.hold, trajectory, show_progress=self.show_progress)
+        return hold_and_pull(
+            solution, self.hand, obj, self.hold, trajectory, film=self.film, show_progress=self.show_progress
+        )
 
     def _notes_on_hold(self, held: HoldReport | None) -> tuple[str, ...]:
         if self.hold is None:
@@ -142,6 +148,8 @@ class SimulatedHand:
         data.qpos[scene.qpos] = trajectory.positions[0]
         data.ctrl[:] = trajectory.positions[0]
         mujoco.mj_forward(scene.model, data)
+        if watch.film is not None:
+            watch.film.begin(scene, data)
         times: list[float] = []
         measured: list[FloatArray] = []
         every = round(WATCH_INTERVAL / TIMESTEP)
@@ -156,6 +164,7 @@ class SimulatedHand:
             watch.look(data)
         mujoco.mj_forward(scene.model, data)
         watch.look(data)
+        watch.still("touch", data)
         if self.on_step is not None:
             self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
         commanded = np.array([trajectory.at(time) for time in times])

@@ -8,6 +8,7 @@ import numpy as np
 
 from clench.models.hand.hand import Hand
 
+from .filming import Film
 from .scene import Scene
 
 
@@ -15,11 +16,12 @@ class TouchWatch:
     """Note when each finger first touches the object, and how hard the fingers press.
 
     Args:
-        scene: the scene. hand: the hand in it.
+        scene: the scene. hand: the hand in it. film: takes a picture of what is looked at, too.
     """
 
-    def __init__(self, scene: Scene, hand: Hand) -> None:
+    def __init__(self, scene: Scene, hand: Hand, film: Film | None = None) -> None:
         self._scene = scene
+        self.film = film
         self._names = tuple(finger.name for finger in hand.fingers)
         #: Finger of every geom, -1 without one, shape (G,).
         self._finger = np.full(scene.model.ngeom, -1)
@@ -33,12 +35,19 @@ class TouchWatch:
 
     def look(self, data: Any) -> None:
         """Note the fingers that touch now for the first time."""
+        if self.film is not None:
+            self.film.look(data)
         if None not in self.first.values():
             return
         for number in set(self._touching(data)[1].tolist()):
             name = self._names[number]
             if self.first[name] is None:
                 self.first[name] = float(data.time)
+
+    def still(self, name: str, data: Any) -> None:
+        """Keep a picture, if there is a film."""
+        if self.film is not None:
+            self.film.still(name, data)
 
     def normal_forces(self, data: Any) -> dict[str, float]:
         """Return the sum of the normal forces of every finger on the object [N]."""

@@ -68,7 +68,7 @@ class Trial:
         if self.report.held:
             return "held"
         if not self.report.pulls:
-            return "unstable"
+            return "hand_in_the_table" if "table" in self.report.reason else "unstable"
         if not self.report.closed.within(*limits):
             return "pushed_away_while_closing"
         if not self.report.planned:

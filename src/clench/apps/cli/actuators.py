@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,6 +13,7 @@ from clench.base.errors import CommandError
 if TYPE_CHECKING:
     from clench.execution.driver import HandDriver
     from clench.execution.executing import Actuator
+    from clench.execution.filming import Film
     from clench.execution.hold import Hold
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
@@ -33,11 +36,12 @@ class ActuatorOptions:
     record: Path | None
     hold: Hold | None = None
     squeeze: float | None = None
+    film: Film | None = None
 
 
 #: Which options mean something to which actuator; any other that is given is refused.
 _TAKEN: dict[str, tuple[str, ...]] = {
-    "simulated": ("hold",),
+    "simulated": ("hold", "film"),
     "ros2": ("controller", "joint_states", "interface", "joint_map", "squeeze"),
     "orca": ("joint_map", "config", "squeeze"),
     "orca-mock": ("joint_map", "config", "squeeze"),
@@ -61,7 +65,7 @@ def make_actuator(
     if not options.timeout > 0.0:
         raise CommandError(f"--timeout: expected seconds above 0, got {options.timeout:g}.")
     if name == "simulated":
-        return clench.SimulatedHand(hand, obj, show_progress=show_progress, hold=options.hold)
+        return clench.SimulatedHand(hand, obj, show_progress=show_progress, hold=options.hold, film=options.film)
     if name == "signal":
         if options.to is None or options.record is None:
             raise CommandError("--actuator signal needs --to (file:PATH, tcp:HOST:PORT, …) and --record DB.")
@@ -74,8 +78,23 @@ def make_actuator(
     )
 
 
-def make_hold(hold: bool, mass: float | None, friction: float | None) -> Hold | None:
-    """Return the hold test that was asked for, None without `--hold`.
+def make_film(video: Path | None, stills: Path | None) -> Film | None:
+    """Return the film that was asked for; this comes before anything of MuJoCo, which looks once for OpenGL.
+
+    Raises:
+        FileError: a file or folder cannot be written.
+    """
+    if video is None and stills is None:
+        return None
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("MUJOCO_GL", "egl")
+    from clench.execution.filming import Film
+
+    return Film(video, stills)
+
+
+def make_hold(hold: bool, lift: bool, mass: float | None, friction: float | None) -> Hold | None:
+    """Return the hold test that was asked for, None without `--hold` and `--lift`.
 
     Raises:
         CommandError: an option of the test without it; a value out of range.
@@ -84,9 +103,11 @@ def make_hold(hold: bool, mass: float | None, friction: float | None) -> Hold | 
 
     given: dict[str, Any] = {"mass": mass, "friction": friction}
     given = {key: value for key, value in given.items() if value is not None}
-    if not hold and given:
-        raise CommandError(f"--{next(iter(given))} means nothing without --hold.")
-    return clench.Hold(**given) if hold else None
+    if hold and lift:
+        raise CommandError("--hold and --lift are two tests: give one of them.")
+    if not (hold or lift) and given:
+        raise CommandError(f"--{next(iter(given))} means nothing without --hold or --lift.")
+    return clench.Hold(test="lift" if lift else "pulls", **given) if hold or lift else None
 
 
 def _driver(name: ActuatorName, options: ActuatorOptions) -> HandDriver:

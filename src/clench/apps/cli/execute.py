@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clench.base.errors import FileError
 
-from .actuators import ActuatorName, ActuatorOptions, Interface, make_actuator, make_hold
+from .actuators import ActuatorName, ActuatorOptions, Interface, make_actuator, make_film, make_hold
 from .interrupts import stopped_by_signals
 
 
@@ -23,6 +23,7 @@ def execute(
     speed: float = 1.0,
     force: bool = False,
     hold: bool = False,
+    lift: bool = False,
     mass: float | None = None,
     friction: float | None = None,
     controller: str | None = None,
@@ -30,6 +31,8 @@ def execute(
     interface: Interface | None = None,
     joint_map: Path | None = None,
     config: Path | None = None,
+    video: Path | None = None,
+    stills: Path | None = None,
     squeeze: float | None = None,
     timeout: float = 5.0,
     to: str | None = None,
@@ -51,14 +54,17 @@ def execute(
         scale: that was used to load the object.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, too.
-        hold: simulated: after the touch release the object, squeeze it as planned, pull it in six directions.
-        mass: hold: of the object, kg (0.1).
-        friction: hold: of its contacts (0.6).
+        hold: simulated: close on the free object, squeeze it as planned, pull it in six directions.
+        lift: simulated: close on the object where it stands on a table, squeeze it as planned, lift it.
+        mass: hold, lift: of the object, kg (0.1).
+        friction: hold, lift: of its contacts (0.6).
         controller: ros2: name of the joint_trajectory_controller (hand_controller).
         joint_states: ros2: topic of the joint states (/joint_states).
         interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
         joint_map: ros2, orca: TOML file with the controller's joint names, units, offsets and limits.
         config: orca: the hand's config.yaml.
+        video: simulated: file for a moving picture (GIF).
+        stills: simulated: folder for pictures of the start, the touch, the squeeze and the end (PNG).
         squeeze: ros2, orca: share of the squeeze plan's angle offsets that is told beyond the touch (1).
         timeout: seconds to look for the controller.
         to: signal: file:PATH, tcp:HOST:PORT, unix:PATH or topic:NAME.
@@ -78,7 +84,8 @@ def execute(
     for file in (out, log):
         if file is not None and not file.parent.is_dir():
             raise FileError(file, f"cannot be written (no folder '{file.parent}').")
-    tested = make_hold(hold, mass, friction)
+    film = make_film(video, stills)
+    tested = make_hold(hold, lift, mass, friction)
     the_solution = clench.GraspSolution.load(solution)
     the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(
@@ -87,11 +94,13 @@ def execute(
         collision_source=the_solution.object_collision_source,
     )
     options = ActuatorOptions(
-        controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze
+        controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze, film
     )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
         report = clench.execute(the_solution, moved, speed=speed, force=force)
+    if film is not None:
+        film.finish()
     if log is not None and report.history is None:
         report = replace(report, notes=(*report.notes, "Nothing was measured on the way: no log was written."))
     elif log is not None:

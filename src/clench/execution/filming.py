@@ -1,0 +1,133 @@
+"""Film a simulation: a moving picture (GIF) and stills (PNG), on request."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from clench.base.errors import ClenchError, FileError
+from clench.base.json_files import write_atomically
+
+from .scene import Scene
+
+#: Time between two pictures [s]; a GIF counts hundredths.
+FRAME: Final = 0.04
+_WIDTH, _HEIGHT = 640, 480
+#: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
+_DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
+#: How much higher it looks where the palm moves up [m].
+_UP: Final = 0.05
+
+
+@dataclass
+class Film:
+    """Take pictures of a simulation and write them.
+
+    Drawing needs OpenGL: without a screen set MUJOCO_GL=egl before anything of MuJoCo is imported.
+
+    Args:
+        video: a GIF file, at the speed of the simulation. stills: a folder for pictures of the start, the touch, the
+            squeeze and the end.
+    """
+
+    video: Path | None = None
+    stills: Path | None = None
+    _frames: list[Any] = field(default_factory=list, init=False, repr=False)
+    _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _renderer: Any = field(default=None, init=False, repr=False)
+    _camera: Any = field(default=None, init=False, repr=False)
+    _due: float = field(default=0.0, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be written.
+
+        Raises:
+            FileError: another kind of file than GIF, or a folder that does not exist.
+        """
+        if self.video is not None and self.video.suffix.lower() != ".gif":
+            raise FileError(self.video, "cannot be written: expected a file name that ends with .gif.")
+        if self.video is not None and not self.video.parent.is_dir():
+            raise FileError(self.video, f"cannot be written (no folder '{self.video.parent}').")
+        if self.stills is not None and self.stills.exists() and not self.stills.is_dir():
+            raise FileError(self.stills, "cannot be written: it is no folder.")
+
+    def begin(self, scene: Scene, data: Any) -> None:
+        """Point the camera at the hand and the object.
+
+        Raises:
+            ClenchError: there is no OpenGL to draw with.
+        """
+        import mujoco
+
+        try:
+            self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
+        except Exception as error:  # whatever the graphics library raises
+            raise ClenchError(
+                f"No video: OpenGL cannot draw here ({error}). Without a screen, install Mesa's libegl1 and set "
+                "MUJOCO_GL=egl."
+            ) from None
+        bodies = [body for body in scene.link_bodies if body >= 0] + [scene.object_body]
+        places = data.xipos[bodies]
+        self._camera = mujoco.MjvCamera()
+        self._camera.lookat[:] = 0.5 * (places.min(axis=0) + places.max(axis=0))
+        self._camera.distance = _DISTANCE * max(float(np.ptp(places, axis=0).max()), 0.1)
+        if scene.lift >= 0:
+            self._camera.lookat[2] += _UP
+            self._camera.distance += 2.0 * _UP
+        self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
+        self._frames, self._kept, self._due = [], {}, float(data.time)
+        self.still("start", data)
+
+    def look(self, data: Any) -> None:
+        """Take a picture when one is due."""
+        if self.video is not None and data.time >= self._due - 1e-9:
+            self._frames.append(self._drawn(data))
+            self._due += FRAME
+
+    def still(self, name: str, data: Any) -> None:
+        """Keep a picture."""
+        if self.stills is not None:
+            self._kept[name] = self._drawn(data)
+
+    def finish(self) -> tuple[Path, ...]:
+        """Write what was taken; return the files.
+
+        Raises:
+            FileError: a file cannot be written.
+        """
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+        written = []
+        if self.video is not None and self._frames:
+            first, *others = self._frames
+            content = io.BytesIO()
+            first.save(
+                content, "GIF", save_all=True, append_images=others, duration=round(FRAME * 1000), loop=0, optimize=True
+            )
+            written.append(_written(self.video, content))
+        for number, (name, picture) in enumerate(self._kept.items(), start=1):
+            assert self.stills is not None
+            content = io.BytesIO()
+            picture.save(content, "PNG")
+            written.append(_written(self.stills / f"{number}_{name}.png", content))
+        return tuple(written)
+
+    def _drawn(self, data: Any) -> Any:
+        from PIL import Image
+
+        self._renderer.update_scene(data, self._camera)
+        return Image.fromarray(self._renderer.render())
+
+
+def _written(path: Path, content: io.BytesIO) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(path.parent, f"cannot be made a folder ({error.strerror or error}).") from None
+    write_atomically(path, content.getvalue())
+    return path

@@ -1,0 +1,79 @@
+"""Pictures of a simulation: as many as its time asks for, of what happens, or one sentence why not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clench.apps.cli.actuators import make_film, make_hold
+from clench.base.errors import ClenchError, CommandError, FileError
+from clench.execution.executing import execute
+from clench.execution.filming import FRAME, Film
+from clench.execution.hold import Hold
+from clench.execution.simulation import SimulatedHand
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.solution import GraspSolution
+
+
+@pytest.mark.parametrize("hold", [None, Hold(friction=1.0, contact_model="soft", duration=0.2)])
+def test_a_film_is_as_long_as_what_it_shows(
+    pincer: Hand, pinch: GraspSolution, ball: GraspObject, tmp_path: Path, hold: Hold | None
+) -> None:
+    from PIL import Image
+
+    film = Film(tmp_path / "grasp.gif", tmp_path / "stills")
+    try:
+        report = execute(pinch, SimulatedHand(pincer, ball, hold=hold, film=film))
+    except ClenchError as error:
+        if "OpenGL cannot draw here" in str(error):
+            pytest.skip("no OpenGL here")
+        raise
+    video, *stills = film.finish()
+    names = ["1_start.png", "2_touch.png"] if hold is None else [f"{n}" for n in _ALL]
+    assert [path.name for path in stills] == names
+    with Image.open(video) as picture:
+        # Pictures that equal the one before are kept as one that is shown longer.
+        shown = 0
+        for k in range(picture.n_frames):
+            picture.seek(k)
+            shown += picture.info["duration"]
+    if hold is None:
+        assert shown / 1000.0 == pytest.approx(report.duration, abs=2 * FRAME)
+    start, touch = (np.asarray(Image.open(path)).astype(int) for path in stills[:2])
+    assert start.shape == (480, 640, 3)
+    assert (np.abs(start - touch).max(axis=2) > 50).sum() > 500  # the fingers have moved
+    orange = (start[..., 0] > 150) & (start[..., 2] < 100)
+    assert orange.sum() > 500  # the object is there
+
+
+_ALL = ("1_start.png", "2_touch.png", "3_squeeze.png", "4_end.png")
+
+
+def test_what_cannot_be_written_is_said_before_anything_moves(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"a\.mp4: cannot be written: expected a file name that ends with \.gif"):
+        Film(tmp_path / "a.mp4")
+    with pytest.raises(FileError, match="no folder"):
+        Film(tmp_path / "nowhere" / "a.gif")
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match="it is no folder"):
+        Film(stills=tmp_path / "file")
+    assert make_film(None, None) is None
+
+
+def test_nothing_taken_is_nothing_written(tmp_path: Path) -> None:
+    assert Film(tmp_path / "a.gif", tmp_path / "stills").finish() == ()
+    assert not list(tmp_path.iterdir())
+
+
+def test_options_of_the_test_that_was_asked_for() -> None:
+    assert make_hold(False, False, None, None) is None
+    assert make_hold(True, False, 0.2, None) == Hold(mass=0.2)
+    assert make_hold(False, True, None, 0.4) == replace(Hold(test="lift"), friction=0.4)
+    with pytest.raises(CommandError, match="two tests"):
+        make_hold(True, True, None, None)
+    with pytest.raises(CommandError, match="--mass means nothing without --hold or --lift"):
+        make_hold(False, False, 0.2, None)
