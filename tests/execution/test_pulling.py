@@ -146,8 +146,9 @@ def test_lifted_from_a_table(pincer: Hand, pinch: GraspSolution, ball: GraspObje
     left = hold_and_pull(solution, pincer, placed, replace(lift, squeeze=0.0), way)
     assert not left.held
     assert left.reason == "Dropped when lifted by 0.1 m."
-    # It stays where it stands while the palm goes up, until it is 5 cm behind.
-    assert left.pulls["lift"].motion.distance == pytest.approx(0.05, abs=0.01)
+    # It is left behind, or rolls between the fingers, as far as the limits.
+    assert not left.pulls["lift"].motion.within(0.05, np.deg2rad(15.0))
+    assert left.pulls["lift"].motion.distance > 0.02
 
 
 def test_a_hand_that_would_be_in_the_table_is_not_tested(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:

@@ -71,3 +71,26 @@ def test_servos_reach_a_bent_posture() -> None:
     for _ in range(300):
         mujoco.mj_step(scene.model, data)
     np.testing.assert_allclose(data.qpos[scene.qpos], goal, atol=1e-4)
+
+
+@pytest.mark.shared
+def test_the_palm_of_a_hand_with_a_wrist_stays_where_it_is(shared_data: Path) -> None:
+    """Fingers that close as fast as they can do not push the palm back through the wrist."""
+    import mujoco
+
+    hand = Hand.load(shared_data / "hands" / "shadow_hand_mjcf/right_hand.xml")
+    start = hand.open_angles()
+    goal = start.copy()
+    for finger in hand.fingers:
+        goal[list(finger.joints)[-3:]] += 0.5
+    scene = build_scene(hand, FAR, PALM_POSE, start)
+    data = mujoco.MjData(scene.model)
+    data.qpos[scene.qpos] = start
+    data.ctrl[:] = hand.coupled(goal)
+    moved = 0.0
+    for _ in range(100):
+        mujoco.mj_step(scene.model, data)
+        mujoco.mj_kinematics(scene.model, data)
+        palm = body_pose(data, scene.link_bodies[hand.palm])
+        moved = max(moved, float(np.linalg.norm(palm[:3, 3] - PALM_POSE.position)))
+    assert moved < 2e-6

@@ -27,6 +27,8 @@ TIMESTEP = 0.002
 SERVO_BANDWIDTH = 100.0
 #: Least inertia that a servo moves [kg m²], for links whose model gives next to none.
 ARMATURE = 1e-3
+#: Inertia of joints between the base and the palm [kg m²]: the palm stays where it is, whatever the fingers do.
+HEAVY = 100.0
 #: Nearer than that is touching [m]: the engine lists such pairs as contacts, forces begin at 0.
 TOUCHING = 1e-5
 #: Elements of a hand's model that would compete with the servos, and settings that the scene makes.
@@ -110,7 +112,7 @@ def build_scene(
         share = free.mass / model.body_mass[scene.object_body]
         model.body_mass[scene.object_body] *= share
         model.body_inertia[scene.object_body] *= share
-    _tune(scene)
+    _tune(scene, hand)
     _place(scene, hand, hand_pose, q)
     return scene
 
@@ -282,13 +284,18 @@ def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
     )
 
 
-def _tune(scene: Scene) -> None:
-    """Give every servo the same bandwidth, critically damped, and take passive forces away."""
+def _tune(scene: Scene, hand: Hand) -> None:
+    """Give every servo the same bandwidth, critically damped; take passive forces away; hold the palm still."""
     import mujoco
 
     model = scene.model
     of_hand = model.dof_bodyid != scene.object_body
     model.dof_armature[of_hand] = np.maximum(model.dof_armature[of_hand], ARMATURE)
+    for i in _joints_before_palm(hand):
+        model.dof_armature[model.jnt_dofadr[model.actuator_trnid[i, 0]]] = HEAVY
+        model.actuator_forcelimited[i] = 0
+    if scene.lift >= 0:
+        model.dof_armature[model.body_dofadr[model.body(LIFT).id]] = HEAVY
     model.dof_damping[:] = 0.0
     model.dof_frictionloss[:] = 0.0
     model.jnt_stiffness[:] = 0.0
@@ -299,6 +306,15 @@ def _tune(scene: Scene) -> None:
         stiffness = SERVO_BANDWIDTH**2 * inertia
         model.actuator_gainprm[i, 0] = stiffness
         model.actuator_biasprm[i, :3] = 0.0, -stiffness, -2.0 * SERVO_BANDWIDTH * inertia
+
+
+def _joints_before_palm(hand: Hand) -> tuple[int, ...]:
+    """Return the joints of wrist and arm, which the palm moves with."""
+    found, link = [], hand.palm
+    while link >= 0:
+        found.append(hand.links[link].joint)
+        link = hand.links[link].parent
+    return tuple(joint for joint in found if joint >= 0)
 
 
 def _place(scene: Scene, hand: Hand, hand_pose: Pose, q: FloatArray) -> None:
