@@ -70,6 +70,12 @@ def plane_offset(core: Floats, corners: int, nx: float, ny: float, nz: float) ->
 
 
 @inner_kernel
+def plane_gap(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float) -> float:
+    """Return how far core `a` lies beyond core `b` along n."""
+    return -plane_offset(a, ka, -nx, -ny, -nz) - plane_offset(b, kb, nx, ny, nz)
+
+
+@inner_kernel
 def turn_to_plane(gap: float, slope: float, curvature: float, best: float) -> float:
     """Return the next turn at which a point comes down to a plane, for a gap `K + A cos + B sin` >= 0 now.
 

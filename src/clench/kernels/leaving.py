@@ -11,7 +11,7 @@ import math
 
 from .closest import edge_count, face_normal, separation
 from .compiling import inner_kernel
-from .core_motion import corner_motion, move_core, plane_offset, turn_to_plane
+from .core_motion import corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
 from .turning import is_blocking
@@ -90,12 +90,6 @@ def leave_plane(
             least = math.sqrt(2.0 * touch / bound)
             step = min(step, max(safe_step(max(gap, 0.0), max(slope, 0.0), bound), least))
     return step
-
-
-@inner_kernel
-def plane_gap(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float) -> float:
-    """Return how far core `a` lies beyond core `b` along n."""
-    return -plane_offset(a, ka, -nx, -ny, -nz) - plane_offset(b, kb, nx, ny, nz)
 
 
 @inner_kernel

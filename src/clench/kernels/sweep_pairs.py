@@ -9,16 +9,18 @@ the neighbours of a core: open, thin and flipped meshes are as good as closed on
 
 from __future__ import annotations
 
+import math
+
 from .closest import crosses, separation
 from .compiling import inner_kernel, kernel
-from .core_motion import corner_motion, move_core, plane_offset, turn_to_plane
+from .core_motion import corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
 from .leaving import BLOCKED, FLAT, OVERLAP, move_on
 
 #: Planes that are laid for one pair at most; a pair that needs more stops there, which is safe.
 PLANES = 400
-#: From this plane on, one is also laid ahead of the present place.
+#: From this plane on, planes that turn are tried as well.
 PLAIN = 8
 #: A pair stops when its gap is below this many times the level that its planes leave open [-].
 CLOSE = 1.5
@@ -60,6 +62,51 @@ def step_to_plane(
     return step
 
 
+@inner_kernel
+def turning_step(
+    core: Floats,
+    placed: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    w: float,
+    nx: float,
+    ny: float,
+    nz: float,
+    chain: Floats,
+    count: int,
+    s: float,
+    level: float,
+    leap: float,
+    best: float,
+) -> float:
+    """Return a step from `s` on which a plane that turns evenly keeps the cores `w + level` apart, or 0.
+
+    Between the plane across n, now, and one across the closest points after the step, a corner's height over the plane
+    bends by its own acceleration and by twice the plane's turn times its speed; it lies above its chord less that.
+
+    Args:
+        placed: (6, 3); the first rows have the moving core at `s`, the others are scratch space.
+        leap: factor on the step that is tried [-]. best: the longest step of interest. The others as in `sweep_pair`.
+    """
+    rate, speed, bend = 0.0, 0.0, 0.0
+    for i in range(count):
+        rate = max(rate, abs(chain[i, 0]))
+    for k in range(ka):
+        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, s)
+        speed, bend = max(speed, lever), max(bend, bound)
+    margin = plane_gap(placed, ka, fixed, kb, nx, ny, nz) - w - level
+    if margin <= 0.0 or speed == 0.0:
+        return 0.0
+    step = min(leap * math.sqrt(4.0 * margin / (bend + 2.0 * rate * speed)), best)
+    ahead = placed[3:]
+    move_core(core, ka, chain, count, s + step, ahead)
+    _, mx, my, mz, _, _, _, _, _ = separation(ahead, ka, fixed, kb)
+    margin = min(margin, plane_gap(ahead, ka, fixed, kb, mx, my, mz) - w - level)
+    turn = math.sqrt((mx - nx) ** 2 + (my - ny) ** 2 + (mz - nz) ** 2)
+    return step if 0.125 * step * (bend * step + 2.0 * turn * speed) <= margin else 0.0
+
+
 @kernel
 def sweep_pair(
     core: Floats,
@@ -87,7 +134,7 @@ def sweep_pair(
         touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
         placed: scratch space, (6, 3); its first rows are the moving core at the contact.
     """
-    s, level, leap = 0.0, -1.0, 2.0
+    s, level, leap = 0.0, -1.0, 1.0
     for turn in range(PLANES):
         move_core(core, ka, chain, count, s, placed)
         d, nx, ny, nz, _, _, _, _, _ = separation(placed, ka, fixed, kb)
@@ -113,12 +160,11 @@ def sweep_pair(
             if step <= 0.0:
                 return s
             if turn >= PLAIN:
-                # Edges almost parallel: the closest points run along them. A plane laid ahead lasts longer.
-                move_core(core, ka, chain, count, s + leap * step, placed[3:])
-                _, nx, ny, nz, _, _, _, _, _ = separation(placed[3:], ka, fixed, kb)
-                offset = plane_offset(fixed, kb, nx, ny, nz) + w + level
-                longer = step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
-                leap = 2.0 * leap if longer > step else max(0.5 * leap, 1.0)
+                # Edges that slide along each other: the closest points run, and no plane that rests lasts.
+                longer = turning_step(
+                    core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, level, leap, best - s
+                )
+                leap = 2.0 * leap if longer > 0.0 else 0.25 * leap
                 step = max(step, longer)
             s += step
             if s >= best:
