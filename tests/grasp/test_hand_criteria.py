@@ -166,13 +166,14 @@ def wrench_hull_torque(sets, setting, load, edges=64):
     for c in sets:
         for t in c.holding:
             n = -np.asarray(t.normal)
+            moved = np.array([velocity(hand, q, j, t) for j in range(len(q)) if j not in followers])
             side = np.cross(n, [0.3, 0.5, 0.8])
             side /= np.linalg.norm(side)
             for angle in np.linspace(0.0, 2.0 * np.pi, edges, endpoint=False):
                 f = n + 0.5 * (np.cos(angle) * side + np.sin(angle) * np.cross(n, side))
                 arm = np.asarray(t.position) - center
                 wrenches.append(np.concatenate([f, np.cross(arm, f)]))
-                torques.append([moment(hand, q, j, t, f) for j in range(len(q)) if j not in followers])
+                torques.append(moved @ f)
     W, R = np.array(wrenches).T, np.array(torques).T
     ones = np.ones((len(R), 1))
     found = linprog(
@@ -186,8 +187,8 @@ def wrench_hull_torque(sets, setting, load, edges=64):
     return found.fun if found.status == 0 else None
 
 
-def moment(hand, q, joint, touch, force, step=1e-6):
-    """Return the torque of a joint for a force on a link, by the work done over a small turn; followers turn along."""
+def velocity(hand, q, joint, touch, step=1e-6):
+    """Return how a touch moves with a joint: a force's work is its torque; followers turn along."""
     shifted = []
     for sign in (1.0, -1.0):
         turned = q.copy()
@@ -197,7 +198,7 @@ def moment(hand, q, joint, touch, force, step=1e-6):
         before, after = (hand.link_poses(x)[touch.link] for x in (q, turned))
         local = np.linalg.solve(before, np.append(touch.position, 1.0))
         shifted.append((after @ local)[:3])
-    return float((shifted[0] - shifted[1]) @ force / (2.0 * step))
+    return (shifted[0] - shifted[1]) / (2.0 * step)
 
 
 def grip(chosen, **changes):
