@@ -17,7 +17,7 @@ print(f"{solution.status.value}: {solution.reason['text']}")
 for name, finger in solution.fingers.items():
     print(f"  {name}: {finger.reason}")
 
-trajectory = clench.plan_trajectory(solution, hand)
+trajectory = clench.plan_trajectory(solution, hand, obj=scene)
 trajectory.save(folder / "trajectory.json")
 print(f"{trajectory.duration:.2f} s for {len(trajectory.times)} points of {len(trajectory.joints)} joints")
 assert trajectory.at(trajectory.duration)[0] == solution.joint_angles[trajectory.joints[0]]

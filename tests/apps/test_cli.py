@@ -62,7 +62,9 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> None:
         return [folder / "figure.png"]
 
     monkeypatch.setitem(sys.modules, "clench.apps.figures", SimpleNamespace(draw_solution=draw))
-    monkeypatch.setattr("clench.execution.trajectory.plan_trajectory", lambda *_: SimpleNamespace(save=Path.touch))
+    monkeypatch.setattr(
+        "clench.execution.trajectory.plan_trajectory", lambda *_, **__: SimpleNamespace(save=Path.touch)
+    )
 
 
 SOLVE = ["solve", "--hand", "pincer", "--object", "ball"]

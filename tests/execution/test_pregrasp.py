@@ -86,6 +86,18 @@ def test_a_completed_solution_is_read_back_equal(grip, tmp_path) -> None:
     assert clench.GraspSolution.load(tmp_path / "full.json") == full
 
 
+def test_with_the_object_it_is_the_trajectorys_own(grip) -> None:
+    hand, ball, solution = grip
+    found = clench.plan_pregrasp(solution, hand, obj=ball, clearance=0.004)
+    trajectory = clench.plan_trajectory(solution, hand, obj=ball, clearance=0.004)
+    assert trajectory.pregrasp is not None
+    assert list(found.values()) == trajectory.positions[trajectory.pregrasp].tolist()
+    touching = {c.finger for c in solution.contacts if not c.passed}
+    off = gaps(hand, ball, solution, found)
+    assert all(0.5 * 0.004 < off[name] < 2.0 * 0.004 for name in touching)
+    assert clench.complete(solution, hand, ball).pregrasp == clench.plan_pregrasp(solution, hand, obj=ball)
+
+
 def test_bad_clearance_is_refused(grip) -> None:
     for clearance in (0.0, -0.001, np.nan):
         with pytest.raises(CommandError, match=r"clearance: expected a finite number above 0 m"):
@@ -119,5 +131,5 @@ def test_forces_are_printed(capsys) -> None:
 def test_bad_numbers_end_with_one_sentence(capsys, option: str, value: str) -> None:
     code, out, err = run(capsys, "--json", option, value)
     assert (code, out) == (2, "")
-    assert err.startswith(f"clench: error: {option[2:]}: expected a finite number")
+    assert err.startswith(f"clench: error: {option}: expected a finite number")
     assert err.count("\n") == 1

@@ -185,7 +185,7 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
 
 @pytest.mark.parametrize("theirs", RCLPY_FIRST)
 def test_a_cut_connection_stops_the_hand_and_is_reported(world: World, theirs: str) -> None:
-    node = world.node(theirs, "--cut-after", "0.8")
+    node = world.node(theirs, "--cut-after", "0.4")
     report = world.report(world.drive("cyclonedds" if installed("cyclonedds") else "rclpy", 0.15))
     time.sleep(0.5)
     log = world.log(node)

@@ -40,5 +40,5 @@ def complete(
     quality = grasp_quality(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
     squeeze = plan_squeeze(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
     # Of joints that were gone through more than once no path is known to back off along.
-    pregrasp = plan_pregrasp(solution, hand, clearance=clearance) if solution.rounds == 1 else None
+    pregrasp = plan_pregrasp(solution, hand, obj=obj, clearance=clearance) if solution.rounds == 1 else None
     return replace(solution, quality=quality.to_dict(), squeeze=squeeze.to_dict(), pregrasp=pregrasp)

@@ -52,16 +52,12 @@ def execute(solution: GraspSolution, actuator: Actuator, *, speed: float = 1.0, 
     if solution.hand != actuator.hand.name:
         raise CommandError(f"The solution is for hand '{solution.hand}', the actuator moves '{actuator.hand.name}'.")
     check_geometry(solution, actuator.hand, actuator.obj)
-    trajectory = plan_trajectory(solution, actuator.hand, obj=_placed(solution, actuator.obj), speed=speed)
+    trajectory = plan_trajectory(solution, actuator.hand, obj=actuator.obj, speed=speed)
     if not (force or solution.is_valid()):
         found = solution.violations()
         why = found[0] if found else f"its status is '{solution.status.value}'"
         return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {why.rstrip('.')}.")
     return actuator.carry_out(solution, trajectory)
-
-
-def _placed(solution: GraspSolution, obj: GraspObject | None) -> GraspObject | None:
-    return None if obj is None else obj.posed(solution.object_pose)
 
 
 def check_geometry(solution: GraspSolution, hand: Hand, obj: GraspObject | None) -> None:

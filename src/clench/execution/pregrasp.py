@@ -1,4 +1,4 @@
-"""The pregrasp: every finger backed off along its own closing path to a clearance (METHOD.md section 7)."""
+"""The pregrasp: every finger off the object by a clearance (METHOD.md section 7)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, invert
 from clench.models.hand.hand import Finger, Hand
+from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
@@ -21,21 +22,29 @@ _STEPS = 100
 _HALVINGS = 30
 
 
-def plan_pregrasp(solution: GraspSolution, hand: Hand, *, clearance: float = CLEARANCE) -> dict[str, float]:
-    """Return the posture in which every touching finger is backed off along its closing path to a clearance [rad].
+def plan_pregrasp(
+    solution: GraspSolution, hand: Hand, *, obj: GraspObject | None = None, clearance: float = CLEARANCE
+) -> dict[str, float]:
+    """Return the posture in which every touching finger stands off by a clearance [rad].
 
-    The clearance is measured at the contacts: every point of a link that touches is that far off the object's tangent
-    plane, which for a convex object is at most its distance from it. A finger that does not get so far is taken back to
-    where it starts; one that does not touch stays where the solution has it.
+    With the object it is the one that `plan_trajectory` goes through: from it, all contacts are reached at once on a
+    straight line that is clear. Without the object, or where no such posture is clear, every finger is backed off along
+    its closing path. There the clearance is measured at the contacts: every point of a link that touches is that far
+    off the object's tangent plane, which for a convex object is at most its distance from it. A finger that does not
+    get so far is taken back to where it starts; one that does not touch stays where the solution has it.
 
     Args:
-        solution: the solution. hand: what it was computed for. clearance: [m].
+        solution: the solution. hand, obj: what it was computed for. clearance: [m].
 
     Raises:
         CommandError: a clearance that is not finite and above 0; the solution is of another hand.
     """
     if not (np.isfinite(clearance) and clearance > 0.0):
         raise CommandError(f"clearance: expected a finite number above 0 m, got {clearance!r}.")
+    if obj is not None:
+        way = plan_trajectory(solution, hand, obj=obj, clearance=clearance)
+        if way.pregrasp is not None:
+            return dict(zip(hand.joint_names, way.positions[way.pregrasp].tolist(), strict=True))
     trajectory = plan_trajectory(solution, hand)
     q = posture(solution.joint_angles, hand, "joint_angles")
     poses, T_palm_world = hand.link_poses(q), solution.hand_pose.inverse()

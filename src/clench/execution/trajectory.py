@@ -131,7 +131,7 @@ def plan_trajectory(
     Args:
         solution: the solution.
         hand: the hand it was computed for.
-        obj: the object it was computed for.
+        obj: the object it was computed for; the solution says where it is.
         speed: fraction of the velocity limits to use, above 0 and up to 1.
         acceleration: largest of every joint [rad/s²].
         clearance: of the pregrasp [m]; less where the way from there is not clear.

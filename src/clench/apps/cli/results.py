@@ -39,7 +39,7 @@ def write_results(
     solution.save(folder / "solution.json")
     written = [folder / "solution.json"]
     if solution.rounds == 1:
-        plan_trajectory(solution, hand).save(folder / "trajectory.json")
+        plan_trajectory(solution, hand, obj=obj).save(folder / "trajectory.json")
         written.append(folder / "trajectory.json")
     return [*written, *draw_solution(hand, obj, command, solution, folder)]
 
