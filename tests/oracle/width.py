@@ -4,7 +4,7 @@ Nothing of the project's kernels: where the links are is forward kinematics of t
 engine's. Advancing by distance over speed passes nothing that is thicker than the smallest step.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import fcl
@@ -25,7 +25,9 @@ Floats = npt.NDArray[np.float64]
 TOUCHING = 1e-9
 #: The oracle's smallest step [rad]: where it is nearer to a contact than that, it looks at the end alone.
 _LEAST = 1e-5
-_STEPS = 600
+_STEPS = 4000
+#: How far the oracle goes on beyond a stop [rad].
+_ON = (1e-3, 2e-3, 5e-3)
 
 
 @dataclass(frozen=True)
@@ -34,17 +36,37 @@ class Case:
 
     hand: Hand
     obj: GraspObject
+    place: Pose
+
+
+@dataclass
+class Judged:
+    """What was found about one closing: `contact`, `free` or `blocked`; what is wrong; and what was not to be judged.
+
+    Args:
+        grazing: stops beyond which nothing overlaps by more than the tolerance, and nothing opens either.
+        unresolved: stages with more steps than were taken.
+    """
+
+    kind: str = "free"
+    wrong: list[str] = field(default_factory=list)
+    grazing: int = 0
+    unresolved: int = 0
+    stages: int = 0
 
 
 class Core:
-    """A convex core with a radius, as the other engine's tree over its triangles."""
+    """A convex core with a radius, as the other engine's tree over its triangles, and the ball around it."""
 
     def __init__(self, vertices: Floats, triangles: npt.NDArray[np.int64], radius: float) -> None:
-        self.model = fcl.BVHModel()
-        self.model.beginModel(len(vertices), len(triangles))
-        self.model.addSubModel(vertices, triangles)
-        self.model.endModel()
+        model = fcl.BVHModel()
+        model.beginModel(len(vertices), len(triangles))
+        model.addSubModel(vertices, triangles)
+        model.endModel()
+        self.placed = fcl.CollisionObject(model)
         self.radius = radius
+        self.middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+        self.reach = float(np.linalg.norm(vertices - self.middle, axis=1).max()) + radius
 
 
 def core_of(shape: Shape) -> Core:
@@ -58,99 +80,131 @@ def core_of(shape: Shape) -> Core:
 
 
 def gap(a: Core, A: Floats, b: Core, B: Floats) -> float:
-    """Return the gap between two cores in their poses, shape (4, 4) each [m]; negative where they cross."""
-    one = fcl.CollisionObject(a.model, fcl.Transform(A[:3, :3], A[:3, 3]))
-    other = fcl.CollisionObject(b.model, fcl.Transform(B[:3, :3], B[:3, 3]))
-    found = float(fcl.distance(one, other, fcl.DistanceRequest(), fcl.DistanceResult()))
+    """Return the gap between two cores in their poses, shape (4, 4) each [m]; -1 where triangles cross."""
+    a.placed.setTransform(fcl.Transform(A[:3, :3], A[:3, 3]))
+    b.placed.setTransform(fcl.Transform(B[:3, :3], B[:3, 3]))
+    found = float(fcl.distance(a.placed, b.placed, fcl.DistanceRequest(), fcl.DistanceResult()))
     # The engine says 0, not how deep, where triangles cross.
     return found - a.radius - b.radius if found > 0.0 else -1.0
+
+
+def least_gap(pairs: list[tuple[Core, Floats, Core, Floats]]) -> float:
+    """Return the smallest gap of pairs of cores in their poses [m]; those whose balls are farther are not looked at."""
+    if not pairs:
+        return np.inf
+    one = np.array([A[:3, :3] @ a.middle + A[:3, 3] for a, A, _, _ in pairs])
+    other = np.array([B[:3, :3] @ b.middle + B[:3, 3] for _, _, b, B in pairs])
+    away = np.linalg.norm(one - other, axis=1) - [a.reach + b.reach for a, _, b, _ in pairs]
+    least = np.inf
+    for k in np.argsort(away):
+        if away[k] >= least:
+            break
+        least = min(least, gap(*pairs[k]))
+    return float(least)
 
 
 class Oracle:
     """Measure gaps of a hand's moving links to an object and to the links that they must not overlap."""
 
     def __init__(self, case: Case) -> None:
-        self.hand = case.hand
-        self.objects = [(core_of(s), case.obj.pose.matrix) for body in case.obj.bodies for s in body.shapes]
-        source = CollisionSource.ENGINE
-        self.links = [[core_of(s) for s in link.shapes.get(source, ())] for link in case.hand.links]
+        self.hand, self.place = case.hand, case.place.matrix
+        self.objects = [core_of(s) for body in case.obj.bodies for s in body.shapes]
+        self.links = [[core_of(s) for s in link.shapes.get(CollisionSource.ENGINE, ())] for link in case.hand.links]
+        self.looks = 0
 
     def gap(self, q: Floats, moving: set[int]) -> float:
         """Return the smallest gap of any moving link at a posture [m]."""
+        self.looks += 1
         poses = self.hand.link_poses(q)
-        least = np.inf
+        pairs = []
         for m in moving:
             for core in self.links[m]:
-                least = min([least, *(gap(core, poses[m], o, T) for o, T in self.objects)])
+                pairs += [(core, poses[m], o, self.place) for o in self.objects]
                 for r in range(len(self.hand.links)):
                     if r != m and (min(m, r), max(m, r)) not in self.hand.allowed_pairs:
-                        least = min([least, *(gap(core, poses[m], other, poses[r]) for other in self.links[r])])
-        return least
+                        pairs += [(core, poses[m], other, poses[r]) for other in self.links[r]]
+        return least_gap(pairs)
 
-    def judge(self, answer: Floats, start: Floats, reach: float) -> list[str]:
-        """Return what is wrong with a closing: a gap below -1e-9 m on its path, or one left open where it stopped.
+    def judge(self, answer: Floats, start: Floats, reach: float) -> Judged:
+        """Judge a closing: no gap below -1e-9 m on its path, none left open where it stopped, no stop without need.
 
         Args:
             answer, start: postures at both ends [rad]. reach: no point is farther from a joint [m].
         """
-        wrong, q = [], start.copy()
+        found, q = Judged(), start.copy()
         finger = self.hand.fingers[0]
         followers = {c.follower: c.leader for c in self.hand.couplings}
         for leader in (j for j in finger.joints if j not in followers):
-            group = [leader, *(f for f, of in followers.items() if of == leader)]
-            moving = {i for i in finger.links if self._before(i) >= min(group)}
+            moving = {i for i in finger.links if self._before(i) >= min(self._group(leader))}
             travel = float(answer[leader] - q[leader])
             speed = reach * sum(abs(c.ratio) for c in self.hand.couplings if c.leader == leader) + reach
-            least = self._march(q, leader, travel, speed, moving)
-            if least < -TOUCHING:
-                wrong.append(f"joint {leader}: a gap of {least:.3g} m before its end at {travel:.9g} rad")
+            rates = np.zeros(len(q))
+            rates[leader] = 1.0
+            self._march(q, rates, travel, speed, moving, found, f"joint {leader}")
             q[leader] = answer[leader]
             q = self.hand.coupled(q)
-            end = self.gap(q, moving)
-            if end < -TOUCHING:
-                wrong.append(f"joint {leader}: overlaps by {-end:.3g} m at its end at {travel:.9g} rad")
-            if answer[leader] < self.hand.joints[leader].upper - 1e-12 and end > TOUCHING:
-                wrong.append(f"joint {leader}: stops at {travel:.9g} rad with a gap of {end:.3g} m")
-        return wrong
+            upper = self.hand.joints[leader].upper
+            if answer[leader] < upper - 1e-12:
+                on = [self._moved(q, rates, min(s, upper - q[leader])) for s in _ON]
+                self._judge_stop(f"joint {leader} at {travel:.9g} rad", q, on, moving, found)
+        return found
 
-    def judge_together(self, answer: Floats, start: Floats, reach: float) -> list[str]:
-        """Return what is wrong with a closing of all joints at once, each at speed 1 until it is held.
+    def judge_together(self, answer: Floats, start: Floats, reach: float, speeds: Floats) -> Judged:
+        """Judge a closing of all joints at once, each at its speed until it is held; see `judge`.
 
         Where a joint is held before its limit, a link behind it touches; going on with what moved until then collides.
         """
-        wrong = []
+        found = Judged()
         finger = self.hand.fingers[0]
-        moving = set(finger.links)
         followers = {c.follower for c in self.hand.couplings}
         free = [j for j in finger.joints if j not in followers]
-
-        def at(s: float, held: Floats) -> Floats:
-            return self.hand.coupled(np.where([j in free for j in range(len(held))], np.minimum(start + s, held), held))
-
-        speed, end = 3.0 * reach * len(finger.joints), float(np.max(answer[free] - start[free]))
-        stops = np.unique(answer[free] - start[free])
-        s = 0.0
-        for _ in range(_STEPS):
-            found = self.gap(at(s, answer), moving)
-            if found < -TOUCHING:
-                wrong.append(f"a gap of {found:.3g} m at {s:.9g} of {end:.9g}")
-            near = np.abs(stops - s).min() < 1e-4
-            s += max(found / speed, 1e-4 if near else 1e-5, end / _STEPS / 2)
-            if s >= end:
-                break
+        rates = np.where([j in free for j in range(len(start))], speeds, 0.0)
+        ends = {j: float((answer[j] - start[j]) / rates[j]) for j in free}
+        before = 0.0
+        speed = 3.0 * reach * len(finger.joints) * float(rates.max())
+        for s in sorted(set(ends.values())):
+            held = np.array([rates[j] if ends.get(j, 0.0) >= s else 0.0 for j in range(len(start))])
+            q = self._held(answer, start, rates, before)
+            first = min((k for j in free if held[j] > 0.0 for k in self._group(j)), default=len(held))
+            moving = {i for i in finger.links if self._before(i) >= first}
+            self._march(q, held, s - before, speed, moving, found, f"from {before:.9g}")
+            before = s
         for j in free:
             if answer[j] < self.hand.joints[j].upper - 1e-12:
-                s = float(answer[j] - start[j])
-                behind = {i for i in finger.links if self._before(i) >= min(j, *self._group(j))}
-                found = self.gap(at(s, answer), behind)
-                if found > TOUCHING:
-                    wrong.append(f"joint {j}: held at {s:.9g} rad with a gap of {found:.3g} m")
-                on = np.where(answer >= answer[j] - 1e-12, np.inf, answer)
-                on = np.minimum(on, [x.upper for x in self.hand.joints])
-                deepest = min(self.gap(at(s + 2e-3 * k, on), moving) for k in range(1, 4))
-                if deepest > 0.0:
-                    wrong.append(f"joint {j}: held at {s:.9g} rad, but it could go on")
-        return wrong
+                behind = {i for i in finger.links if self._before(i) >= min(self._group(j))}
+                q = self._held(answer, start, rates, ends[j])
+                still = np.array([rates[k] if ends.get(k, 0.0) >= ends[j] - 1e-12 else 0.0 for k in range(len(start))])
+                on = [self._moved(q, still, s / float(rates.max())) for s in _ON]
+                self._judge_stop(f"joint {j} at {ends[j]:.9g}", q, on, behind, found, set(finger.links))
+        return found
+
+    def _judge_stop(
+        self,
+        name: str,
+        q: Floats,
+        on: list[Floats],
+        moving: set[int],
+        found: Judged,
+        all_moving: set[int] | None = None,
+    ) -> None:
+        end = self.gap(q, moving)
+        if abs(end) > TOUCHING:
+            found.wrong.append(f"{name}: stops at a gap of {end:.3g} m")
+            return
+        beyond = [self.gap(p, moving if all_moving is None else all_moving) for p in on]
+        if min(beyond) < -TOUCHING:
+            return
+        if max(beyond) > 10.0 * TOUCHING:
+            found.wrong.append(f"{name}: could go on, with gaps of {', '.join(f'{g:.3g}' for g in beyond)} m")
+        else:
+            found.grazing += 1
+
+    def _held(self, answer: Floats, start: Floats, rates: Floats, s: float) -> Floats:
+        return self.hand.coupled(np.where(rates > 0.0, np.minimum(start + rates * s, answer), answer))
+
+    def _moved(self, q: Floats, rates: Floats, s: float) -> Floats:
+        upper = np.array([x.upper for x in self.hand.joints])
+        return self.hand.coupled(np.where(rates > 0.0, np.minimum(q + rates * s, upper), q))
 
     def _group(self, leader: int) -> list[int]:
         return [leader, *(c.follower for c in self.hand.couplings if c.leader == leader)]
@@ -158,19 +212,21 @@ class Oracle:
     def _before(self, link: int) -> int:
         return self.hand.links[link].joint
 
-    def _march(self, q: Floats, leader: int, travel: float, speed: float, moving: set[int]) -> float:
-        """Return the smallest gap found on the way, the last 1e-4 rad left out."""
-        s, least = 0.0, np.inf
+    def _march(
+        self, q: Floats, rates: Floats, travel: float, speed: float, moving: set[int], found: Judged, name: str
+    ) -> None:
+        """Look for gaps below the tolerance on the way; its last 1e-4 rad are left out, and so is its start."""
+        s = 0.0
+        found.stages += 1
         for _ in range(_STEPS):
             if s >= travel - 1e-4:
-                break
-            at = q.copy()
-            at[leader] += s
-            found = self.gap(self.hand.coupled(at), moving)
-            if s > 0.0:
-                least = min(least, found)
-            s += max(found / speed, _LEAST * (1.0 + 100.0 * (s > 0.0 and found > 1e-5)), travel / _STEPS / 2)
-        return least
+                return
+            seen = self.gap(self._moved(q, rates, s), moving)
+            if s > 0.0 and seen < -TOUCHING:
+                found.wrong.append(f"{name}: a gap of {seen:.3g} m at {s:.9g} before its end at {travel:.9g} rad")
+                return
+            s += max(seen / speed, _LEAST)
+        found.unresolved += 1
 
 
 def make_case(seed: int) -> Case:
@@ -184,9 +240,14 @@ def make_case(seed: int) -> Case:
         follower = int(rng.integers(1, joints))
         hand = hand.couple(f"index_{follower - 1}", f"index_{follower}", float(rng.uniform(0.3, 1.2)))
     body = object_shape(rng)
-    away = rng.uniform(0.02, 0.6 * lengths.sum() + 0.02)
-    place = Pose([away, rng.uniform(-0.01, 0.01), rng.uniform(0.03, 0.06)], wxyz=unit(rng.normal(size=4)))
-    return Case(hand.hand(), GraspObject.from_shape(body, pose=place, name="thing"))
+    obj = GraspObject.from_shape(body, name="thing")
+    return Case(hand.hand(), obj, random_place(rng, float(lengths.sum())))
+
+
+def random_place(rng: np.random.Generator, length: float) -> Pose:
+    """Return a place of the object within reach of a finger of some length."""
+    away = rng.uniform(0.02, 0.6 * length + 0.02)
+    return Pose([away, rng.uniform(-0.01, 0.01), rng.uniform(0.03, 0.06)], wxyz=unit(rng.normal(size=4)))
 
 
 def unit(v: Floats) -> Floats:
@@ -241,20 +302,59 @@ def mesh_shape(mesh: Any) -> Shape:
     )
 
 
-def judge_case(seed: int, order: str = "proximal-first") -> tuple[str, list[str]]:
-    """Close one case and judge it; return what kind it was, and what is wrong."""
+def judge_case(seed: int, order: str = "proximal-first") -> Judged:
+    """Close one case and judge it."""
+    return judge_places(seed, order, 1)[0]
+
+
+def judge_places(seed: int, order: str, places: int) -> list[Judged]:
+    """Close one finger on one object in so many places, and judge every answer; the first is that of the case.
+
+    Args:
+        order: of closing; `speeds` is `together` with a random speed per joint.
+    """
     case = make_case(seed)
-    planes = (1, 2, 3)[seed % 3]
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=planes, order=clench.ClosingOrder(order))
-    solution = clench.solve(case.hand, case.obj, command)
+    oracle = Oracle(case)
+    rng = np.random.default_rng([78, seed])
+    length = sum(float(link.T_parent_link[0, 3]) for link in case.hand.links[2:]) + 0.035
+    found = []
+    for number in range(places):
+        place = case.place if number == 0 else random_place(rng, length)
+        case = replace(case, place=place)
+        oracle.place = place.matrix
+        judged = _judge(case, oracle, seed, order)
+        judged.wrong = [f"{order}, seed {seed}, place {number}: {sentence}" for sentence in judged.wrong]
+        found.append(judged)
+    return found
+
+
+def _judge(case: Case, oracle: Oracle, seed: int, order: str) -> Judged:
+    followers = {c.follower for c in case.hand.couplings}
+    free = [i for i in range(len(case.hand.joints)) if i not in followers]
+    speeds = np.ones(len(case.hand.joints))
+    if order == "speeds":
+        speeds[free] = np.random.default_rng([79, seed]).uniform(0.3, 3.0, len(free))
+    solution = clench.solve(
+        case.hand,
+        case.obj,
+        clench.GraspCommand(
+            hand_pose=Pose.identity(),
+            object_pose=case.place,
+            planes=(1, 2, 3)[seed % 3],
+            order=clench.ClosingOrder("together" if order == "speeds" else order),
+            speeds={case.hand.joint_names[i]: float(speeds[i]) for i in free} if order == "speeds" else {},
+            measure=False,
+        ),
+    )
+    start = case.hand.open_angles()
     if solution.fingers["index"].status == "blocked":
-        q = case.hand.open_angles()
-        start = Oracle(case).gap(q, set(case.hand.fingers[0].links))
-        return "blocked", [] if start <= 1e-6 else [f"seed {seed}: called blocked with a gap of {start:.3g} m"]
+        found = oracle.gap(start, set(case.hand.fingers[0].links))
+        return Judged("blocked", [] if found <= 1e-6 else [f"called blocked with a gap of {found:.3g} m"])
     answer = np.array([solution.joint_angles[name] for name in case.hand.joint_names])
     reach = float(np.sum([0.05] * len(case.hand.joints))) + 0.02
-    oracle = Oracle(case)
-    judge = oracle.judge if order == "proximal-first" else oracle.judge_together
-    wrong = judge(answer, case.hand.open_angles(), reach)
-    kind = "contact" if solution.contacts else "free"
-    return kind, [f"seed {seed}: {sentence}" for sentence in wrong]
+    if order == "proximal-first":
+        judged = oracle.judge(answer, start, reach)
+    else:
+        judged = oracle.judge_together(answer, start, reach, speeds)
+    judged.kind = "contact" if solution.contacts else "free"
+    return judged
