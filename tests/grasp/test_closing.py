@@ -66,7 +66,7 @@ def test_a_section_that_outgrows_its_arena_is_cut_anew(monkeypatch, roles):
     obj = GraspObject.from_meshes([(mesh.vertices, mesh.faces)], pose=Pose([0.04, 0.001, 0.04]))
     found = plans(hand, q=[0.0, 0.3, 0.0][: len(roles)] if len(roles) == 3 else None)
     _, plenty = close(found, obj)
-    monkeypatch.setattr(closing, "_CAPACITY", 1)
+    monkeypatch.setattr(closing, "CAPACITY", 1)
     _, tight = close(found, obj)
     np.testing.assert_array_equal(tight.answer.travel, plenty.answer.travel)
     np.testing.assert_array_equal(tight.answer.point[..., :8], plenty.answer.point[..., :8])

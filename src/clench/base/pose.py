@@ -155,21 +155,28 @@ def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
 
 def quaternion_from_rotation(rotation: FloatArray) -> FloatArray:
     """Return the unit quaternion `wxyz` of a rotation matrix, with w >= 0 (Shepperd's method)."""
-    m = rotation
-    trace = float(np.trace(m))
-    candidates = np.array([trace, m[0, 0], m[1, 1], m[2, 2]])
-    i = int(np.argmax(candidates))
-    if i == 0:
-        q = np.array([1 + trace, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
-    else:
-        a, b, c = (i - 1), i % 3, (i + 1) % 3
-        q = np.empty(4)
-        q[0] = m[c, b] - m[b, c]
-        q[1 + a] = 1 + m[a, a] - m[b, b] - m[c, c]
-        q[1 + b] = m[a, b] + m[b, a]
-        q[1 + c] = m[a, c] + m[c, a]
-    q /= np.linalg.norm(q)
-    return -q if q[0] < 0 else q
+    q: FloatArray = quaternions_from_rotations(np.asarray(rotation)[None])[0]
+    return q
+
+
+def quaternions_from_rotations(rotations: FloatArray) -> FloatArray:
+    """Return the unit quaternions `wxyz` of rotation matrices (N, 3, 3), with w >= 0, shape (N, 4)."""
+    m = np.moveaxis(rotations, 0, -1)
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
+    largest = np.argmax(np.stack([trace, m[0, 0], m[1, 1], m[2, 2]]), axis=0)
+    q = np.empty((4, len(rotations)))
+    q[:] = 1 + trace, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    for i in (1, 2, 3):
+        if (here := largest == i).any():
+            a, b, c = (i - 1), i % 3, (i + 1) % 3
+            n = m[:, :, here]
+            rows = {0: n[c, b] - n[b, c], 1 + a: 1 + n[a, a] - n[b, b] - n[c, c]}
+            rows |= {1 + b: n[a, b] + n[b, a], 1 + c: n[a, c] + n[c, a]}
+            for row, values in rows.items():
+                q[row, here] = values
+    # Sums in a fixed order: one matrix gives the same bits as many.
+    q /= np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return np.ascontiguousarray(np.where(q[0] < 0, -q, q).T)
 
 
 def checked_vector(value: ArrayLike | Sequence[object], length: int, key: str, expected: str) -> FloatArray:

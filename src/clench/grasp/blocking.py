@@ -10,7 +10,7 @@ from clench.models.shapes import CollisionSource
 from .closing import ClosedHand, HandPlan
 from .containment import may_hold_part
 from .depths import LinkDepth, hand_depths
-from .plan import FingerPlan
+from .plan import resting_links
 from .scene import PackedObject
 
 
@@ -37,7 +37,7 @@ def start_overlaps(
         # Links that closing moves are judged on the planes; those that only the posture moves lie on none, and a part
         # of the object inside a link may lie between them.
         everything = crossed >= 0 or around[entry]
-        links = finger.finger.links if everything else _resting_links(hand, finger)
+        links = finger.finger.links if everything else resting_links(hand, finger)
         depths = hand_depths(hand, finger.posture, packed, T_palm_object, source, links=links) if links else ()
         deepest = max(depths, key=lambda d: d.depth, default=None)
         if deepest is not None and deepest.depth > ALLOWED_PENETRATION:
@@ -54,13 +54,3 @@ def _crossed_link(plan: HandPlan, closed: ClosedHand, entry: int) -> int:
     if closed.overlaps[entry] >= 0:
         return int(plan.arrays.outlines.link[closed.overlaps[entry]])
     return int(closed.answer.overlap[plan.items.entry == entry].max(initial=-1))
-
-
-def _resting_links(hand: Hand, plan: FingerPlan) -> tuple[int, ...]:
-    """Return the finger's links that no closing joint moves."""
-    closing = {p.joint for p in plan.joints}
-    moved: set[int] = set()
-    for i in plan.finger.links:
-        if hand.links[i].joint in closing or hand.links[i].parent in moved:
-            moved.add(i)
-    return tuple(i for i in plan.finger.links if i not in moved)

@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clench.base.pose import FloatArray, invert
+from clench.base.pose import FloatArray
 from clench.base.tolerances import PASSED_GAP
 from clench.models.hand.hand import Hand
-from clench.models.objects.grasp_object import BodyRole
 
 from .closing import ClosedHand, HandPlan, close_item_again, only_item
 from .depths import LinkDepth
 from .mechanics.contacts import without_repeats
 from .plan import FingerPlan
 from .scene import PackedObject
-from .surface import surface_normal
+from .surface import object_surface
 
 if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
@@ -176,117 +175,34 @@ def _read_touches(
     hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, contacts: np.ndarray
 ) -> list[list[Touch]]:
     """Return the touches of every item, in stage order; `contacts` says how many each has."""
-    from clench.kernels.layout import HIT_FAMILY, HIT_PLANE, HIT_SOURCE
+    from clench.kernels.touches import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays, read_touches
 
-    answer = closed.answer
-    item, slot = np.nonzero(np.arange(answer.hit.shape[1]) < contacts[:, None])
-    hits, points = answer.hit[item, slot], answer.point[item, slot]
-    poses = answer.pose[item, hits[:, HIT_FAMILY]]
-    offsets = plan.arrays.plane_offset[hits[:, HIT_PLANE]]
-    across = np.stack([points[:, 0], offsets, points[:, 1]], axis=1)
-    positions = (poses[:, :, :3] @ across[:, :, None])[:, :, 0] + poses[:, :, 3]
-    # For an exact touch the column numbers an element of what is met, and the normal is read with it.
-    sources = np.where(hits[:, HIT_PLANE] < 0, 0, np.maximum(hits[:, HIT_SOURCE], 0))
-    facets = packed.tree.normals[sources] if len(packed.tree.normals) else positions
-    normals = facets @ closed.T_palm_object[:3, :3].T
-    touches: list[list[Touch]] = [[] for _ in contacts]
-    for i, n, hit, point, position, normal, offset in zip(
-        item.tolist(), slot.tolist(), hits.tolist(), points.tolist(), positions, normals, offsets.tolist(), strict=True
-    ):
-        if hit[HIT_PLANE] < 0:
-            touches[i].append(_exact_touch(hand, plan, packed, closed, i, n))
-            continue
-        if hit[HIT_SOURCE] < 0:
-            facet = surface_normal(packed, hit[HIT_SOURCE], closed.T_palm_object, position)
-            normal = closed.T_palm_object[:3, :3] @ facet
-        touches[i].append(_plane_touch(hand, plan, packed, closed, i, hit, point, position, normal, offset))
-    return touches
+    shape = closed.answer.hit.shape[:2]
+    read = TouchArrays(np.empty((*shape, TOUCH_INTEGERS), dtype=np.int64), np.empty((*shape, TOUCH_FLOATS)))
+    answer = closed.answer._replace(contacts=contacts)
+    T = np.ascontiguousarray(closed.T_palm_object[:3])
+    read_touches(plan.arrays, plan.frames(hand), object_surface(packed), plan.items, answer, T, read)
+    return [
+        [_touch(*row) for row in zip(numbers[:n].tolist(), values[:n].tolist(), values[:n], strict=True)]
+        for n, numbers, values in zip(contacts.tolist(), read.number, read.value, strict=True)
+    ]
 
 
-def _plane_touch(
-    hand: Hand,
-    plan: HandPlan,
-    packed: PackedObject,
-    closed: ClosedHand,
-    i: int,
-    hit: list[int],
-    point: list[float],
-    position: FloatArray,
-    normal: FloatArray,
-    offset: float,
-) -> Touch:
-    """Return a touch on a plane, of numbers that are read already."""
-    plane, outline, kind, source, group, family, _, _, stopped = hit
-    _, _, nx, nz, cx, cz, gap = point
-    arrays, entry = plan.arrays, int(plan.items.entry[i])
-    finger = plan.plans[entry]
-    first, last = arrays.entry_group[entry : entry + 2]
-    link = int(arrays.outlines.link[outline])
-    body = int(packed.tree.body[source]) if source >= 0 else int(packed.rounds.body[-1 - source])
-    travel = closed.answer.travel[i, first:last]
-    own_family = family - int(arrays.entry_family[entry])
+def _touch(number: list[int], value: list[float], row: FloatArray) -> Touch:
+    """Return a touch of the numbers that `clench.kernels.touches` lists; positions and normals are views of `row`."""
+    link, joint, body, kind, plane, graspable = number
+    gap, curve, side, offset = value[6:]
     return Touch(
         link=link,
-        joint=_stopped(plan, entry, group - int(first), stopped),
+        joint=joint,
         body=body,
-        graspable=packed.body_roles[body] is BodyRole.GRASPABLE,
-        plane=plane - int(arrays.family_plane[family]),
+        graspable=bool(graspable),
+        plane=plane if plane >= 0 else None,
         offset=offset,
         kind=kind,
-        position=position,
-        normal=normal,
-        gap=max(gap, _carried(hand, finger, link, own_family, travel, position)),
-        curve_angle=math.atan2(cx, -cz),
-        link_angle=math.atan2(nx, -nz) if kind == 0 else None,
+        position=row[:3],
+        normal=row[3:6],
+        gap=gap,
+        curve_angle=curve,
+        link_angle=None if math.isnan(side) else side,
     )
-
-
-def _exact_touch(hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, i: int, n: int) -> Touch:
-    """Read a touch that an exact sweep found, anywhere over the width."""
-    _, link, kind, element, group, family, _, met, stopped = closed.answer.hit[i, n].tolist()
-    entry = int(plan.items.entry[i])
-    numbers = closed.answer.point[i, n]
-    position, normal = numbers[:3].copy(), numbers[3:6].copy()
-    pose = closed.answer.pose[i, family]
-    body = int(packed.element_body[element]) if met == len(hand.links) else -1 - met
-    across = pose[:, :3].T @ normal
-    return Touch(
-        link=link,
-        joint=_stopped(plan, entry, group - int(plan.arrays.entry_group[entry]), stopped),
-        body=body,
-        graspable=body >= 0 and packed.body_roles[body] is BodyRole.GRASPABLE,
-        plane=None,
-        offset=float(pose[:, 1] @ (position - pose[:, 3])),
-        kind=kind,
-        position=position,
-        normal=normal,
-        gap=float(numbers[6]),
-        curve_angle=math.atan2(across[0], -across[2]),
-        # Where the side of a round link touches, the two surfaces have one tangent.
-        link_angle=math.atan2(across[0], -across[2]) if kind == 0 else None,
-    )
-
-
-def _stopped(plan: HandPlan, entry: int, group: int, last: int) -> int:
-    """Return the joint that a contact stops: the leader of a group, or the last one before those that break away."""
-    finger = plan.plans[entry]
-    if not finger.breaks[group]:
-        return finger.leaders[group]
-    return finger.joints[last - int(plan.joints_of(entry).start)].joint
-
-
-def _carried(hand: Hand, plan: FingerPlan, link: int, family: int, travel: FloatArray, position: FloatArray) -> float:
-    """Return how far the joints of later families carried the point of a link that touched [m].
-
-    Their planes are not those of the touch, so its outline does not tell; the distance is an upper bound of the gap.
-    """
-    if family == len(plan.families) - 1:
-        return 0.0
-    later = {p.group for p in plan.joints if p.family > family and travel[p.group] > 0.0}
-    if not later:
-        return 0.0
-    before = travel.copy()
-    before[list(later)] = 0.0
-    T_before, T_after = (hand.link_poses(plan.angles(hand, s))[link] for s in (before, travel))
-    moved = (T_after @ invert(T_before) @ np.append(position, 1.0))[:3]
-    return float(np.linalg.norm(moved - position))

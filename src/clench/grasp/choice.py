@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -34,7 +35,7 @@ TIERS = (
     "has a value for every criterion",
 )
 
-#: Sets whose angles differ by less are the same for the choice [rad]; sums are rounded to as many digits.
+#: Sets whose angles differ by less are the same for the choice [rad]; so are sums [-].
 SAME_ANGLE = 1e-9
 _SAME_DIGITS = 9
 
@@ -129,12 +130,28 @@ def _compare(group: Sequence[FingerCandidate], names: Sequence[str], calibration
     tiers = tuple(_tier(c, said, calibration) for c in group)
     worth = {name: calibration.worth(name, 1.0) for name in said}
     totals = tuple(sum(w * c.scores[n] for n, w in worth.items() if n in c.scores) for c in group)
+    same = _same_as_whole(group)
     # Rounded, so that sets that are equal but for rounding come in the order of the alternatives.
-    rank = [(tiers[i], round(totals[i], _SAME_DIGITS), c.plane is None, -i) for i, c in enumerate(group)]
+    steps = [math.floor(total / SAME_ANGLE + 0.5) for total in totals]
+    rank = [(tiers[same[i]], steps[same[i]], c.plane is None, -i) for i, c in enumerate(group)]
     order = sorted(range(len(group)), key=rank.__getitem__, reverse=True)
     best = [i for i in order if tiers[i] == tiers[order[0]]]
     different = {group[i].q.round(_SAME_DIGITS).tobytes(): i for i in reversed(best)}
     return FingerChoice(tiers, totals, tuple(order), tuple(i for i in best if i in different.values()), order[0])
+
+
+def _same_as_whole(group: Sequence[FingerCandidate]) -> list[int]:
+    """Return what every set is judged as: a plane's set with the angles of the full width is no other set.
+
+    Corners that touch on several planes at once would else let a plane, which promises less, go before it.
+    """
+    whole = {id(c.plan): i for i, c in enumerate(group) if c.plane is None}
+    result = []
+    for i, c in enumerate(group):
+        full = whole.get(id(c.plan)) if c.clear and c.plane is not None else None
+        same = full is not None and np.abs(c.q - group[full].q).max(initial=0.0) <= SAME_ANGLE
+        result.append(full if full is not None and same else i)
+    return result
 
 
 def _tier(c: FingerCandidate, said: Sequence[str], calibration: Calibration) -> tuple[bool, ...]:

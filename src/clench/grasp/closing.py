@@ -14,19 +14,23 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
 
+from .linkage import plan_frames
 from .packing import pack_plans
 from .plan import FingerPlan
 from .scene import PackedObject
+from .surface import round_arrays
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays
     from clench.kernels.exact import ExactArrays
+    from clench.kernels.frames import FrameArrays
     from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
     from clench.kernels.tree import MeshTree
 
 #: Segments per plane that the arena holds before it has to grow.
-_CAPACITY = 512
+CAPACITY = 512
 
 
 @dataclass(eq=False)
@@ -47,6 +51,13 @@ class HandPlan:
     items: ItemArrays
     whole: tuple[bool, ...]
     together: bool
+    _frames: FrameArrays | None = None
+
+    def frames(self, hand: Hand) -> FrameArrays:
+        """Return the kinematics of the hand that was planned, packed once."""
+        if self._frames is None:
+            self._frames = plan_frames(hand, self.plans)
+        return self._frames
 
     def joints_of(self, entry: int) -> slice:
         """Return the range of an entry's joints in the packed arrays."""
@@ -108,8 +119,8 @@ def close_hand(
     from clench.kernels.overlap import find_overlaps
 
     T = np.ascontiguousarray(T_palm_object[:3])
-    obj = _there(packed)
-    capacity = _CAPACITY
+    obj = object_for_closing(packed)
+    capacity = CAPACITY
     shared = make_sections(len(plan.arrays.plane_offset), capacity, len(obj.rounds.kind))
     while wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared):
         capacity = 2 * wanted
@@ -120,7 +131,7 @@ def close_hand(
     return ClosedHand(answer, overlaps, shared, T_palm_object)
 
 
-class _KernelObject(NamedTuple):
+class KernelObject(NamedTuple):
     """Hold an object as the closing kernels take it."""
 
     tree: MeshTree
@@ -129,27 +140,25 @@ class _KernelObject(NamedTuple):
     bodies: BodyArrays
 
 
-def _there(packed: PackedObject) -> _KernelObject:
-    from clench.kernels.layout import RoundArrays
-
-    r = packed.rounds
-    rounds = RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)
-    return _KernelObject(packed.tree, rounds, packed.closed, packed.bodies)
+def object_for_closing(packed: PackedObject) -> KernelObject:
+    """Return an object as the closing kernels take it."""
+    return KernelObject(packed.tree, round_arrays(packed), packed.closed, packed.bodies)
 
 
 @lru_cache(maxsize=1)
-def _nothing() -> _KernelObject:
+def nothing_to_close() -> KernelObject:
+    """Return an object that is nowhere."""
     from clench.kernels.bodies import no_body
     from clench.kernels.layout import no_rounds
     from clench.kernels.tree import build_tree
 
-    return _KernelObject(build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True, no_body())
+    return KernelObject(build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True, no_body())
 
 
 def _close_plan(
     plan: HandPlan,
     exact: ExactArrays,
-    obj: _KernelObject,
+    obj: KernelObject,
     T: FloatArray,
     shared: SectionArrays,
     capacity: int,
@@ -162,21 +171,27 @@ def _close_plan(
         answer = empty_answer(plan)
         close = partial(_close_range, plan, exact, obj, T, shared, capacity, rounds, answer)
         # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
-        deque(_threads().map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
+        deque(kernel_threads(core_count()).map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
         wanted = int(answer.overflow.max(initial=0))
         if not wanted:
             return answer
         capacity = 2 * wanted
 
 
-@lru_cache(maxsize=1)
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="clench")
+def core_count() -> int:
+    """Return how many cores there are."""
+    return os.cpu_count() or 1
+
+
+@lru_cache(maxsize=4)
+def kernel_threads(count: int) -> ThreadPoolExecutor:
+    """Return so many threads for kernels to run in."""
+    return ThreadPoolExecutor(count, thread_name_prefix="clench")
 
 
 # A forked process has none of its parent's threads.
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_threads.cache_clear)
+    os.register_at_fork(after_in_child=kernel_threads.cache_clear)
 
 
 def _entry_ranges(plan: HandPlan) -> list[tuple[int, int]]:
@@ -188,7 +203,7 @@ def _entry_ranges(plan: HandPlan) -> list[tuple[int, int]]:
 def _close_range(
     plan: HandPlan,
     exact: ExactArrays,
-    obj: _KernelObject,
+    obj: KernelObject,
     T: FloatArray,
     shared: SectionArrays,
     capacity: int,
@@ -237,12 +252,12 @@ def close_item_again(
     from clench.kernels.family_section import make_sections
 
     T = np.ascontiguousarray(closed.T_palm_object[:3])
-    obj, shared = _nothing(), closed.sections
+    obj, shared = nothing_to_close(), closed.sections
     if packed is None:
         shared = make_sections(len(plan.arrays.plane_offset), 0, 0)
     else:
-        obj = _there(packed)
-    answer = _close_plan(only_item(plan, item), exact, obj, T, shared, _CAPACITY, rounds)
+        obj = object_for_closing(packed)
+    answer = _close_plan(only_item(plan, item), exact, obj, T, shared, CAPACITY, rounds)
     return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
 
 

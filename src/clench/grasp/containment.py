@@ -9,11 +9,11 @@ from collections.abc import Collection
 
 import numpy as np
 
-from clench.base.pose import FloatArray, invert
+from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
-from .depths import LinkMesh, link_meshes
+from .depths import link_mesh_arrays, link_meshes, mesh_mask, object_mesh
 from .scene import PackedObject
 
 
@@ -31,20 +31,13 @@ def contained_link(
         hand: the hand. q: angles of all its joints [rad], shape (J,). packed: the object.
         T_palm_object: where it is, shape (4, 4). source: geometry of the hand. links: which links.
     """
-    from clench.kernels.distance import is_inside
+    from clench.kernels.link_meshes import find_contained
 
-    poses = invert(T_palm_object) @ hand.link_poses(q)
-    for mesh in link_meshes(hand, source):
-        if mesh.link not in links:
-            continue
-        T = poses[mesh.link]
-        for p in mesh.points @ T[:3, :3].T + T[:3, 3] if _fits(mesh, T, packed) else ():
-            if is_inside(packed.full_tree, (p[0], p[1], p[2]), packed.closed):
-                return mesh.link
-        for p in (packed.points - T[:3, 3]) @ T[:3, :3]:
-            if is_inside(mesh.tree, (p[0], p[1], p[2]), mesh.closed):
-                return mesh.link
-    return None
+    meshes = link_mesh_arrays(hand, source)
+    T = np.ascontiguousarray(np.asarray(T_palm_object, dtype=np.float64)[:3])
+    poses = np.ascontiguousarray(hand.link_poses(q)[:, :3])
+    found = int(find_contained(meshes, mesh_mask(meshes, links), poses, object_mesh(packed), T))
+    return None if found < 0 else found
 
 
 def may_hold_part(
@@ -89,15 +82,3 @@ def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked
         if is_inside(meshes[m].tree, (p[0], p[1], p[2]), meshes[m].closed):
             return int(links[owner[k]]), int(links[m])
     return None
-
-
-def _fits(mesh: LinkMesh, T_object_link: FloatArray, packed: PackedObject) -> bool:
-    """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
-    if len(mesh.points) != 1 or not len(packed.full_tree.low):
-        return True
-    first = T_object_link[:3, :3] @ mesh.points[0] + T_object_link[:3, 3]
-    if not (np.all(first >= packed.full_tree.low[0]) and np.all(first <= packed.full_tree.high[0])):
-        return False  # most links end here, by one of their corners
-    placed = mesh.tree.vertices @ T_object_link[:3, :3].T + T_object_link[:3, 3]
-    low, high = packed.full_tree.low[0], packed.full_tree.high[0]
-    return bool(np.all(placed >= low) and np.all(placed <= high))

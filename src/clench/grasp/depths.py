@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -19,6 +19,7 @@ from .parts import part_points
 from .scene import PackedObject, shape_mesh
 
 if TYPE_CHECKING:
+    from clench.kernels.link_meshes import LinkMeshArrays, ObjectMesh
     from clench.kernels.tree import MeshTree
 
 #: Depths below this fraction of the object's size are rounding of a touch [-].
@@ -83,35 +84,36 @@ def hand_depths(
         source: which geometry of the hand; None is its default.
         links: only these links; None is all of the hand.
     """
-    from clench.kernels.depth import CROSSINGS, penetration
-    from clench.kernels.tree import STACK_SIZE
+    from clench.kernels.link_meshes import measure_depths
 
-    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
-    T_object_links = invert(np.asarray(T_palm_object, dtype=np.float64)) @ hand.link_poses(q)
+    meshes = link_mesh_arrays(hand, source)
+    wanted = np.ones(len(meshes.link), dtype=np.int64) if links is None else mesh_mask(meshes, links)
+    T = np.ascontiguousarray(np.asarray(T_palm_object, dtype=np.float64)[:3])
+    deepest = np.empty((len(meshes.link), 4))
+    measure_depths(meshes, wanted, np.ascontiguousarray(hand.link_poses(q)[:, :3]), object_mesh(packed), T, deepest)
     found = []
-    for mesh in link_meshes(hand, source):
-        if links is not None and mesh.link not in links:
-            continue
-        T_object_link = T_object_links[mesh.link]
-        depth = 0.0
-        if _may_touch(mesh, T_object_link, packed):
-            depth, *place = penetration(
-                mesh.tree,
-                mesh.owners,
-                mesh.closed,
-                packed.full_tree,
-                packed.full_owners,
-                packed.closed,
-                np.ascontiguousarray(T_object_link[:3]),
-                np.ascontiguousarray(invert(T_object_link)[:3]),
-                crossings,
-                stack,
-            )
-        if depth > _TOUCHING * packed.radius:
-            found.append(LinkDepth(mesh.link, depth, np.array(place)))
-        else:
-            found.append(LinkDepth(mesh.link, 0.0, None))
+    for link, (depth, *place) in zip(meshes.link[wanted != 0].tolist(), deepest[wanted != 0].tolist(), strict=True):
+        overlaps = depth > _TOUCHING * packed.radius
+        found.append(LinkDepth(link, depth if overlaps else 0.0, np.array(place) if overlaps else None))
     return tuple(found)
+
+
+def mesh_mask(meshes: LinkMeshArrays, links: Collection[int]) -> NDArray[np.int64]:
+    """Return which meshes are those of the given links, shape (M,)."""
+    return np.isin(meshes.link, list(links)).astype(np.int64)
+
+
+def object_mesh(packed: PackedObject) -> ObjectMesh:
+    """Return an object's surface as the kernels that measure depths take it."""
+    from clench.kernels.link_meshes import ObjectMesh
+
+    return ObjectMesh(packed.full_tree, packed.full_owners, packed.closed, packed.points)
+
+
+def link_mesh_arrays(hand: Hand, source: CollisionSource | None = None) -> LinkMeshArrays:
+    """Return the meshes of all links of the hand that have a shape in one piece; made once per hand and source."""
+    link_meshes(hand, source)
+    return _kept[id(hand), hand.default_source if source is None else CollisionSource(source)][2]
 
 
 def travel_to_touch(
@@ -197,14 +199,38 @@ def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[Link
         return kept[1]
     meshes = tuple(_link_mesh(n, hand.links[n].shapes.get(chosen, ()), chosen) for n in hand.solid_links)
     meshes = tuple(mesh for mesh in meshes if len(mesh.tree.triangles))
-    _kept[key] = (hand, meshes)
+    _kept[key] = (hand, meshes, _joined(meshes))
     while len(_kept) > _KEPT_HANDS:
         _kept.popitem(last=False)
     return meshes
 
 
 #: Meshes by identity of the hand; each entry holds its hand, so that the identity stays its own.
-_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, tuple[LinkMesh, ...]]] = OrderedDict()
+_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, tuple[LinkMesh, ...], LinkMeshArrays]] = OrderedDict()
+
+
+def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:
+    from clench.kernels.link_meshes import LinkMeshArrays
+    from clench.kernels.tree import build_tree
+
+    def firsts(counts: list[int]) -> NDArray[np.int64]:
+        return np.cumsum([0, *counts]).astype(np.int64)
+
+    none = build_tree(np.empty((0, 3)), np.empty((0, 3)))
+    trees = [none, *(mesh.tree for mesh in meshes)]
+    return LinkMeshArrays(
+        link=np.array([mesh.link for mesh in meshes], dtype=np.int64),
+        closed=np.array([mesh.closed for mesh in meshes], dtype=np.int64),
+        center=np.array([mesh.center for mesh in meshes]).reshape(-1, 3),
+        radius=np.array([mesh.radius for mesh in meshes], dtype=np.float64),
+        point_first=firsts([len(mesh.points) for mesh in meshes]),
+        points=np.concatenate([np.empty((0, 3)), *(mesh.points for mesh in meshes)]),
+        vertex_first=firsts([len(mesh.tree.vertices) for mesh in meshes]),
+        triangle_first=firsts([len(mesh.tree.triangles) for mesh in meshes]),
+        node_first=firsts([len(mesh.tree.low) for mesh in meshes]),
+        tree=type(none)(*(np.concatenate(columns) for columns in zip(*trees, strict=True))),
+        owners=np.concatenate([np.empty(0, dtype=np.uint8), *(mesh.owners for mesh in meshes)]),
+    )
 
 
 def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:
@@ -243,12 +269,3 @@ def is_closed(mesh: TriangleMesh) -> bool:
 def _placed(hand: Hand, q: FloatArray, source: CollisionSource | None) -> list[tuple[LinkMesh, FloatArray]]:
     poses = hand.link_poses(q)
     return [(mesh, poses[mesh.link]) for mesh in link_meshes(hand, source)]
-
-
-def _may_touch(mesh: LinkMesh, T_object_link: FloatArray, packed: PackedObject) -> bool:
-    """Say whether the ball around a link meets the box around the object."""
-    if len(packed.full_tree.low) == 0:
-        return False
-    center = T_object_link[:3, :3] @ mesh.center + T_object_link[:3, 3]
-    outside = np.maximum(np.maximum(packed.full_tree.low[0] - center, center - packed.full_tree.high[0]), 0.0)
-    return bool(outside @ outside <= mesh.radius**2)

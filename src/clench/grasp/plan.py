@@ -259,6 +259,16 @@ def last_closing_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[i
     return result
 
 
+def resting_links(hand: Hand, plan: FingerPlan) -> tuple[int, ...]:
+    """Return the finger's links that no closing joint moves."""
+    closing = {p.joint for p in plan.joints}
+    moved: set[int] = set()
+    for i in plan.finger.links:
+        if hand.links[i].joint in closing or hand.links[i].parent in moved:
+            moved.add(i)
+    return tuple(i for i in plan.finger.links if i not in moved)
+
+
 def _frame(
     hand: Hand,
     closing: list[int],

@@ -14,6 +14,7 @@ from clench.models.hand.hand import Hand
 from .candidates import FingerCandidate, closed_anew
 from .closing import ClosedHand, HandPlan, close_item_again
 from .exact import HandBodies
+from .linkage import placed_links
 from .scene import PackedObject
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def close_in_sequence(
             own = list(candidate.plan.finger.joints)
             posture[own] = candidate.plan.posture[own]
             placed = exact.link_pose.copy()
-            placed[entry] = hand.link_poses(posture)[:, :3]
+            placed[entry] = placed_links(hand, posture)
             among = exact._replace(link_pose=placed, wanted=np.ones(1, dtype=np.int64))
             if _meets_another(plan, among._replace(checked=others), closed, candidate, entry, rounds):
                 among = among._replace(checked=bodies.across)

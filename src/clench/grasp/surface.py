@@ -1,32 +1,42 @@
-"""The object's surface where it is touched: its outward normal, and whose it is."""
+"""The object's surface where it is touched: its outward normals, and whose it is."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from clench.base.pose import FloatArray, invert
-from clench.models.shapes import ShapeKind
+from clench.base.pose import FloatArray
+from clench.models.objects.grasp_object import BodyRole
 
-from .scene import ROUND_KINDS, PackedObject
+from .scene import PackedObject
+
+if TYPE_CHECKING:
+    from clench.kernels.layout import RoundArrays
+    from clench.kernels.touches import SurfaceArrays
 
 
-def surface_normal(packed: PackedObject, source: int, T_palm_object: FloatArray, position: FloatArray) -> FloatArray:
-    """Return the outward unit normal in the object's frame, shape (3,): of the touched facet, or of the round shape.
+def round_arrays(packed: PackedObject) -> RoundArrays:
+    """Return an object's round shapes as the kernels take them."""
+    from clench.kernels.layout import RoundArrays
 
-    Args:
-        packed: the object. source: touched triangle of its tree, or -1 - index of a round shape.
-        T_palm_object: shape (4, 4). position: of the touch in the palm frame [m], shape (3,).
-    """
-    if source >= 0:
-        facet: FloatArray = packed.tree.normals[source]
-        return facet
-    i = -1 - source
-    pose = packed.rounds.T_object_shape[i]
-    in_object = (invert(T_palm_object) @ np.append(position, 1.0))[:3]
-    normal: FloatArray = pose[:, :3] @ _round_normal(
-        int(packed.rounds.kind[i]), packed.rounds.size[i], pose[:, :3].T @ (in_object - pose[:, 3])
+    r = packed.rounds
+    return RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)
+
+
+def object_surface(packed: PackedObject) -> SurfaceArrays:
+    """Return what reading touches needs of an object."""
+    from clench.kernels.touches import SurfaceArrays
+
+    graspable = [role is BodyRole.GRASPABLE for role in packed.body_roles]
+    return SurfaceArrays(
+        packed.tree.normals,
+        packed.tree.body,
+        round_arrays(packed),
+        packed.rounds.body,
+        packed.element_body,
+        np.array(graspable, dtype=np.int64),
     )
-    return normal
 
 
 def nearest_body(packed: PackedObject, place: FloatArray) -> int:
@@ -35,19 +45,3 @@ def nearest_body(packed: PackedObject, place: FloatArray) -> int:
 
     _, triangle, _, _, _ = closest_point(packed.full_tree, np.asarray(place, dtype=np.float64), np.inf)
     return int(packed.full_tree.body[triangle])
-
-
-def _round_normal(kind: int, size: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the normal of a round shape in its own frame at a point of its surface."""
-    if kind == ROUND_KINDS[ShapeKind.ELLIPSOID]:
-        n = p / size**2
-    elif kind == ROUND_KINDS[ShapeKind.CYLINDER]:
-        across = float(np.hypot(p[0], p[1]))
-        on_cap = abs(abs(p[2]) - size[1]) < abs(across - size[0])
-        n = np.array([0.0, 0.0, np.sign(p[2])]) if on_cap else np.array([p[0], p[1], 0.0])
-    elif kind == ROUND_KINDS[ShapeKind.CAPSULE]:
-        n = p - np.array([0.0, 0.0, min(max(p[2], -size[1]), size[1])])
-    else:
-        n = p
-    unit: FloatArray = n / np.linalg.norm(n)
-    return unit

@@ -41,8 +41,9 @@ _KINDS = (
     ContactKind.FACE,
 )
 _Places = dict[int, tuple[FloatArray, FloatArray]]
-#: Contacts of thumb and finger oppose each other when their normals do: the cosine is below this [-].
-_OPPOSED = 0.0
+#: Contacts of thumb and finger oppose each other when their normals do: the cosine is below this [-]. Normals of faces
+#: at right angles do not, whichever way their product is rounded.
+_OPPOSED = -1e-9
 
 
 @dataclass(frozen=True, eq=False)

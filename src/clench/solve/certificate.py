@@ -15,6 +15,7 @@ from clench.grasp.candidates import FingerCandidate
 from clench.grasp.containment import contained_link, link_within_link
 from clench.grasp.depths import LinkDepth
 from clench.grasp.exact import boxes_meet, hand_bodies, swept_deviation, tilt_deviation
+from clench.grasp.linkage import placed_links
 
 if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
@@ -135,7 +136,7 @@ def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[st
     from clench.kernels.exact import find_link_overlap
 
     hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])
-    poses = np.ascontiguousarray(hand.link_poses(q)[:, :3])
+    poses = placed_links(hand, q)
     bodies = hand_bodies(hand, problem.source)
     everything = exact._replace(object=problem.packed.bodies, checked=bodies.across * boxes_meet(bodies, poses))
     pair = find_link_overlap(everything, poses, T, ALLOWED_PENETRATION)

@@ -6,12 +6,13 @@ import time
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clench.base.errors import CommandError, HandError, ObjectError, UnknownNameError
-from clench.base.pose import FloatArray, Pose, invert
+from clench.base.pose import FloatArray, Pose
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, combined_posture, read_candidates
@@ -78,10 +79,14 @@ class Problem:
         """Whether all joints close at once."""
         return self.command.order != ClosingOrder.PROXIMAL_FIRST
 
-    @property
+    @cached_property
     def T_palm_object(self) -> FloatArray:
         """Where the object is for the hand, shape (4, 4)."""
-        return invert(self.T_world_palm.matrix) @ self.T_world_object.matrix
+        from clench.kernels.frames import relate_poses
+
+        T = np.eye(4)
+        relate_poses(self.T_world_palm.wxyz_xyz[None], self.T_world_object.wxyz_xyz[None], T[None, :3])
+        return T
 
 
 def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record | None = None) -> GraspSolution:
@@ -147,7 +152,7 @@ def _close_fingers(
 ) -> tuple[HandPlan, ExactArrays, ClosedHand, list[list[FingerCandidate]]]:
     """Close every alternative of every finger, and judge what it passes through."""
     hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
-    plan, exact = _planned(problem)
+    plan, exact = planned(problem)
     clock.lap("plan")
     closed = close_hand(plan, exact, packed, T, problem.rounds)
     clock.lap("close")
@@ -205,10 +210,10 @@ def plan_hand(problem: Problem) -> HandPlan:
     Raises:
         HandError: no finger asked for has a closing joint.
     """
-    return _planned(problem)[0]
+    return planned(problem)[0]
 
 
-def _planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
+def planned(problem: Problem) -> tuple[HandPlan, ExactArrays]:
     """Return the plan of a hand at a posture, and what its exact sweeps need."""
     hand, command = problem.hand, problem.command
     key = (

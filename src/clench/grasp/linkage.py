@@ -1,0 +1,80 @@
+"""Pack a hand's kinematics and its links' meshes for the kernels; once per hand."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+
+from .plan import FingerPlan
+
+if TYPE_CHECKING:
+    from clench.kernels.frames import FrameArrays
+
+_KEPT_HANDS: Final = 16
+#: Frames by identity of the hand; each entry holds its hand, so that the identity stays its own.
+_kept: OrderedDict[int, tuple[Hand, FrameArrays]] = OrderedDict()
+
+
+def hand_frames(hand: Hand) -> FrameArrays:
+    """Return the kinematics of a hand without any entry; made once per hand."""
+    kept = _kept.get(id(hand))
+    if kept is not None and kept[0] is hand:
+        return kept[1]
+    frames = _frames(hand)
+    _kept[id(hand)] = (hand, frames)
+    while len(_kept) > _KEPT_HANDS:
+        _kept.popitem(last=False)
+    return frames
+
+
+def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
+    """Return the kinematics of a hand with the plans of its fingers, one entry each."""
+    return hand_frames(hand)._replace(
+        posture=np.array([plan.posture for plan in plans], dtype=np.float64),
+        group_leader=_whole([leader for plan in plans for leader in plan.leaders]),
+        chain_joint=_whole([p.joint for plan in plans for p in plan.joints]),
+    )
+
+
+def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
+    """Return `T_palm_link` of every link at a posture [rad], as the kernels place them, shape (L, 3, 4)."""
+    from clench.kernels.frames import place_links
+
+    poses = np.empty((len(hand.links), 3, 4))
+    place_links(hand_frames(hand), np.ascontiguousarray(q), poses)
+    return poses
+
+
+def _frames(hand: Hand) -> FrameArrays:
+    from clench.kernels.frames import FrameArrays
+
+    joints, couplings = hand.joints, hand.couplings
+    return FrameArrays(
+        parent=_whole([link.parent for link in hand.links]),
+        joint=_whole([link.joint for link in hand.links]),
+        T_parent_link=np.array([link.T_parent_link[:3] for link in hand.links], dtype=np.float64),
+        axis=np.array([j.axis for j in joints], dtype=np.float64).reshape(-1, 3),
+        anchor=np.array([j.anchor for j in joints], dtype=np.float64).reshape(-1, 3),
+        reference=np.array([j.reference for j in joints], dtype=np.float64),
+        palm=_whole([hand.palm]),
+        direction=np.array([j.direction for j in joints], dtype=np.float64),
+        lower=np.array([j.lower for j in joints], dtype=np.float64),
+        upper=np.array([j.upper for j in joints], dtype=np.float64),
+        leader=_whole([c.leader for c in couplings]),
+        follower=_whole([c.follower for c in couplings]),
+        ratio=np.array([c.ratio for c in couplings], dtype=np.float64),
+        offset=np.array([c.offset for c in couplings], dtype=np.float64),
+        posture=np.empty((0, len(joints))),
+        group_leader=_whole([]),
+        chain_joint=_whole([]),
+    )
+
+
+def _whole(numbers: Sequence[int]) -> np.ndarray:
+    return np.array(numbers, dtype=np.int64)

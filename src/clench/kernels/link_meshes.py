@@ -1,0 +1,207 @@
+"""The meshes of a hand's links in one piece, and what lies how deep in what (METHOD.md sections 3 and 5)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compiling import inner_kernel, kernel
+from .depth import CROSSINGS, penetration
+from .distance import is_inside
+from .family_pose import compose_inverse
+from .layout import Floats
+from .layout import Ints as Numbers
+from .tree import STACK_SIZE, Ints, MeshTree
+
+
+class LinkMeshArrays(NamedTuple):
+    """Hold the trees of M links, one after another; M may be smaller than the number of links of the hand.
+
+    Args:
+        link: index in the hand, (M,). closed: watertight with outward normals, (M,).
+        center: of a ball around it, (M, 3), radius: of that ball [m], (M,).
+        point_first: first of its points, (M + 1,). points: one of every connected part [m], (P, 3).
+        vertex_first, triangle_first, node_first: first vertex, triangle and node of each, (M + 1,).
+        tree: the trees' arrays joined, with numbers that count from each tree's own beginning. owners: (T,).
+    """
+
+    link: Numbers
+    closed: Numbers
+    center: Floats
+    radius: Floats
+    point_first: Numbers
+    points: Floats
+    vertex_first: Numbers
+    triangle_first: Numbers
+    node_first: Numbers
+    tree: MeshTree
+    owners: NDArray[np.uint8]
+
+
+class ObjectMesh(NamedTuple):
+    """Hold an object's surface: tree of all its triangles, their owners, whether closed, a point of every part."""
+
+    tree: MeshTree
+    owners: NDArray[np.uint8]
+    closed: bool
+    points: Floats
+
+
+@inner_kernel
+def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
+    """Return the tree of one link."""
+    v0, v1 = meshes.vertex_first[k], meshes.vertex_first[k + 1]
+    t0, t1 = meshes.triangle_first[k], meshes.triangle_first[k + 1]
+    n0, n1 = meshes.node_first[k], meshes.node_first[k + 1]
+    tree = meshes.tree
+    return MeshTree(
+        tree.vertices[v0:v1],
+        tree.triangles[t0:t1],
+        tree.normals[t0:t1],
+        tree.body[t0:t1],
+        tree.original[t0:t1],
+        tree.low[n0:n1],
+        tree.high[n0:n1],
+        tree.first[n0:n1],
+        tree.count[n0:n1],
+        tree.right[n0:n1],
+        tree.skip[n0:n1],
+    )
+
+
+@inner_kernel
+def put_at(T: Floats, p: Floats, out: Floats) -> None:
+    """Map a point by a pose, (3, 4)."""
+    for r in range(3):
+        out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
+
+
+@inner_kernel
+def put_back(T: Floats, p: Floats, out: Floats) -> None:
+    """Map a point by the inverse of a pose, (3, 4)."""
+    for c in range(3):
+        out[c] = T[0, c] * (p[0] - T[0, 3]) + T[1, c] * (p[1] - T[1, 3]) + T[2, c] * (p[2] - T[2, 3])
+
+
+@inner_kernel
+def in_box(obj: MeshTree, p: Floats) -> bool:
+    """Say whether a point lies in the box around a mesh."""
+    inside = True
+    for k in range(3):
+        inside = inside and obj.low[0, k] <= p[k] <= obj.high[0, k]
+    return bool(inside)
+
+
+@inner_kernel
+def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree) -> bool:
+    """Say whether the ball around a link meets the box around the object."""
+    if obj.low.shape[0] == 0:
+        return False
+    center, outside = np.empty(3), 0.0
+    put_at(T_object_link, meshes.center[k], center)
+    for r in range(3):
+        outside += max(max(obj.low[0, r] - center[r], center[r] - obj.high[0, r]), 0.0) ** 2
+    return bool(outside <= meshes.radius[k] ** 2)
+
+
+@kernel
+def measure_depths(
+    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, obj: ObjectMesh, T_palm_object: Floats, out: Floats
+) -> None:
+    """Write depth and place of the links that are wanted, (M, 4), zeros where nothing overlaps; see `penetration`.
+
+    Args:
+        meshes: of the links. wanted: which, (M,). poses: `T_palm_link` of every link, (L, 3, 4).
+        obj: the object. T_palm_object: where it is, (3, 4).
+    """
+    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
+    for k in range(meshes.link.shape[0]):
+        out[k] = 0.0
+        if wanted[k]:
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3] = depth_of(
+                meshes, k, poses[meshes.link[k]], obj, T_palm_object, crossings, stack
+            )
+
+
+@inner_kernel
+def depth_of(
+    meshes: LinkMeshArrays,
+    k: int,
+    T_palm_link: Floats,
+    obj: ObjectMesh,
+    T_palm_object: Floats,
+    crossings: Floats,
+    stack: Ints,
+) -> tuple[float, float, float, float]:
+    """Return depth and place of one link."""
+    T, back = np.empty((3, 4)), np.empty((3, 4))
+    compose_inverse(T_palm_object, T_palm_link, T)
+    if not may_touch(meshes, k, T, obj.tree):
+        return 0.0, 0.0, 0.0, 0.0
+    compose_inverse(T_palm_link, T_palm_object, back)
+    closed = meshes.closed[k] != 0
+    found: tuple[float, float, float, float] = penetration(
+        mesh_of(meshes, k),
+        meshes.owners[meshes.triangle_first[k] : meshes.triangle_first[k + 1]],
+        closed,
+        obj.tree,
+        obj.owners,
+        obj.closed,
+        T,
+        back,
+        crossings,
+        stack,
+    )
+    return found
+
+
+@kernel
+def find_contained(
+    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, obj: ObjectMesh, T_palm_object: Floats
+) -> int:
+    """Return a link that has a part inside the object or around a part of it, or -1; as in `measure_depths`."""
+    T, p = np.empty((3, 4)), np.empty(3)
+    for k in range(meshes.link.shape[0]):
+        if not wanted[k]:
+            continue
+        compose_inverse(T_palm_object, poses[meshes.link[k]], T)
+        if obj.tree.low.shape[0] > 0 and may_fit(meshes, k, T, obj.tree, p):
+            for i in range(meshes.point_first[k], meshes.point_first[k + 1]):
+                put_at(T, meshes.points[i], p)
+                if is_inside(obj.tree, (p[0], p[1], p[2]), obj.closed):
+                    return int(meshes.link[k])
+        for i in range(obj.points.shape[0]):
+            put_back(T, obj.points[i], p)
+            if is_inside(mesh_of(meshes, k), (p[0], p[1], p[2]), meshes.closed[k] != 0):
+                return int(meshes.link[k])
+    return -1
+
+
+@inner_kernel
+def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree, p: Floats) -> bool:
+    """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
+    if meshes.point_first[k + 1] - meshes.point_first[k] != 1:
+        return True
+    put_at(T_object_link, meshes.points[meshes.point_first[k]], p)
+    if not in_box(obj, p):
+        return False
+    for i in range(meshes.vertex_first[k], meshes.vertex_first[k + 1]):
+        put_at(T_object_link, meshes.tree.vertices[i], p)
+        if not in_box(obj, p):
+            return False
+    return True
+
+
+@inner_kernel
+def may_hold_part(meshes: LinkMeshArrays, poses: Floats, obj: ObjectMesh, T_palm_object: Floats) -> bool:
+    """Say whether a part of the object may lie inside a link, as the links' balls tell."""
+    p, c = np.empty(3), np.empty(3)
+    for i in range(obj.points.shape[0]):
+        put_at(T_palm_object, obj.points[i], p)
+        for k in range(meshes.link.shape[0]):
+            put_at(poses[meshes.link[k]], meshes.center[k], c)
+            if (c[0] - p[0]) ** 2 + (c[1] - p[1]) ** 2 + (c[2] - p[2]) ** 2 <= meshes.radius[k] ** 2:
+                return True
+    return False
