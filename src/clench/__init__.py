@@ -40,7 +40,9 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
     from clench.models.shapes import CollisionSource, ShapeKind
+    from clench.solve.batch import solve_batch, solve_stream
     from clench.solve.controller import solve
+    from clench.solve.grasp_batch import BatchContacts, GraspBatch
     from clench.solve.pose_error import PoseErrorReport, pose_error
     from clench.solve.quality import GraspQuality, grasp_quality
     from clench.solve.record import Record
@@ -55,12 +57,14 @@ if TYPE_CHECKING:
         SolutionStatus,
     )
     from clench.solve.squeezing import SqueezePlan, plan_squeeze
+    from clench.solve.tracking import Tracker
 
 __version__ = "0.1.0"
 
 # One documented path per name: the module that defines it. A test holds this equal to `__all__`.
 _HOMES = {
     "Actuator": "clench.execution.executing",
+    "BatchContacts": "clench.solve.grasp_batch",
     "Body": "clench.models.objects.grasp_object",
     "BodyRole": "clench.models.objects.grasp_object",
     "Calibration": "clench.grasp.calibration",
@@ -83,6 +87,7 @@ _HOMES = {
     "FindingCode": "clench.models.hand.findings",
     "FingerResult": "clench.solve.solution",
     "FingerStatus": "clench.solve.solution",
+    "GraspBatch": "clench.solve.grasp_batch",
     "GraspCommand": "clench.models.command",
     "GraspFormat": "clench.execution.formats.exchange",
     "GraspObject": "clench.models.objects.grasp_object",
@@ -111,6 +116,7 @@ _HOMES = {
     "SimulatedHand": "clench.execution.simulation",
     "SolutionStatus": "clench.solve.solution",
     "SqueezePlan": "clench.solve.squeezing",
+    "Tracker": "clench.solve.tracking",
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
     "approach_poses": "clench.grasp.approach",
@@ -128,11 +134,14 @@ _HOMES = {
     "pose_error": "clench.solve.pose_error",
     "register_criterion": "clench.grasp.criterion_registry",
     "sensitivity": "clench.solve.sensitivity",
+    "solve_batch": "clench.solve.batch",
+    "solve_stream": "clench.solve.batch",
     "write_log": "clench.execution.formats.mcap_log",
 }
 
 __all__ = [
     "Actuator",
+    "BatchContacts",
     "Body",
     "BodyRole",
     "Calibration",
@@ -155,6 +164,7 @@ __all__ = [
     "FindingCode",
     "FingerResult",
     "FingerStatus",
+    "GraspBatch",
     "GraspCommand",
     "GraspFormat",
     "GraspObject",
@@ -183,6 +193,7 @@ __all__ = [
     "SimulatedHand",
     "SolutionStatus",
     "SqueezePlan",
+    "Tracker",
     "Trajectory",
     "UnknownNameError",
     "__version__",
@@ -202,6 +213,8 @@ __all__ = [
     "register_criterion",
     "sensitivity",
     "solve",
+    "solve_batch",
+    "solve_stream",
     "write_log",
 ]
 

@@ -67,6 +67,37 @@ def solve(
     return _print(bench_solve(hand, object, scale, planes, poses, passes, seed), json)
 
 
+def batch(
+    *,
+    hand: str = "patent15",
+    object: str = "mug",
+    scale: float = 1.0,
+    planes: int = 5,
+    poses: int = 200,
+    passes: int = 5,
+    stream: int = 2000,
+    seed: int = 0,
+    json: bool = False,
+) -> int:
+    """Time many solves at once, on one core and on all, with and without the full width, and stream poses.
+
+    Args:
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
+        scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        planes: curl planes per finger.
+        poses: how many approach poses are solved.
+        passes: how often they are timed.
+        stream: how many poses are streamed.
+        seed: of the approach poses.
+        json: print one JSON document on standard output.
+    """
+    from .batching import bench_batch
+
+    _at_least(1, planes=planes, poses=poses, passes=passes, stream=stream)
+    return _print(bench_batch(hand, object, scale, planes, poses, passes, stream, seed), json)
+
+
 def choose(
     *,
     hand: str = "patent15",
@@ -167,7 +198,13 @@ def hold(
     return _print(bench_hold(hand, object, scale, asked, HoldFiles(table, trials), show_progress=not json), json)
 
 
-BENCHMARKS: dict[str, Callable[..., int]] = {"solve": solve, "choose": choose, "steadiness": steadiness, "hold": hold}
+BENCHMARKS: dict[str, Callable[..., int]] = {
+    "solve": solve,
+    "batch": batch,
+    "choose": choose,
+    "steadiness": steadiness,
+    "hold": hold,
+}
 
 
 def _at_least(least: int, **counts: int) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from clench.base.errors import CommandError, FileError
 
+from .batch import batch
 from .calibrating import calibrate
 from .exchange import export, import_
 from .execute import execute
@@ -263,6 +264,7 @@ def bench(*arguments: str) -> int:
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "solve": solve,
+    "batch": batch,
     "hand": hand,
     "execute": execute,
     "export": export,

@@ -219,6 +219,20 @@ def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
     console.print(table)
 
 
+def print_batch(document: Mapping[str, Any]) -> None:
+    """Print how the poses of a batch ended, and how long that took; see `clench batch --json`."""
+    console = _console()
+    count, seconds = document["poses"], document["seconds"]
+    table = _table(f"{document['hand']} on {document['object']}: {count} poses", "status", "poses", "share")
+    for name, number in {**document["status"], "certified": document["certified"]}.items():
+        table.add_row(name, str(number), f"{100.0 * number / max(count, 1):.1f} %")
+    console.print(table)
+    rate = f", {count / seconds:.0f} a second" if count and seconds > 0.0 else ""
+    console.print(f"solved in {seconds:.2f} s{rate}")
+    if document["one_by_one"]:
+        console.print(f"{document['one_by_one']} of them one by one: the kernels of a batch do not cover this command")
+
+
 def print_weights(weights: Mapping[str, float], sentence: str) -> None:
     """Print fitted weights, and a sentence about them."""
     console = _console()

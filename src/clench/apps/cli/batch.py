@@ -1,0 +1,130 @@
+"""The command that solves many poses and writes the answers as arrays."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from clench.base.errors import CommandError, FileError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+
+SCHEMA = "clench.batch/1"
+
+
+def batch(
+    *,
+    hand: str,
+    object: str,
+    poses: Path | None = None,
+    count: int = 100,
+    seed: int = 0,
+    command: Path | None = None,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    scale: float = 1.0,
+    planes: int | None = None,
+    planes_only: bool = False,
+    threads: int | None = None,
+    out: Path | None = None,
+    strict: bool = False,
+    json: bool = False,
+) -> int:
+    """Solve one command at many poses of the hand, on all cores, and write the answers as arrays (docs/batch.md).
+
+    Args:
+        hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
+        object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
+        poses: NumPy file (.npy) of rows [w, x, y, z, X, Y, Z] or of matrices 4 x 4; without it, approach poses.
+        count: how many approach poses.
+        seed: of the approach poses.
+        command: command file (JSON) with everything else; its own hand_pose plays no part.
+        hand_file: TOML file that overrides what was found in the hand's model.
+        palm: name of the palm link, to pick a hand inside a whole robot.
+        scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        planes: curl planes per finger.
+        planes_only: close on the planes alone; what lies between them is not looked at, and nothing is certified.
+        threads: how many are used; all cores by default.
+        out: NumPy file (.npz) to write.
+        strict: exit with 1 unless a pose gives a grasp.
+        json: print one JSON document on standard output.
+    """
+    from dataclasses import replace
+
+    import clench
+    from clench.kernels.warming import warm_up
+
+    from .printing import print_batch, print_files
+    from .results import print_json
+
+    if out is not None and out.suffix != ".npz":
+        raise CommandError(f"--out: expected a file that ends in .npz, got '{out}'.")
+    the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
+    the_object = clench.GraspObject.load(object, scale=scale)
+    asked = clench.GraspCommand(hand_pose=clench.Pose.identity())
+    if command is not None:
+        asked = clench.load_command(command)
+    if planes_only:
+        asked = replace(asked, full_width=False)
+    if planes is not None:
+        asked = replace(asked, planes=planes)
+    warm_up()
+    rows = _approaches(the_hand, the_object, count, seed) if poses is None else _read(poses)
+    began = time.perf_counter()
+    answers = clench.solve_batch(the_hand, the_object, rows, asked, threads=threads)
+    seconds = time.perf_counter() - began
+    if out is not None:
+        answers.save(out)
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "hand": the_hand.name,
+        "object": the_object.name,
+        "poses": len(answers),
+        "status": answers.counts(),
+        "certified": int(answers.certified.sum()),
+        "one_by_one": int(answers.one_by_one.sum()),
+        "seconds": seconds,
+        "file": None if out is None else str(out),
+    }
+    if json:
+        print_json(document)
+    else:
+        print_batch(document)
+        print_files([] if out is None else [out])
+    counts = answers.counts()
+    return 0 if counts["grasp"] or (counts["partial"] and not strict) else 1
+
+
+def _approaches(hand: Hand, obj: GraspObject, count: int, seed: int) -> Any:
+    import clench
+
+    if count < 1:
+        raise CommandError(f"--count: expected at least 1, got {count}.")
+    return clench.approach_poses(hand, obj, count, seed)
+
+
+def _read(path: Path) -> np.ndarray:
+    """Read an array of poses; which shapes there are is told by what solves them.
+
+    Raises:
+        FileError: missing, or no array of numbers.
+    """
+    import numpy as np
+
+    from clench.base.pose_arrays import pose_rows
+
+    if not path.is_file():
+        raise FileError(path, "no such file of poses.")
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise FileError(path, f"not a NumPy file (.npy) of numbers ({error}).") from None
+    if not isinstance(array, np.ndarray):
+        array.close()
+        raise FileError(path, "expected one array (.npy), got an archive of several (.npz).")
+    return pose_rows(array, str(path))

@@ -1,0 +1,228 @@
+"""Solve a packed problem at many poses of the object: kernels over ranges of poses, in threads."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.pose import FloatArray
+
+from .batching import PackedProblem
+from .closing import CAPACITY, KernelObject, kernel_threads, nothing_to_close
+
+if TYPE_CHECKING:
+    from clench.kernels.batch_layout import Solved
+    from clench.kernels.layout import ClosingArrays
+
+Whole = NDArray[np.int64]
+
+
+def solve_packed(problem: PackedProblem, T_palm_object: FloatArray, threads: int) -> Solved:
+    """Solve for every pose of the object; the answer is the same for any number of threads.
+
+    Args:
+        problem: the rest. T_palm_object: where the object is, shape (N, 3, 4). threads: how many are used.
+    """
+    solved = _empty_solved(problem, len(T_palm_object))
+    # A few more parts than threads, as poses that touch nothing are quick.
+    count = min(len(T_palm_object), 4 * threads)
+    if threads == 1 or count < 2:
+        _Range(problem, T_palm_object).solve(solved)
+        return solved
+    ends = np.linspace(0, len(T_palm_object), count + 1).astype(int).tolist()
+
+    def run(span: tuple[int, int]) -> None:
+        columns: list[Any] = [column[slice(*span)] for column in solved]
+        _Range(problem, T_palm_object[slice(*span)]).solve(type(solved)(*columns))
+
+    deque(kernel_threads(threads).map(run, pairwise(ends)), maxlen=0)
+    return solved
+
+
+class _Range:
+    """Solve a range of poses, stage after stage."""
+
+    def __init__(self, problem: PackedProblem, T_palm_object: FloatArray) -> None:
+        self._problem, self._T = problem, T_palm_object
+        self._count, self._items = len(T_palm_object), len(problem.items.entry)
+        self._blocked = np.zeros((self._count, len(problem.frames.posture)), dtype=np.int64)
+        self._answers = _empty_answers(problem, self._count)
+
+    def solve(self, solved: Solved) -> None:
+        """Close the fingers, each with the earlier ones in its way, and judge the answer, which is written."""
+        from clench.kernels.batch_judging import judge_poses
+        from clench.kernels.batch_sequence import find_blocked
+
+        p = self._problem
+        everyone = np.arange(self._count)
+        overlaps = self._close(everyone, np.ones((self._count, self._items), dtype=np.int64))
+        find_blocked(
+            p.exact.link_pose,
+            p.meshes,
+            p.items,
+            p.wanted,
+            p.mesh,
+            self._T,
+            overlaps,
+            self._answers,
+            self._blocked,
+        )
+        if p.wanted.whole and not p.alone:
+            self._close_in_sequence()
+        judge_poses(
+            p.hand,
+            p.exact._replace(checked=p.bodies.across),
+            p.frames,
+            p.surface,
+            p.mesh,
+            p.meshes,
+            p.items,
+            p.wanted,
+            self._T,
+            self._answers,
+            self._blocked,
+            solved,
+        )
+
+    def _close(self, poses: Whole, asked: Whole, placed: FloatArray | None = None) -> Whole:
+        """Close the items that are asked for at some poses, with arenas that grow until they are large enough.
+
+        Args:
+            poses: indices of the poses. asked: (len(poses), I). placed: where the links are when they start, where
+                other fingers are in the way; None leaves those out.
+
+        Returns:
+            overlaps at the start, (len(poses), E).
+        """
+        p = self._problem
+        overlaps = np.empty((len(poses), self._blocked.shape[1]), dtype=np.int64)
+        waiting, capacity = np.arange(len(poses)), CAPACITY
+        while len(waiting):
+            rows = poses[waiting]
+            answers = _rows(self._answers, rows)
+            found = np.empty((len(rows), overlaps.shape[1]), dtype=np.int64)
+            links = p.exact.link_pose[None] if placed is None else placed[waiting]
+            exact = p.exact if placed is None else p.exact._replace(checked=p.bodies.across)
+            length = np.repeat(p.hand.chain.group_length[None], len(links), axis=0)
+            self._run(exact, p.target, rows, links, length, asked[waiting], capacity, found, answers)
+            for column, values in zip(self._answers, answers, strict=True):
+                column[rows] = values
+            overlaps[waiting] = found
+            wanted = (answers.overflow * asked[waiting]).max(axis=1, initial=0)
+            capacity, waiting = 2 * int(wanted.max(initial=0)), waiting[wanted > 0]
+        return overlaps
+
+    def _run(
+        self,
+        exact: Any,
+        target: KernelObject,
+        rows: Whole,
+        links: FloatArray,
+        length: FloatArray,
+        asked: Whole,
+        capacity: int,
+        overlaps: Whole,
+        answers: ClosingArrays,
+    ) -> None:
+        from clench.kernels.batch_closing import close_poses
+        from clench.kernels.family_section import make_sections
+
+        p, rounds = self._problem, len(target.rounds.kind)
+        close_poses(
+            p.hand,
+            exact,
+            target.tree,
+            target.rounds,
+            target.closed,
+            np.ascontiguousarray(self._T[rows]),
+            links,
+            length,
+            p.items,
+            asked,
+            make_sections(len(p.hand.plane_offset), capacity, rounds),
+            make_sections(p.most_planes, capacity, rounds),
+            overlaps,
+            answers,
+        )
+
+    def _close_in_sequence(self) -> None:
+        """Close fingers anew that meet another one, each with the earlier ones where they are by then.
+
+        Items are entries here: the full width of each. A finger's set stands once those before it do.
+        """
+        waiting, first = np.arange(self._count), np.zeros(self._count, dtype=np.int64)
+        entry = np.arange(self._items)
+        while len(waiting):
+            placed, length = self._place(waiting)
+            asked = ((self._blocked[waiting] == 0) & (entry >= first[:, None])).astype(np.int64)
+            meets = self._meeting(waiting, placed, length, asked)
+            again = meets.any(axis=1)
+            waiting, placed = waiting[again], placed[again]
+            chosen = meets[again].argmax(axis=1)
+            self._close(waiting, (entry == chosen[:, None]).astype(np.int64), placed)
+            first = chosen + 1
+
+    def _place(self, poses: Whole) -> tuple[FloatArray, FloatArray]:
+        """Return where all links are when each finger begins, (N, E, L, 3, 4), and the travel of all groups, (N, G)."""
+        from clench.kernels.batch_sequence import place_fingers
+
+        p = self._problem
+        placed = np.empty((len(poses), *p.exact.link_pose.shape))
+        length = np.zeros((len(poses), len(p.hand.chain.group_length)))
+        place_fingers(p.hand, p.frames, p.wanted, self._answers.travel[poses], placed, length)
+        return placed, length
+
+    def _meeting(self, poses: Whole, placed: FloatArray, length: FloatArray, asked: Whole) -> NDArray[np.bool_]:
+        """Say which items meet another finger's links on the path to their sets; the object plays no part."""
+        p, none = self._problem, nothing_to_close()
+        exact = p.exact._replace(object=none.bodies, checked=p.bodies.across - p.bodies.within)
+        answers = _empty_answers(p, len(poses))
+        overlaps = np.empty((len(poses), self._blocked.shape[1]), dtype=np.int64)
+        self._run(exact, none, poses, placed, length, asked, CAPACITY, overlaps, answers)
+        meets: NDArray[np.bool_] = (asked != 0) & ((answers.contacts > 0) | (answers.skipped > 0))
+        return meets
+
+
+def _rows(answers: ClosingArrays, rows: Whole) -> ClosingArrays:
+    columns: list[Any] = [column[rows] for column in answers]
+    return type(answers)(*columns)
+
+
+def _empty_answers(problem: PackedProblem, count: int) -> ClosingArrays:
+    """Return the arrays that the closing of so many poses writes."""
+    from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
+
+    items, contacts, chain = len(problem.items.entry), problem.most_contacts, problem.hand.chain
+    return ClosingArrays(
+        travel=np.zeros((count, items, len(chain.group_length))),
+        turn=np.zeros((count, items, len(chain.rate))),
+        contacts=np.zeros((count, items), dtype=np.int64),
+        hit=np.zeros((count, items, contacts, HIT_INTEGERS), dtype=np.int64),
+        point=np.zeros((count, items, contacts, HIT_FLOATS)),
+        pose=np.zeros((count, items, len(problem.hand.family_pose), 3, 4)),
+        overflow=np.zeros((count, items), dtype=np.int64),
+        overlap=np.full((count, items), -1, dtype=np.int64),
+        skipped=np.zeros((count, items), dtype=np.int64),
+    )
+
+
+def _empty_solved(problem: PackedProblem, count: int) -> Solved:
+    from clench.kernels.batch_layout import Solved
+    from clench.kernels.touches import TOUCH_FLOATS, TOUCH_INTEGERS
+
+    entries, joints = problem.frames.posture.shape
+    most = problem.most_contacts
+    return Solved(
+        angles=np.zeros((count, joints)),
+        status=np.zeros(count, dtype=np.int64),
+        certified=np.zeros(count, dtype=np.int64),
+        fingers=np.zeros((count, entries), dtype=np.int64),
+        chosen=np.zeros((count, entries), dtype=np.int64),
+        contacts=np.zeros((count, entries), dtype=np.int64),
+        number=np.zeros((count, entries, most, TOUCH_INTEGERS), dtype=np.int64),
+        value=np.zeros((count, entries, most, TOUCH_FLOATS)),
+    )

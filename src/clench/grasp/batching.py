@@ -1,0 +1,164 @@
+"""Pack a problem, so that kernels solve it at many poses (METHOD.md sections 4 to 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Finger, Hand
+from clench.models.shapes import CollisionSource
+
+from .calibration import Calibration
+from .closing import HandPlan, KernelObject, object_for_closing
+from .containment import link_within_link
+from .criterion_registry import ALWAYS
+from .depths import link_mesh_arrays, mesh_mask, object_mesh
+from .exact import HandBodies
+from .plan import resting_links
+from .scene import PackedObject
+from .surface import object_surface
+
+if TYPE_CHECKING:
+    from clench.kernels.batch_layout import Wanted
+    from clench.kernels.exact import ExactArrays
+    from clench.kernels.frames import FrameArrays
+    from clench.kernels.layout import HandArrays, ItemArrays
+    from clench.kernels.link_meshes import LinkMeshArrays, ObjectMesh
+    from clench.kernels.touches import SurfaceArrays
+
+#: Sums of more numbers are added up in another order by NumPy.
+_MOST_JOINTS: Final = 7
+
+
+@dataclass(frozen=True, eq=False)
+class PackedProblem:
+    """Hold everything that the kernels of a batch read, but for the poses.
+
+    Args:
+        hand, exact, items, frames, meshes, wanted: see `clench.kernels.batch_closing` and `batch_judging`.
+        target: the object; mesh, surface: how it is measured and read.
+        bodies: see `hand_bodies`. alone: the hand has one finger only.
+    """
+
+    hand: HandArrays
+    exact: ExactArrays
+    items: ItemArrays
+    frames: FrameArrays
+    meshes: LinkMeshArrays
+    wanted: Wanted
+    target: KernelObject
+    mesh: ObjectMesh
+    surface: SurfaceArrays
+    bodies: HandBodies
+    alone: bool
+
+    @property
+    def most_planes(self) -> int:
+        """Return the number of planes of the largest entry."""
+        firsts = self.hand.family_plane[self.hand.entry_family]
+        return int(np.diff(firsts).max())
+
+    @property
+    def most_contacts(self) -> int:
+        """Return the number of joints of the largest entry, each of which one contact may stop."""
+        return int(np.diff(self.exact.joint_first).max())
+
+
+def sums_alone(calibration: Calibration) -> bool:
+    """Say whether a calibration chooses by the sum of the criteria that are always scored, without limits."""
+    weighs_joints = any(weight != 1.0 for weight in calibration.joints.values())
+    return set(calibration.criteria) <= set(ALWAYS) and not calibration.limits and not weighs_joints
+
+
+def is_covered(hand: Hand, plan: HandPlan, calibration: Calibration) -> bool:
+    """Say whether the kernels of a batch solve what a plan asks for: one open posture per finger, nothing unusual.
+
+    Args:
+        hand: the hand. plan: of its fingers, closed one joint after another, once. calibration: what counts.
+    """
+    one_posture = len(set(plan.finger)) == len(plan.plans) and not plan.together
+    breaks = any(c.breakaway for c in hand.couplings) or any(any(p.breaks) for p in plan.plans)
+    if any(plan.whole):
+        return one_posture and not breaks
+    few = all(len(p.finger.joints) <= _MOST_JOINTS for p in plan.plans)
+    return one_posture and not breaks and few and sums_alone(calibration)
+
+
+def pack_problem(
+    hand: Hand,
+    plan: HandPlan,
+    exact: ExactArrays,
+    packed: PackedObject,
+    start: FloatArray,
+    source: CollisionSource,
+    bodies: HandBodies,
+    calibration: Calibration,
+    idle: int,
+) -> PackedProblem:
+    """Pack a problem; `is_covered` has to hold.
+
+    Args:
+        hand: the hand. plan, exact: of its fingers. packed: the object. start: posture before closing [rad], (J,).
+        source: geometry of the hand. bodies: see `hand_bodies`. calibration: what counts.
+        idle: fingers asked for that no joint closes.
+    """
+    obj = object_for_closing(packed)
+    items = np.flatnonzero(plan.whole) if any(plan.whole) else np.arange(len(plan.whole))
+    columns: list[Any] = [np.ascontiguousarray(column[items]) for column in plan.items]
+    return PackedProblem(
+        hand=plan.arrays,
+        exact=exact._replace(object=obj.bodies, wanted=np.ascontiguousarray(exact.wanted[items])),
+        items=type(plan.items)(*columns),
+        frames=plan.frames(hand),
+        meshes=link_mesh_arrays(hand, source),
+        wanted=_wanted(hand, plan, start, source, bodies, calibration, idle),
+        target=obj,
+        mesh=object_mesh(packed),
+        surface=object_surface(packed),
+        bodies=bodies,
+        alone=len(hand.fingers) == 1,
+    )
+
+
+def _wanted(
+    hand: Hand,
+    plan: HandPlan,
+    start: FloatArray,
+    source: CollisionSource,
+    bodies: HandBodies,
+    calibration: Calibration,
+    idle: int,
+) -> Wanted:
+    from clench.kernels.batch_layout import Wanted
+
+    meshes = link_mesh_arrays(hand, source)
+    fingers = [p.finger for p in plan.plans]
+    terms = [name for name in calibration.criteria if name in ALWAYS]
+    return Wanted(
+        start=start,
+        start_pose=np.ascontiguousarray(hand.link_poses(start)[:, :3]),
+        fixed=mesh_mask(meshes, hand.fixed_links),
+        fingers=mesh_mask(meshes, [link for finger in hand.fingers for link in finger.links]),
+        own=np.array([mesh_mask(meshes, finger.links) for finger in fingers]),
+        resting=np.array([mesh_mask(meshes, resting_links(hand, p)) for p in plan.plans]),
+        joints=_own_joints(fingers),
+        thumb=np.array([finger.is_thumb for finger in fingers], dtype=np.int64),
+        worth=np.array([calibration.worth(name, 1.0) for name in terms], dtype=np.float64),
+        term=np.array([ALWAYS.index(name) for name in terms], dtype=np.int64),
+        present=np.full(len(fingers), -1, dtype=np.int64),
+        margin=0.0,
+        whole=any(plan.whole),
+        nested=link_within_link(hand, start, source, bodies.across) is not None,
+        idle=idle,
+    )
+
+
+def _own_joints(fingers: Sequence[Finger]) -> np.ndarray:
+    joints = np.full((len(fingers), max(len(finger.joints) for finger in fingers)), -1, dtype=np.int64)
+    for row, finger in zip(joints, fingers, strict=True):
+        row[: len(finger.joints)] = finger.joints
+    return joints

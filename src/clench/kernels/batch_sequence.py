@@ -1,0 +1,108 @@
+"""Which fingers are blocked, and where the others stand when a finger closes, for many poses of an object."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clench.base.tolerances import ALLOWED_PENETRATION
+
+from .batch_closing import answer_at, clear_answer
+from .batch_layout import Wanted
+from .compiling import inner_kernel, kernel
+from .depth import CROSSINGS
+from .frames import FrameArrays, place_links, put_angles
+from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
+from .link_meshes import LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
+from .tree import STACK_SIZE
+
+
+@inner_kernel
+def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, obj: ObjectMesh, T_palm_object: Floats) -> bool:
+    """Say whether a link that is wanted overlaps the object by more than is allowed."""
+    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
+    for k in range(meshes.link.shape[0]):
+        if wanted[k]:
+            depth = depth_of(meshes, k, poses[meshes.link[k]], obj, T_palm_object, crossings, stack)[0]
+            if depth > ALLOWED_PENETRATION:
+                return True
+    return False
+
+
+@inner_kernel
+def starts_blocked(
+    link_pose: Floats,
+    meshes: LinkMeshArrays,
+    wanted: Wanted,
+    entry: int,
+    obj: ObjectMesh,
+    T_palm_object: Floats,
+) -> bool:
+    """Say whether links of a finger that the planes do not tell of overlap the object; see `start_overlaps`."""
+    around = may_hold_part(meshes, link_pose, obj, T_palm_object)
+    mask = wanted.own[entry] if around else wanted.resting[entry]
+    return bool(any_deep(meshes, mask, link_pose, obj, T_palm_object))
+
+
+@kernel
+def find_blocked(
+    link_pose: Floats,
+    meshes: LinkMeshArrays,
+    items: ItemArrays,
+    wanted: Wanted,
+    obj: ObjectMesh,
+    T_palm_object: Floats,
+    overlaps: Ints,
+    answers: ClosingArrays,
+    blocked: Ints,
+) -> None:
+    """Write whether an entry overlaps the object before anything moves, (N, E); its items then move nothing.
+
+    Args:
+        link_pose: see `ExactArrays`. meshes: of the links. items, wanted: what is asked for. obj: the object.
+        T_palm_object: where it is, (N, 3, 4). overlaps, answers: see `close_poses`.
+    """
+    for n in range(T_palm_object.shape[0]):
+        answer = answer_at(answers, n)
+        for entry in range(blocked.shape[1]):
+            crossed = overlaps[n, entry] >= 0
+            for i in range(items.entry.shape[0]):
+                crossed = crossed or (items.entry[i] == entry and answer.overlap[i] >= 0)
+            if not crossed:
+                crossed = starts_blocked(link_pose[entry], meshes, wanted, entry, obj, T_palm_object[n])
+            blocked[n, entry] = 1 if crossed else 0
+        for i in range(items.entry.shape[0]):
+            if blocked[n, items.entry[i]]:
+                clear_answer(answer, i)
+
+
+@kernel
+def place_fingers(
+    hand: HandArrays, frames: FrameArrays, wanted: Wanted, travel: Floats, link_pose: Floats, length: Floats
+) -> None:
+    """Write where all links are when a finger begins to close, those before it closed already; see `close_in_sequence`.
+
+    Args:
+        hand, frames: the hand. wanted: what is asked for. travel: of every entry's groups, (N, E, G).
+        link_pose: written, (N, E, L, 3, 4). length: written with the travel of each group, (N, G).
+    """
+    q, angles = wanted.start.copy(), wanted.start.copy()
+    for n in range(travel.shape[0]):
+        q[:] = wanted.start
+        for entry in range(travel.shape[1]):
+            first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
+            angles[:] = q
+            for j in wanted.joints[entry]:
+                if j >= 0:
+                    angles[j] = frames.posture[entry, j]
+            place_links(frames, angles, link_pose[n, entry])
+            length[n, first:last] = travel[n, entry, first:last]
+            put_angles(frames, entry, first, last, travel[n, entry], angles)
+            take_joints(wanted, entry, angles, q)
+
+
+@inner_kernel
+def take_joints(wanted: Wanted, entry: int, angles: Floats, q: Floats) -> None:
+    """Copy the angles of a finger's own joints into the posture of the hand."""
+    for j in wanted.joints[entry]:
+        if j >= 0:
+            q[j] = angles[j]

@@ -1,0 +1,168 @@
+"""Solve one command at many poses, as arrays (METHOD.md sections 4 to 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
+from numbers import Integral
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clench.base.errors import CommandError
+from clench.base.pose import FloatArray, Pose
+from clench.base.pose_arrays import pose_rows
+from clench.grasp.closing import core_count
+from clench.models.command import GraspCommand
+
+from .batch_progress import shown
+from .batch_solver import BatchSolver
+from .grasp_batch import GraspBatch
+
+if TYPE_CHECKING:
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+
+#: Poses that are solved at a time: a few ten megabytes.
+CHUNK: Final = 1024
+
+Poses = Sequence[Pose] | ArrayLike
+
+
+def solve_batch(
+    hand: Hand,
+    obj: GraspObject,
+    hand_poses: Poses,
+    command: GraspCommand | None = None,
+    *,
+    object_poses: Poses | None = None,
+    preshapes: Mapping[str, ArrayLike] | None = None,
+    threads: int | None = None,
+    chunk: int = CHUNK,
+    progress: bool | None = None,
+) -> GraspBatch:
+    """Solve a command at many poses; every answer has the bits of `clench.solve` at that pose, for any threads.
+
+    Args:
+        hand, obj: as for `clench.solve`.
+        hand_poses: poses, rows [w, x, y, z, X, Y, Z] of shape (N, 7), or matrices (N, 4, 4): `T_world_palm`, or that of
+            the command's `root_link`.
+        command: everything else that is asked for; its own `hand_pose` plays no part.
+        object_poses: `T_world_object`, one per pose, in the same forms; by default the command's, or the object's own.
+        preshapes: angles by joint name [rad], shape (N,) each, over those of the command. A hand is planned anew for
+            every posture, which takes much longer than a solve: few different ones are quick, many are not.
+        threads: how many are used; all cores by default. chunk: poses at a time, which bounds the memory besides the
+            answers. progress: show a bar on standard error after a second; by default where that is a terminal.
+
+    Raises:
+        CommandError: malformed poses or numbers, or see `clench.solve`.
+    """
+    asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
+    rows = pose_rows(hand_poses, "hand_poses")
+    there = None if object_poses is None else pose_rows(object_poses, "object_poses")
+    if there is not None and len(there) != len(rows):
+        raise CommandError(f"object_poses: expected {len(rows)} poses, one per hand pose, got {len(there)}.")
+    count, size = _threads(threads), _whole(chunk, "chunk")
+    columns = _preshapes(preshapes, len(rows))
+    groups = _postures(columns, len(rows))
+    parts = []
+    with shown(len(rows), progress) as advance:
+        for where in groups:
+            shape = {name: float(values[where[0]]) for name, values in columns.items()} if len(where) else {}
+            solver = BatchSolver(hand, obj, replace(asked, preshape={**asked.preshape, **shape}))
+            for begin in range(0, max(len(where), 1), size):
+                part = where[begin : begin + size]
+                parts.append(solver.solve(rows[part], None if there is None else there[part], count))
+                advance(len(part))
+    batch = GraspBatch.joined(parts)
+    if len(groups) > 1:
+        batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
+    question = replace(batch.question, command=asked, preshapes=columns)
+    return replace(batch, question=question)
+
+
+def solve_stream(
+    hand: Hand,
+    obj: GraspObject,
+    hand_poses: Iterable[Pose | ArrayLike],
+    command: GraspCommand | None = None,
+    *,
+    object_poses: Iterable[Pose | ArrayLike] | None = None,
+    threads: int | None = None,
+    chunk: int = CHUNK,
+) -> Iterator[GraspBatch]:
+    """Solve a command at any number of poses, in constant memory: yield batches of up to `chunk` poses.
+
+    Args:
+        hand_poses: what is iterated over: single poses, rows (7,) or matrices (4, 4). The rest as for `solve_batch`.
+
+    Raises:
+        CommandError: malformed poses or numbers, or see `clench.solve`.
+    """
+    asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
+    count, size = _threads(threads), _whole(chunk, "chunk")
+    solver = BatchSolver(hand, obj, asked)
+    return _stream(solver, iter(hand_poses), None if object_poses is None else iter(object_poses), count, size)
+
+
+def _stream(
+    solver: BatchSolver,
+    hand_poses: Iterator[Pose | ArrayLike],
+    object_poses: Iterator[Pose | ArrayLike] | None,
+    threads: int,
+    size: int,
+) -> Iterator[GraspBatch]:
+    while True:
+        rows = _next_rows(hand_poses, size, "hand_poses")
+        there = None if object_poses is None else _next_rows(object_poses, max(len(rows), 1), "object_poses")
+        if there is not None and len(there) != len(rows):
+            raise CommandError("object_poses: expected as many poses as hand_poses has.")
+        if not len(rows):
+            return
+        yield solver.solve(rows, there, threads)
+
+
+def _next_rows(poses: Iterator[Pose | ArrayLike], size: int, key: str) -> FloatArray:
+    some: list[Any] = [pose.wxyz_xyz if isinstance(pose, Pose) else pose for pose in islice(poses, size)]
+    return pose_rows(some, key)
+
+
+def _threads(threads: int | None) -> int:
+    return core_count() if threads is None else _whole(threads, "threads")
+
+
+def _whole(value: int, key: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise CommandError(f"{key}: expected a whole number of at least 1, got {value!r}.")
+    return int(value)
+
+
+def _preshapes(preshapes: Mapping[str, ArrayLike] | None, count: int) -> dict[str, FloatArray]:
+    """Return the preshapes as arrays.
+
+    Raises:
+        CommandError: another number of angles than of poses, or not finite.
+    """
+    columns = {}
+    for name, values in (preshapes or {}).items():
+        try:
+            array = np.array(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise CommandError(f"preshapes.{name}: expected {count} angles in rad, one per pose.") from None
+        if array.shape != (count,) or not np.isfinite(array).all():
+            raise CommandError(
+                f"preshapes.{name}: expected {count} finite angles in rad, one per pose, got shape {array.shape}."
+            )
+        columns[name] = array
+    return columns
+
+
+def _postures(columns: Mapping[str, FloatArray], count: int) -> list[np.ndarray]:
+    """Return the indices of the poses that have one posture, posture by posture."""
+    if not columns or not count:
+        return [np.arange(count)]
+    _, number = np.unique(np.stack(list(columns.values()), axis=1), axis=0, return_inverse=True)
+    number = number.reshape(-1)
+    return [np.flatnonzero(number == k) for k in range(int(number.max()) + 1)]

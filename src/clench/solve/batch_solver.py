@@ -1,0 +1,214 @@
+"""Solve one command at arrays of poses: by the kernels of a batch, or one by one where those do not cover it."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clench.base.pose import FloatArray, Pose
+from clench.grasp.batch_run import solve_packed
+from clench.grasp.batching import PackedProblem, is_covered, pack_problem
+from clench.grasp.calibration import calibration_of
+from clench.grasp.exact import hand_bodies
+from clench.grasp.motion import asked_fingers, palm_pose
+from clench.grasp.plan import closing_joints
+from clench.models.command import ClosingOrder, GraspCommand
+
+from .controller import make_problem, make_setting, planned, solve
+from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
+from .solution import FingerStatus, GraspSolution
+
+if TYPE_CHECKING:
+    from clench.kernels.batch_layout import Solved
+    from clench.models.hand.hand import Finger, Hand
+    from clench.models.objects.grasp_object import GraspObject
+
+
+class BatchSolver:
+    """Hold a command, checked and packed, to be solved at any poses.
+
+    Args:
+        hand, obj, command: as for `clench.solve`; the command's `hand_pose` plays no part.
+
+    Raises:
+        ClenchError: see `clench.solve`.
+    """
+
+    def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
+        self._question = Question(hand, obj, command, {})
+        self._start = make_problem(hand, obj, command)
+        asked = asked_fingers(hand, command)
+        self._moving = [finger for finger in asked if closing_joints(hand, finger)]
+        self._idle = [finger for finger in asked if finger not in self._moving]
+        self.packed = self._pack()
+
+    @property
+    def fingers(self) -> list[Finger]:
+        """The fingers asked for: first those that close, in the command's order."""
+        return [*self._moving, *self._idle]
+
+    def _pack(self) -> PackedProblem | None:
+        problem, command = self._start, self._question.command
+        if command.orders:
+            return None
+        calibration = calibration_of(command.criteria)
+        make_setting(problem, calibration)
+        plan, exact = planned(problem)
+        usual = command.order == ClosingOrder.PROXIMAL_FIRST and command.rounds == 1 and not command.check_sets
+        if not (usual and is_covered(problem.hand, plan, calibration)):
+            return None
+        return pack_problem(
+            problem.hand,
+            plan,
+            exact,
+            problem.packed,
+            problem.start,
+            problem.source,
+            hand_bodies(problem.hand, problem.source),
+            calibration,
+            len(self._idle),
+        )
+
+    def solve(self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int) -> GraspBatch:
+        """Return the answers.
+
+        Args:
+            hand_rows: poses as the command means them, (N, 7). object_rows: of the object, (N, 7); None: where it is.
+            threads: how many are used.
+        """
+        if object_rows is None:
+            object_rows = np.repeat(self._start.T_world_object.wxyz_xyz[None], len(hand_rows), axis=0)
+        if self.packed is None:
+            return self._one_by_one(hand_rows, object_rows, threads)
+        from clench.kernels.frames import relate_poses
+
+        palms = self._palms(hand_rows)
+        T_palm_object = np.empty((len(palms), 3, 4))
+        relate_poses(palms, object_rows, T_palm_object)
+        solved = solve_packed(self.packed, T_palm_object, threads)
+        return self._read(solved, palms, hand_rows, object_rows)
+
+    def _palms(self, hand_rows: FloatArray) -> FloatArray:
+        """Return the poses of the palm, (N, 7)."""
+        command, problem = self._question.command, self._start
+        if command.root_link is None:
+            return hand_rows
+        placed = (replace(command, hand_pose=Pose(row[4:], row[:4])) for row in hand_rows)
+        poses = [palm_pose(problem.hand, each, problem.start).wxyz_xyz for each in placed]
+        return np.array(poses).reshape(-1, 7)
+
+    def _read(self, solved: Solved, palms: FloatArray, hand_rows: FloatArray, object_rows: FloatArray) -> GraspBatch:
+        """Name what the kernels computed, with contacts in the world."""
+        from clench.base.tolerances import PASSED_GAP
+        from clench.kernels.touches import TOUCH_BODY, TOUCH_GAP, TOUCH_JOINT, TOUCH_LINK, TOUCH_NORMAL, TOUCH_PLANE
+
+        assert self.packed is not None
+        slots = np.arange(solved.number.shape[2])
+        # The hand's own links are no part of the object: no contacts, as in a solution.
+        found = (slots < solved.contacts[:, :, None]) & (solved.number[..., TOUCH_BODY] >= 0)
+        pose, finger, slot = np.nonzero(found)
+        number, value = solved.number[pose, finger, slot], solved.value[pose, finger, slot]
+        R = rotations(palms[pose])
+        contacts = BatchContacts(
+            first=np.concatenate([[0], np.cumsum(found.sum(axis=(1, 2)))]),
+            finger=finger,
+            link=number[:, TOUCH_LINK],
+            body=number[:, TOUCH_BODY],
+            joint=number[:, TOUCH_JOINT],
+            plane=number[:, TOUCH_PLANE],
+            passed=value[:, TOUCH_GAP] > PASSED_GAP,
+            position=np.einsum("cij,cj->ci", R, value[:, :3]) + palms[pose, 4:],
+            normal=np.einsum("cij,cj->ci", R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
+            gap=value[:, TOUCH_GAP],
+        )
+        chosen = np.full(solved.chosen.shape, -1) if self.packed.wanted.whole else self.packed.items.low[solved.chosen]
+        idle = np.full((len(palms), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
+        return self._batch(
+            hand_poses=hand_rows,
+            object_poses=object_rows,
+            status_codes=solved.status.astype(np.int8),
+            certified=solved.certified.astype(np.bool_),
+            joint_angles=solved.angles,
+            finger_codes=np.concatenate([solved.fingers, idle], axis=1).astype(np.int8),
+            planes=np.concatenate([chosen, np.full_like(idle, -1)], axis=1).astype(np.int16),
+            contacts=contacts,
+            one_by_one=np.zeros(len(palms), dtype=np.bool_),
+        )
+
+    def _batch(self, **columns: Any) -> GraspBatch:
+        problem = self._start
+        return GraspBatch(
+            question=self._question,
+            joint_names=problem.hand.joint_names,
+            finger_names=tuple(finger.name for finger in self.fingers),
+            link_names=tuple(link.name for link in problem.hand.links),
+            body_names=problem.packed.body_names,
+            **columns,
+        )
+
+    def _one_by_one(self, hand_rows: FloatArray, object_rows: FloatArray, threads: int) -> GraspBatch:
+        """Solve every pose by itself, and read the solutions."""
+        asked = self._question
+
+        def run(rows: tuple[FloatArray, FloatArray]) -> GraspSolution:
+            hand_pose, object_pose = (Pose(row[4:], row[:4]) for row in rows)
+            return solve(asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose))
+
+        with ThreadPoolExecutor(threads, thread_name_prefix="clench-batch") as pool:
+            solutions = list(pool.map(run, zip(hand_rows, object_rows, strict=True)))
+        fingers = [[s.fingers[finger.name] for finger in self.fingers] for s in solutions]
+        shape = (len(solutions), len(self.fingers))
+        planes = [[-1 if not f.candidates else _plane(f.candidates[f.chosen].plane) for f in row] for row in fingers]
+        codes = [[FINGER_STATUSES.index(f.status) for f in row] for row in fingers]
+        return self._batch(
+            hand_poses=hand_rows,
+            object_poses=object_rows,
+            status_codes=np.array([STATUSES.index(s.status) for s in solutions], dtype=np.int8),
+            certified=np.array([s.certified for s in solutions], dtype=np.bool_),
+            joint_angles=np.array([list(s.joint_angles.values()) for s in solutions]).reshape(
+                len(solutions), len(asked.hand.joints)
+            ),
+            finger_codes=np.array(codes, dtype=np.int8).reshape(shape),
+            planes=np.array(planes, dtype=np.int16).reshape(shape),
+            contacts=self._contacts(solutions),
+            one_by_one=np.ones(len(solutions), dtype=np.bool_),
+        )
+
+    def _contacts(self, solutions: list[GraspSolution]) -> BatchContacts:
+        hand, bodies = self._question.hand, self._start.packed.body_names
+        names = [finger.name for finger in self.fingers]
+        all_contacts = [c for s in solutions for c in s.contacts]
+        return BatchContacts(
+            first=np.cumsum([0, *(len(s.contacts) for s in solutions)]),
+            finger=_numbers([names.index(c.finger) for c in all_contacts]),
+            link=_numbers([hand.link_index(c.link) for c in all_contacts]),
+            body=_numbers([bodies.index(c.body) for c in all_contacts]),
+            joint=_numbers([-1 if c.stops_joint is None else hand.joint_index(c.stops_joint) for c in all_contacts]),
+            plane=_numbers([_plane(c.plane) for c in all_contacts]),
+            passed=np.array([c.passed for c in all_contacts], dtype=np.bool_),
+            position=np.array([c.position for c in all_contacts]).reshape(-1, 3),
+            normal=np.array([c.normal for c in all_contacts]).reshape(-1, 3),
+            gap=np.array([c.gap for c in all_contacts], dtype=np.float64),
+        )
+
+
+def rotations(rows: FloatArray) -> FloatArray:
+    """Return the rotation matrices of poses (N, 7), shape (N, 3, 3)."""
+    w, x, y, z = rows[:, :4].T
+    entries = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(entries), -1, 0)
+
+
+def _plane(plane: int | None) -> int:
+    return -1 if plane is None else plane
+
+
+def _numbers(values: list[int]) -> np.ndarray:
+    return np.array(values, dtype=np.int64)
