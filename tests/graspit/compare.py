@@ -1,8 +1,9 @@
 """Compare `together` with GraspIt!'s autoGrasp: 750 cases as that program computed them (see the README beside them).
 
-Run from `tests`: ``python -m graspit.compare``. Both close the same raw meshes with the same speeds; what differs is
-that GraspIt! steps by 0.0075 rad, bisects a collision to a gap of 0.1 mm, and sees what it steps into, not what it
-passes. Every finger whose joints end elsewhere is explained by a measurement of its own:
+Run from `tests`: ``python -m graspit.compare --file compared.jsonl``; a run that was ended goes on. Both close the same
+raw meshes with the same speeds; what differs is that GraspIt! steps by 0.0075 rad, bisects a collision to a gap of
+0.1 mm, and sees what it steps into, not what it passes. Every finger whose joints end elsewhere is explained by a
+measurement of its own:
 
 - *as its step and gap allow*: the joints differ by no more than one step.
 - *it stops at a gap*: at its posture the link that it stopped is within 0.2 mm of what stops it, so it is done where we
@@ -16,10 +17,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +33,7 @@ import numpy.typing as npt
 import clench
 from clench.models.hand.hand import Finger, Hand
 from engine.surfaces import volume_tree
+from resumable import each
 
 Floats = npt.NDArray[np.float64]
 SHARED = Path(__file__).parents[2].parent / "shared" / "data" / "graspit"
@@ -167,17 +171,39 @@ def table(rows: list[Compared]) -> str:
     return "\n".join(lines)
 
 
+@lru_cache(maxsize=len(OBJECTS))
+def _comparison(name: str) -> tuple[Comparison, dict[int, dict[str, Any]]]:
+    return Comparison(load_hand(SHARED / "hands" / "DLR"), name), {case["case"]: case for case in read_cases(name)}
+
+
+def compare_case(name: str, number: int) -> list[dict[str, Any]]:
+    """Compare one case of an object."""
+    comparison, cases = _comparison(name)
+    return [asdict(row) for row in comparison.compare(cases[number])]
+
+
+def spread(count: int | None) -> list[tuple[str, int]]:
+    """Return the cases to compare, so many of each object, evenly spread; objects take turns."""
+    numbers = {name: [case["case"] for case in read_cases(name)] for name in OBJECTS}
+    wanted = max(len(n) for n in numbers.values()) if count is None else count
+    chosen = [
+        (k / wanted, name, n[k * len(n) // min(wanted, len(n))])
+        for name, n in numbers.items()
+        for k in range(min(wanted, len(n)))
+    ]
+    return [(name, number) for _, name, number in sorted(chosen, key=lambda row: row[0])]
+
+
 def main() -> None:
     """Print the table, and what is not explained."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--cases", type=int, default=None, help="of each object; all if not given")
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument("--file", type=Path, help="keeps what was found; a run goes on with it")
+    parser.add_argument("--seconds", type=float, help="nothing new is begun after so long")
     asked = parser.parse_args()
-    hand = load_hand(SHARED / "hands" / "DLR")
-    rows = []
-    for name in OBJECTS:
-        comparison = Comparison(hand, name)
-        for case in read_cases(name, asked.cases):
-            rows += comparison.compare(case)
+    done = each(compare_case, spread(asked.cases), asked.processes, asked.file, asked.seconds)
+    rows = [Compared(**row) for _, found in done for row in found]
     print(table(rows))
     agreed = [r.difference for r in rows if r.kind == AGREES]
     print(f"{len(rows)} fingers; where they agree: median {np.median(agreed):.2g}, largest {max(agreed):.2g} rad")

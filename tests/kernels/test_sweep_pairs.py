@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from clench.kernels.leaving import OVERLAP
 from clench.kernels.sweep_pairs import sweep_pair
 
 TOUCH = 1e-11
@@ -10,10 +12,12 @@ BEST = 1.5
 PIVOT = np.array([[1.0, 0.0, 0.0]])
 
 
-def swept(core, fixed, w=0.0, best=BEST):
-    """Sweep a core that turns from x towards z about the origin."""
+def swept(core, fixed, w=0.0, best=BEST, chain=PIVOT, rough=False):
+    """Sweep a core that turns from x towards z about the origin, or as a chain does."""
     corners = [np.ascontiguousarray(np.resize(np.asarray(c, dtype=float), (3, 3))) for c in (core, fixed)]
-    return sweep_pair(corners[0], len(core), corners[1], len(fixed), w, PIVOT, 1, TOUCH, best, False, np.zeros((6, 3)))
+    return sweep_pair(
+        corners[0], len(core), corners[1], len(fixed), w, chain, len(chain), TOUCH, best, rough, np.zeros((6, 3))
+    )
 
 
 @pytest.mark.parametrize("gap", [5e-12, 1e-10, 1e-8, 1e-6])
@@ -49,3 +53,32 @@ def test_an_edge_that_comes_down_on_another_touches_or_passes(away, part):
         left = height - away * np.sin(found) - (height - gap) * np.cos(found)
         assert found == pytest.approx(expected, rel=1e-3)
         assert 0.0 <= left <= 2.0 * TOUCH
+
+
+@pytest.mark.parametrize("rates", [(1.0, 1.7), (1.0, 0.0), (1.0, -0.4)])
+def test_a_point_on_two_turning_joints_meets_a_face(rates):
+    """The point is at `R(a s) e + R(b s) c`; the face lies across z."""
+    base, tip, height = np.array([0.04, 0.0]), np.array([0.03, 0.005]), 0.02
+    chain = np.array([[rates[0], *base], [rates[1], 0.0, 0.0]])
+
+    def over(s):
+        return sum(v[0] * np.sin(r * s) + v[1] * np.cos(r * s) for r, v in zip(rates, (base, tip), strict=True))
+
+    face = [(-1.0, -1.0, height), (1.0, -1.0, height), (0.0, 1.0, height)]
+    found = swept([(tip[0], 0.0, tip[1])], face, chain=chain)
+    assert found == pytest.approx(brentq(lambda s: over(s) - height, 0.0, 0.7), abs=1e-8)
+    assert 0.0 <= height - over(found) <= 2.0 * TOUCH
+
+
+@pytest.mark.parametrize("deep", [1e-3, 1e-6])
+def test_cores_that_cross_at_the_start_are_said_to_overlap(deep):
+    face = [(-0.02, -0.02, 0.05), (0.02, -0.02, 0.05), (0.0, 0.02, 0.05)]
+    assert swept([(0.0, 0.0, 0.03), (0.001, 0.0, 0.05 + deep)], face) == OVERLAP
+    assert swept([(0.0, 0.0, 0.05 - 0.01 + deep)], face, w=0.01) == OVERLAP
+
+
+def test_what_touches_at_the_start_has_met_where_only_balls_are_asked_for():
+    """A point on the x axis leaves the face below it; a rough sweep does not ask which way it goes."""
+    face = [(-0.1, -0.1, -1e-12), (0.1, -0.1, -1e-12), (0.0, 0.1, -1e-12)]
+    assert swept([(0.05, 0.0, 0.0)], face) > 0.5
+    assert swept([(0.05, 0.0, 0.0)], face, rough=True) == 0.0

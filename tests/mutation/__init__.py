@@ -1,0 +1,1 @@
+"""Whether the tests of the sweep kernels notice mistakes that are put into them."""
