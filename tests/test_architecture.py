@@ -179,7 +179,8 @@ def inner_kernels() -> set[str]:
     for path in (PACKAGE / "kernels").glob("*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and any(
-                isinstance(d, ast.Name) and d.id == "inner_kernel" for d in node.decorator_list
+                isinstance(d, ast.Name) and d.id in ("inner_kernel", "inner_allocating_kernel")
+                for d in node.decorator_list
             ):
                 names.add(node.name)
     return names

@@ -8,7 +8,7 @@ import numpy as np
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .compiling import inner_kernel
+from .compiling import inner_allocating_kernel, inner_kernel
 from .conics import sweep_region
 from .corners import sharp_blocks
 from .coupled_pairs import sweep_disk, sweep_segment
@@ -29,7 +29,7 @@ from .turning_pairs import sooner, turn_disk, turn_segment
 STRIDE = 0.06
 
 
-@inner_kernel
+@inner_allocating_kernel
 def make_work(joints: int, outlines: OutlineArrays) -> Work:
     """Allocate the scratch space for a hand."""
     rows = joints + 1

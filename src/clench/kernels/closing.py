@@ -7,9 +7,9 @@ import numpy as np
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import advance, make_work
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays, describe_pair, pose_movers, settle_pair, sweep_stage
-from .family_pose import compose_inverse, pose_family
+from .family_pose import compose_inverse, copy_pose, pose_family
 from .family_section import cut_planes
 from .layout import (
     HIT_GAP,
@@ -147,7 +147,7 @@ def group_family(hand: HandArrays, group: int) -> int:
     return -1
 
 
-@inner_kernel
+@inner_allocating_kernel
 def enter_family(
     hand: HandArrays,
     family: int,
@@ -245,7 +245,7 @@ def write_contact(
     describe_pair(exact, T_palm_object, met, group, family, sweep, hit, point)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def close_item(
     hand: HandArrays,
     exact: ExactArrays,
@@ -269,7 +269,8 @@ def close_item(
     joints = hand.chain.rate.shape[0]
     rates, locked = np.zeros(joints), np.zeros(joints, dtype=np.int64)
     if exact.wanted[i]:
-        sweep.poses[:] = exact.link_pose[entry]
+        for link in range(sweep.poses.shape[0]):
+            copy_pose(exact.link_pose[entry, link], sweep.poses[link])
     sweep.skipped[0] = 0
     for _ in range(times):
         family, before = start - 1, answer.turn[i].copy()
@@ -310,7 +311,7 @@ def close_item(
     settle(hand, exact, T_palm_object, start, shared, own, items, i, work, sweep, answer)
 
 
-@kernel
+@allocating_kernel
 def close_items(
     hand: HandArrays,
     exact: ExactArrays,

@@ -10,17 +10,31 @@ from numba import njit, types
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 
+def kernel(function: Kernel) -> Kernel:
+    """Compile a function on its first call; it keeps its signature. It may not allocate.
+
+    Without counts of references, which would be kept for every view of an array: counting takes most of the time
+    of a kernel that reads many rows. What such a kernel reads is alive as long as its caller holds it.
+    """
+    return _compiled(function, _nrt=False)
+
+
 def inner_kernel(function: Kernel) -> Kernel:
     """Compile a function that only other kernels call: without an entry from Python, it compiles faster.
 
     A call from Python would end the process without a word; a test holds that there is none.
     """
-    return _compiled(function, no_cpython_wrapper=True)
+    return _compiled(function, _nrt=False, no_cpython_wrapper=True)
 
 
-def kernel(function: Kernel) -> Kernel:
-    """Compile a function on its first call; it keeps its signature."""
-    return _compiled(function)
+def allocating_kernel(function: Kernel) -> Kernel:
+    """Compile a function that allocates. It may not keep an array that a kernel which does not allocate returns."""
+    return _compiled(function, _nrt=True)
+
+
+def inner_allocating_kernel(function: Kernel) -> Kernel:
+    """Compile a function that allocates, and that only other kernels call."""
+    return _compiled(function, _nrt=True, no_cpython_wrapper=True)
 
 
 def _compiled(function: Kernel, **options: bool) -> Kernel:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_kernel, kernel
 from .tree import STACK_SIZE, Floats, Ints, MeshTree
 
 Point = tuple[float, float, float]
@@ -34,7 +34,7 @@ def signed_distance(tree: MeshTree, p: Any, closed: bool) -> float:
     return -distance if is_inside(tree, p, closed) else distance
 
 
-@kernel
+@allocating_kernel
 def closest_point(tree: MeshTree, p: Any, bound: float) -> tuple[float, int, float, float, float]:
     """Return the squared distance, triangle and coordinates of the point of the mesh closest to `p`.
 

@@ -11,9 +11,10 @@ from clench.base.tolerances import SWEEP_FRACTION
 
 from .advance import fill_chain, place_joints
 from .bodies import BodyArrays, pack_bodies
+from .body_sweep import sweep_body
 from .closest import AT_CORNER, separation
-from .compiling import inner_kernel, kernel
-from .family_pose import compose_inverse
+from .compiling import allocating_kernel, inner_kernel
+from .family_pose import compose_inverse, copy_pose
 from .layout import (
     HIT_FAMILY,
     HIT_FEATURE,
@@ -32,7 +33,7 @@ from .layout import (
     Ints,
     Work,
 )
-from .sweeping import SweepWork, bodies_overlap, body_gap, make_sweep_work, put_core, put_point, sweep_body
+from .sweeping import SweepWork, bodies_overlap, body_gap, make_sweep_work, put_core, put_point
 
 
 class ExactArrays(NamedTuple):
@@ -103,7 +104,7 @@ def pose_movers(exact: ExactArrays, chain: ChainArrays, entry: int, turns: Float
     """Write `T_palm_link` of an entry's moving links at the present turns to `poses`, (L, 3, 4)."""
     for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
         T = poses[exact.mover_link[n]]
-        T[:] = exact.mover_pose[n]
+        copy_pose(exact.mover_pose[n], T)
         for j in range(exact.mover_joint[n], exact.joint_first[entry] - 1, -1):
             if turns[j] != 0.0:
                 turn_about(exact.axis[j], exact.anchor[j], turns[j], T)
@@ -130,7 +131,7 @@ def sweep_link(
         sweep: `start` has `T_family_link`, `resting` the resting body's pose relative to the first active pivot.
     """
     count, last, rate, speed = fill_chain(joint, first, rates, work.place, work)
-    sweep.moving[:] = sweep.start
+    copy_pose(sweep.start, sweep.moving)
     sweep.moving[0, 3] -= work.place[last, 0]
     sweep.moving[2, 3] -= work.place[last, 1]
     put_point(sweep.moving, links.node[links.root[m]], sweep.core[0])
@@ -271,7 +272,7 @@ def first_after(exact: ExactArrays, entry: int, link: int, first: int, joint: in
     return j
 
 
-@kernel
+@allocating_kernel
 def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
     """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
 
@@ -282,13 +283,13 @@ def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, 
     links = exact.checked.shape[0]
     sweep = make_sweep_work(np.empty((1, 3)), links)
     for m in range(links):
-        sweep.moving[:] = poses[m]
-        sweep.resting[:] = T_palm_object
+        copy_pose(poses[m], sweep.moving)
+        copy_pose(T_palm_object, sweep.resting)
         if bodies_overlap(exact.links, m, exact.object, 0, allowed, sweep):
             return m, links
         for r in range(m):
             if exact.checked[m, r] != 0:
-                sweep.resting[:] = poses[r]
+                copy_pose(poses[r], sweep.resting)
                 if bodies_overlap(exact.links, m, exact.links, r, allowed, sweep):
                     return m, r
     return -1, -1
@@ -335,8 +336,8 @@ def settle_pair(
     if abs(point[HIT_GAP]) <= touch:
         return
     on_object = met == exact.checked.shape[0]
-    sweep.moving[:] = sweep.poses[m]
-    sweep.resting[:] = T_palm_object if on_object else sweep.poses[met]
+    copy_pose(sweep.poses[m], sweep.moving)
+    copy_pose(T_palm_object if on_object else sweep.poses[met], sweep.resting)
     body_gap(exact.links, m, exact.object if on_object else exact.links, 0 if on_object else met, math.inf, 1.0, sweep)
     keep_pair(sweep)
     describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)

@@ -7,8 +7,16 @@ import math
 import numpy as np
 
 from .advance import place_joints
-from .compiling import inner_kernel
+from .compiling import inner_allocating_kernel, inner_kernel
 from .layout import Floats, HandArrays
+
+
+@inner_kernel
+def copy_pose(T: Floats, out: Floats) -> None:
+    """Write a pose elsewhere, shape (3, 4) each."""
+    for r in range(3):
+        for c in range(4):
+            out[r, c] = T[r, c]
 
 
 @inner_kernel
@@ -34,7 +42,7 @@ def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
             out[r, c] = total
 
 
-@inner_kernel
+@inner_allocating_kernel
 def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, place: Floats, poses: Floats) -> None:
     """Write `T_palm_family` of a family from that of the family before and the turns of its joints.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_kernel
 from .family_pose import compose_inverse
 from .layout import Floats, HandArrays, RoundArrays, SectionArrays
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
@@ -25,7 +25,7 @@ def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
     )
 
 
-@kernel
+@allocating_kernel
 def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections: SectionArrays) -> None:
     """Append the sections of all round primitives with one plane."""
     pose = np.empty((3, 4))
@@ -84,7 +84,7 @@ def cut_planes(
     return wanted
 
 
-@kernel
+@allocating_kernel
 def cut_first_families(
     hand: HandArrays, tree: MeshTree, rounds: RoundArrays, T_palm_object: Floats, sections: SectionArrays
 ) -> int:

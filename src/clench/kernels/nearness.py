@@ -6,12 +6,13 @@ import numpy as np
 
 from .bodies import BodyArrays
 from .closest import separation
-from .compiling import kernel
+from .compiling import allocating_kernel
+from .family_pose import copy_pose
 from .layout import Floats, Ints
 from .sweeping import body_gap, make_sweep_work, put_core
 
 
-@kernel
+@allocating_kernel
 def smallest_gap(
     links: BodyArrays, wanted: Ints, poses: Floats, target: BodyArrays, T_palm_object: Floats
 ) -> tuple[float, int]:
@@ -26,17 +27,17 @@ def smallest_gap(
         other are not noticed here (see `clench.kernels.closest.separation`).
     """
     work = make_sweep_work(np.empty((1, 3)), 0)
-    work.resting[:] = T_palm_object
+    copy_pose(T_palm_object, work.resting)
     best, nearest = np.inf, -1
     for m in wanted:
-        work.moving[:] = poses[m]
+        copy_pose(poses[m], work.moving)
         gap = body_gap(links, m, target, 0, best, 1.0, work)
         if gap < best:
             best, nearest = gap, m
     return best, nearest
 
 
-@kernel
+@allocating_kernel
 def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, slack: float, out: Floats) -> float:
     """Return the gap of two links if it is below `bound`, else `bound`; where, and the direction to `m`, go to `out`.
 
@@ -45,8 +46,8 @@ def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, sla
         slack: see `body_gap`. out: (6,).
     """
     sweep = make_sweep_work(np.empty((1, 3)), 0)
-    sweep.moving[:] = poses[m]
-    sweep.resting[:] = poses[r]
+    copy_pose(poses[m], sweep.moving)
+    copy_pose(poses[r], sweep.resting)
     gap = body_gap(links, m, links, r, bound, slack, sweep)
     if gap < bound:
         i, k = sweep.pair[0], sweep.pair[1]

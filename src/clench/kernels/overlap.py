@@ -9,7 +9,7 @@ import numpy as np
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import make_work, place_joints, put_outline
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .distance import is_inside
 from .family_pose import compose_inverse, pose_family
 from .layout import Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
@@ -115,7 +115,7 @@ def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
     return bool(x * x + y * y + beyond * beyond < size[0] ** 2)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def starts_inside(
     tree: MeshTree, rounds: RoundArrays, closed: bool, T_family_object: Floats, x: float, y: float, z: float
 ) -> bool:
@@ -138,7 +138,7 @@ def starts_inside(
     return bool(is_inside(tree, (p[0], p[1], p[2]), closed))
 
 
-@kernel
+@allocating_kernel
 def find_overlaps(
     hand: HandArrays,
     tree: MeshTree,

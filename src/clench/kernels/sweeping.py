@@ -1,4 +1,4 @@
-"""First contact of a moving body with a resting one, through their trees (METHOD.md section 5, exact width)."""
+"""Pairs of parts of two bodies, through their trees: the scratch space, gaps and overlaps (METHOD.md section 5)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .advance import misses
 from .bodies import BodyArrays
 from .closest import crosses, separation
-from .compiling import inner_kernel
+from .compiling import inner_allocating_kernel, inner_kernel
 from .layout import Floats, Ints
-from .sweep_pairs import sweep_pair
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
 PAIRS = 512
-#: How coarsely the sweep of an element against a node's ball is settled, as a fraction of the ball's radius [-].
-COARSE = 0.25
 
 
 class SweepWork(NamedTuple):
@@ -27,7 +23,9 @@ class SweepWork(NamedTuple):
         core, fixed: corners of a pair, (3, 3) each. placed: those of the moving one on its way, (6, 3).
         chain: rows (Ω, e_x, e_z), (J + 1, 3).
         moving, resting: poses of two bodies relative to their pivots, (3, 4). start: pose of the moving one, (3, 4).
-        poses: `T_palm_link` of every link, (L, 3, 4). stack: (PAIRS, 2).
+        poses: `T_palm_link` of every link, (L, 3, 4).
+        stack, keys: pairs of items that wait, and when they can meet at the earliest, (PAIRS, 2) and (PAIRS,).
+        plane: normal and offset of one that keeps bodies apart, relative to the first pivot, (4,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
@@ -41,12 +39,14 @@ class SweepWork(NamedTuple):
     start: Floats
     poses: Floats
     stack: Ints
+    keys: Floats
+    plane: Floats
     pair: Ints
     winner: Ints
     skipped: Ints
 
 
-@inner_kernel
+@inner_allocating_kernel
 def make_sweep_work(chain: Floats, links: int) -> SweepWork:
     """Allocate the scratch space for sweeps of a hand; `chain` is that of the closing kernels."""
     return SweepWork(
@@ -59,6 +59,8 @@ def make_sweep_work(chain: Floats, links: int) -> SweepWork:
         np.empty((3, 4)),
         np.empty((links, 3, 4)),
         np.empty((PAIRS, 2), dtype=np.int64),
+        np.empty(PAIRS),
+        np.empty(4),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(1, dtype=np.int64),
@@ -80,44 +82,11 @@ def put_core(bodies: BodyArrays, element: int, T: Floats, out: Floats) -> None:
 
 
 @inner_kernel
-def balls_miss(
-    a: Floats, b: Floats, work: SweepWork, count: int, speed: float, best: float, touch: float, c: float, d: float
-) -> bool:
-    """Say whether a moving ball meets no resting one before `best`; rows hold centre and radius in the body's frame.
-
-    Args:
-        c, d: cosine and sine of the turn at `best`, for one joint. speed: bound for several.
-    """
-    T, R = work.moving, work.resting
-    ax = T[0, 0] * a[0] + T[0, 1] * a[1] + T[0, 2] * a[2] + T[0, 3]
-    ay = T[1, 0] * a[0] + T[1, 1] * a[1] + T[1, 2] * a[2] + T[1, 3]
-    az = T[2, 0] * a[0] + T[2, 1] * a[1] + T[2, 2] * a[2] + T[2, 3]
-    bx = R[0, 0] * b[0] + R[0, 1] * b[1] + R[0, 2] * b[2] + R[0, 3]
-    by = R[1, 0] * b[0] + R[1, 1] * b[1] + R[1, 2] * b[2] + R[1, 3]
-    bz = R[2, 0] * b[0] + R[2, 1] * b[1] + R[2, 2] * b[2] + R[2, 3]
-    reach = a[3] + b[3] + touch
-    if count > 1:
-        for i in range(count - 1):
-            ax += work.chain[i, 1]
-            az += work.chain[i, 2]
-        reach += speed * best
-        return bool((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2 > reach * reach)
-    flat = reach * reach - (ay - by) ** 2
-    if flat < 0.0:
-        return True
-    if work.chain[0, 0] < 0.0:
-        # Mirrored, so that the turn is counter-clockwise.
-        az, bz = -az, -bz
-    turn = abs(work.chain[0, 0]) * best
-    far = math.sqrt(ax * ax + az * az)
-    return bool(misses(ax, az, far, c * ax - d * az, d * ax + c * az, turn >= 3.0, bx, bz, math.sqrt(flat)))
-
-
-@inner_kernel
-def ball_of(bodies: BodyArrays, n: int) -> Floats:
-    """Return the ball around a node, or around element `-1 - n`."""
-    ball: Floats = bodies.node[n] if n >= 0 else bodies.ball[-1 - n]
-    return ball
+def put_ball(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> float:
+    """Write the centre of the ball around node `n`, or around element `-1 - n`, as `put_point`; return its radius."""
+    ball = bodies.node[n] if n >= 0 else bodies.ball[-1 - n]
+    put_point(T, ball, out)
+    return float(ball[3])
 
 
 @inner_kernel
@@ -148,60 +117,6 @@ def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, stack: I
     if b < 0 or (a >= 0 and moving.node[a, 3] >= resting.node[b, 3]):
         return push_parts(moving, a, 0, b, stack, waiting)
     return push_parts(resting, b, 1, a, stack, waiting)
-
-
-@inner_kernel
-def sweep_body(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    count: int,
-    speed: float,
-    touch: float,
-    best: float,
-    work: SweepWork,
-) -> float:
-    """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
-
-    A pair of nodes is left out when their balls do not meet, a node and an element when the element does not meet the
-    ball: the same sweep, with the ball's centre as a core. For one joint the balls' arcs tell without it.
-
-    Args:
-        work: has `chain`, `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
-        count: rows of the chain. speed: no point of body `m` is faster [m per travel].
-        touch: gaps up to this touch [m].
-    """
-    stack = work.stack
-    stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
-    waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
-    turn = abs(work.chain[0, 0]) * best
-    c, d = math.cos(turn), math.sin(turn)
-    while waiting > 0:
-        waiting -= 1
-        a, b = stack[waiting, 0], stack[waiting, 1]
-        if balls_miss(ball_of(moving, a), ball_of(resting, b), work, count, speed, best, touch, c, d):
-            continue
-        if a < 0 or b < 0 or count > 1:
-            ka, wa = put_item(moving, a, work.moving, work.core)
-            kb, wb = put_item(resting, b, work.resting, work.fixed)
-            near = touch if a < 0 and b < 0 else COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
-            rough = a >= 0 or b >= 0
-            found = sweep_pair(
-                work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, rough, work.placed
-            )
-            if found >= best:
-                continue
-            if a < 0 and b < 0:
-                best = found
-                work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
-                if best < 0.0:
-                    return best
-                turn = abs(work.chain[0, 0]) * best
-                c, d = math.cos(turn), math.sin(turn)
-                continue
-        waiting = split_pair(moving, a, resting, b, stack, waiting)
-    return best
 
 
 @inner_kernel
@@ -256,10 +171,8 @@ def put_nearest_last(
 @inner_kernel
 def ball_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> float:
     """Return the gap between the balls of two nodes or elements."""
-    ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
-    put_point(work.moving, ball_a, work.core[0])
-    put_point(work.resting, ball_b, work.fixed[0])
-    return point_distance(work.core, work.fixed) - float(ball_a[3] + ball_b[3])
+    reach = put_ball(moving, a, work.moving, work.core[0]) + put_ball(resting, b, work.resting, work.fixed[0])
+    return point_distance(work.core, work.fixed) - reach
 
 
 @inner_kernel

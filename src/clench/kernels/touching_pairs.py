@@ -8,9 +8,10 @@ import numpy as np
 
 from .bodies import BodyArrays
 from .closest import Separation, above_face, edge_count, edge_pair, face_normal, separation
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_kernel
+from .family_pose import copy_pose
 from .layout import Floats, Ints
-from .sweeping import SweepWork, ball_of, make_sweep_work, point_distance, push_parts, put_item, put_point
+from .sweeping import SweepWork, ball_gap, make_sweep_work, put_item, split_pair
 
 #: Columns of the integers: posture, moving link, what it touches (a link, or the number of links for the object).
 PAIR_STAGE, PAIR_LINK, PAIR_MET = 0, 1, 2
@@ -22,7 +23,7 @@ PAIR_FLOATS = 7
 SAME_DIRECTION = 1e-9
 
 
-@kernel
+@allocating_kernel
 def touching_pairs(
     links: BodyArrays,
     obj: BodyArrays,
@@ -52,14 +53,14 @@ def touching_pairs(
         for m in range(checked.shape[0]):
             if moves[s, m] == 0:
                 continue
-            work.moving[:] = poses[s, m]
+            copy_pose(poses[s, m], work.moving)
             for r in range(checked.shape[0] + 1):
                 before = count
                 if r == checked.shape[0]:
-                    work.resting[:] = T_palm_object
+                    copy_pose(T_palm_object, work.resting)
                     count = _add_pairs(links, m, obj, 0, within, tie, numbers, count, work)
                 elif checked[m, r] != 0 and (moves[s, r] == 0 or r < m):
-                    work.resting[:] = poses[s, r]
+                    copy_pose(poses[s, r], work.resting)
                     count = _add_pairs(links, m, links, r, within, tie, numbers, count, work)
                 found[before:count, PAIR_STAGE], found[before:count, PAIR_LINK] = s, m
                 found[before:count, PAIR_MET] = r
@@ -85,10 +86,7 @@ def _add_pairs(
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        ball_a, ball_b = ball_of(moving, a), ball_of(resting, b)
-        put_point(work.moving, ball_a, work.core[0])
-        put_point(work.resting, ball_b, work.fixed[0])
-        if point_distance(work.core, work.fixed) - ball_a[3] - ball_b[3] > within:
+        if ball_gap(moving, a, resting, b, work) > within:
             continue
         if a < 0 or b < 0:
             ka, wa = put_item(moving, a, work.moving, work.core)
@@ -100,10 +98,7 @@ def _add_pairs(
                 if found[0] - wa - wb >= -within:
                     count = _add_touches(found, ka, kb, wa, wb, tie, numbers, first, count, work)
                 continue
-        if b < 0 or (a >= 0 and ball_a[3] >= ball_b[3]):
-            waiting = push_parts(moving, a, 0, b, stack, waiting)
-        else:
-            waiting = push_parts(resting, b, 1, a, stack, waiting)
+        waiting = split_pair(moving, a, resting, b, stack, waiting)
     return count
 
 
@@ -179,7 +174,8 @@ def _add_row(x: float, y: float, z: float, w: float, tie: float, numbers: Floats
     """
     last, row = numbers[-1], numbers[count]
     row[0], row[1], row[2] = x + w * last[3], y + w * last[4], z + w * last[5]
-    row[3:] = last[3:]
+    for k in range(3, row.shape[0]):
+        row[k] = last[k]
     for k in range(first, count):
         apart, turned = 0.0, 0.0
         for i in range(3):

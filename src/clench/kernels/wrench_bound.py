@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiling import kernel
+from .compiling import allocating_kernel, kernel
 
 #: Newton steps that balance internal forces, in the first round and in later ones.
 _FIRST_STEPS = 12
@@ -20,7 +20,7 @@ _ANSWER = 0.6
 _PRELOAD = 0.5
 
 
-@kernel
+@allocating_kernel
 def resisted_ball(
     G: np.ndarray,
     edges: np.ndarray,
@@ -64,7 +64,7 @@ def resisted_ball(
     return best
 
 
-@kernel
+@allocating_kernel
 def _response(G: np.ndarray, reach: np.ndarray, answers: np.ndarray, K: np.ndarray) -> bool:
     """Write `K = H G^T (G H G^T)^-1` with weights H; say whether the wrenches span all directions."""
     count, width = reach.shape
@@ -86,7 +86,7 @@ def _response(G: np.ndarray, reach: np.ndarray, answers: np.ndarray, K: np.ndarr
     return True
 
 
-@kernel
+@allocating_kernel
 def _balance(wrenches: np.ndarray, share: np.ndarray, y: np.ndarray, weights: np.ndarray, steps: int) -> None:
     """Write weights `share exp(y w)`, summing to 1, whose wrenches balance: Newton steps on the logarithm of their sum.
 
@@ -164,7 +164,7 @@ def _solve(L: np.ndarray, x: np.ndarray) -> None:
         x[r] /= L[r, r]
 
 
-@kernel
+@allocating_kernel
 def _internal_forces(G: np.ndarray, K: np.ndarray, edges: np.ndarray, weights: np.ndarray, f0: np.ndarray) -> None:
     """Write the forces of weighted edges, balanced to rounding, shape (n,)."""
     count, each, width = edges.shape
