@@ -7,7 +7,8 @@ import pytest
 
 import clench
 from clench.apps.cli.demo import MUG_POSE
-from clench.kernels import closing, depth, family_section, overlap, warming
+from clench.base.pose import Pose
+from clench.kernels import closing, family_section, frames, link_meshes, overlap, touches, warming
 
 
 @pytest.mark.parametrize("kernel", [*warming.HERE, *warming.THERE], ids=lambda kernel: kernel.__name__)
@@ -19,9 +20,43 @@ def test_what_is_compiled_is_what_a_solve_calls():
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE))
     values = warming.sample_values()
-    called = (family_section.cut_first_families, overlap.find_overlaps, closing.close_items, depth.penetration)
+    called = (
+        *(family_section.cut_first_families, overlap.find_overlaps, closing.close_items, frames.relate_poses),
+        *(frames.place_links, link_meshes.measure_depths, link_meshes.find_contained, touches.read_touches),
+    )
     for kernel in called:
         assert warming.argument_types(kernel, values) in kernel.signatures
+
+
+def test_the_first_call_says_that_it_compiles(monkeypatch, capsys):
+    hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
+    clench.solve(hand, ball, clench.GraspCommand(Pose([5, 0, 0])))
+    capsys.readouterr()
+    warming.announce.cache_clear()
+    clench.solve(hand, ball, clench.GraspCommand(Pose([5, 0, 0])))
+    assert capsys.readouterr().err == ""  # they are compiled by now
+    monkeypatch.setattr(warming, "_is_cold", lambda kernel=None: True)
+    warming.announce.cache_clear()
+    warming.announce(batch=True)
+    warming.announce(batch=True)
+    sentences = capsys.readouterr().err.splitlines()
+    assert [s.split(",")[0] for s in sentences] == [
+        "clench: compiling its kernels",
+        "clench: compiling the kernels of a batch",
+    ]
+    warming.announce.cache_clear()
+
+
+def test_a_cache_without_the_closing_is_cold(monkeypatch, tmp_path):
+    assert not warming._is_cold()
+
+    class Elsewhere:
+        py_func = closing.close_items.py_func
+
+        class stats:  # noqa: N801
+            cache_path = str(tmp_path)
+
+    assert warming._is_cold(Elsewhere)
 
 
 def test_compiled_kernels_start_no_process(monkeypatch):

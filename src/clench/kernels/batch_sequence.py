@@ -17,12 +17,12 @@ from .tree import STACK_SIZE
 
 
 @inner_kernel
-def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, obj: ObjectMesh, T_palm_object: Floats) -> bool:
+def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
     """Say whether a link that is wanted overlaps the object by more than is allowed."""
     crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
     for k in range(meshes.link.shape[0]):
         if wanted[k]:
-            depth = depth_of(meshes, k, poses[meshes.link[k]], obj, T_palm_object, crossings, stack)[0]
+            depth = depth_of(meshes, k, poses[meshes.link[k]], solid, T_palm_object, crossings, stack)[0]
             if depth > ALLOWED_PENETRATION:
                 return True
     return False
@@ -34,13 +34,13 @@ def starts_blocked(
     meshes: LinkMeshArrays,
     wanted: Wanted,
     entry: int,
-    obj: ObjectMesh,
+    solid: ObjectMesh,
     T_palm_object: Floats,
 ) -> bool:
     """Say whether links of a finger that the planes do not tell of overlap the object; see `start_overlaps`."""
-    around = may_hold_part(meshes, link_pose, obj, T_palm_object)
+    around = may_hold_part(meshes, link_pose, solid, T_palm_object)
     mask = wanted.own[entry] if around else wanted.resting[entry]
-    return bool(any_deep(meshes, mask, link_pose, obj, T_palm_object))
+    return bool(any_deep(meshes, mask, link_pose, solid, T_palm_object))
 
 
 @kernel
@@ -49,7 +49,7 @@ def find_blocked(
     meshes: LinkMeshArrays,
     items: ItemArrays,
     wanted: Wanted,
-    obj: ObjectMesh,
+    solid: ObjectMesh,
     T_palm_object: Floats,
     overlaps: Ints,
     answers: ClosingArrays,
@@ -58,7 +58,7 @@ def find_blocked(
     """Write whether an entry overlaps the object before anything moves, (N, E); its items then move nothing.
 
     Args:
-        link_pose: see `ExactArrays`. meshes: of the links. items, wanted: what is asked for. obj: the object.
+        link_pose: see `ExactArrays`. meshes: of the links. items, wanted: what is asked for. solid: the object.
         T_palm_object: where it is, (N, 3, 4). overlaps, answers: see `close_poses`.
     """
     for n in range(T_palm_object.shape[0]):
@@ -68,7 +68,7 @@ def find_blocked(
             for i in range(items.entry.shape[0]):
                 crossed = crossed or (items.entry[i] == entry and answer.overlap[i] >= 0)
             if not crossed:
-                crossed = starts_blocked(link_pose[entry], meshes, wanted, entry, obj, T_palm_object[n])
+                crossed = starts_blocked(link_pose[entry], meshes, wanted, entry, solid, T_palm_object[n])
             blocked[n, entry] = 1 if crossed else 0
         for i in range(items.entry.shape[0]):
             if blocked[n, items.entry[i]]:

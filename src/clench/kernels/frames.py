@@ -108,17 +108,17 @@ def inside(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def relate_poses(first: Floats, second: Floats, out: Floats) -> None:
+def relate_poses(first: Floats, second: Floats, placed: Floats) -> None:
     """Write where the second pose is in the first one, row by row: `T_first_second`, (N, 3, 4).
 
     Args:
-        first, second: unit quaternion `wxyz` and position [m], (N, 7). out: written.
+        first, second: unit quaternion `wxyz` and position [m], (N, 7). placed: written.
     """
     a, b = np.empty((3, 4)), np.empty((3, 4))
-    for n in range(out.shape[0]):
+    for n in range(placed.shape[0]):
         put_pose(first[n], a)
         put_pose(second[n], b)
-        compose_inverse(a, b, out[n])
+        compose_inverse(a, b, placed[n])
 
 
 @inner_kernel

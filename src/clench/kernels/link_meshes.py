@@ -108,20 +108,20 @@ def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTr
 
 @kernel
 def measure_depths(
-    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, obj: ObjectMesh, T_palm_object: Floats, out: Floats
+    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, out: Floats
 ) -> None:
     """Write depth and place of the links that are wanted, (M, 4), zeros where nothing overlaps; see `penetration`.
 
     Args:
         meshes: of the links. wanted: which, (M,). poses: `T_palm_link` of every link, (L, 3, 4).
-        obj: the object. T_palm_object: where it is, (3, 4).
+        solid: the object. T_palm_object: where it is, (3, 4).
     """
     crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
     for k in range(meshes.link.shape[0]):
         out[k] = 0.0
         if wanted[k]:
             out[k, 0], out[k, 1], out[k, 2], out[k, 3] = depth_of(
-                meshes, k, poses[meshes.link[k]], obj, T_palm_object, crossings, stack
+                meshes, k, poses[meshes.link[k]], solid, T_palm_object, crossings, stack
             )
 
 
@@ -130,7 +130,7 @@ def depth_of(
     meshes: LinkMeshArrays,
     k: int,
     T_palm_link: Floats,
-    obj: ObjectMesh,
+    solid: ObjectMesh,
     T_palm_object: Floats,
     crossings: Floats,
     stack: Ints,
@@ -138,7 +138,7 @@ def depth_of(
     """Return depth and place of one link."""
     T, back = np.empty((3, 4)), np.empty((3, 4))
     compose_inverse(T_palm_object, T_palm_link, T)
-    if not may_touch(meshes, k, T, obj.tree):
+    if not may_touch(meshes, k, T, solid.tree):
         return 0.0, 0.0, 0.0, 0.0
     compose_inverse(T_palm_link, T_palm_object, back)
     closed = meshes.closed[k] != 0
@@ -146,9 +146,9 @@ def depth_of(
         mesh_of(meshes, k),
         meshes.owners[meshes.triangle_first[k] : meshes.triangle_first[k + 1]],
         closed,
-        obj.tree,
-        obj.owners,
-        obj.closed,
+        solid.tree,
+        solid.owners,
+        solid.closed,
         T,
         back,
         crossings,
@@ -159,7 +159,7 @@ def depth_of(
 
 @kernel
 def find_contained(
-    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, obj: ObjectMesh, T_palm_object: Floats
+    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats
 ) -> int:
     """Return a link that has a part inside the object or around a part of it, or -1; as in `measure_depths`."""
     T, p = np.empty((3, 4)), np.empty(3)
@@ -167,13 +167,13 @@ def find_contained(
         if not wanted[k]:
             continue
         compose_inverse(T_palm_object, poses[meshes.link[k]], T)
-        if obj.tree.low.shape[0] > 0 and may_fit(meshes, k, T, obj.tree, p):
+        if solid.tree.low.shape[0] > 0 and may_fit(meshes, k, T, solid.tree, p):
             for i in range(meshes.point_first[k], meshes.point_first[k + 1]):
                 put_at(T, meshes.points[i], p)
-                if is_inside(obj.tree, (p[0], p[1], p[2]), obj.closed):
+                if is_inside(solid.tree, (p[0], p[1], p[2]), solid.closed):
                     return int(meshes.link[k])
-        for i in range(obj.points.shape[0]):
-            put_back(T, obj.points[i], p)
+        for i in range(solid.points.shape[0]):
+            put_back(T, solid.points[i], p)
             if is_inside(mesh_of(meshes, k), (p[0], p[1], p[2]), meshes.closed[k] != 0):
                 return int(meshes.link[k])
     return -1
@@ -195,11 +195,11 @@ def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree
 
 
 @inner_kernel
-def may_hold_part(meshes: LinkMeshArrays, poses: Floats, obj: ObjectMesh, T_palm_object: Floats) -> bool:
+def may_hold_part(meshes: LinkMeshArrays, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
     """Say whether a part of the object may lie inside a link, as the links' balls tell."""
     p, c = np.empty(3), np.empty(3)
-    for i in range(obj.points.shape[0]):
-        put_at(T_palm_object, obj.points[i], p)
+    for i in range(solid.points.shape[0]):
+        put_at(T_palm_object, solid.points[i], p)
         for k in range(meshes.link.shape[0]):
             put_at(poses[meshes.link[k]], meshes.center[k], c)
             if (c[0] - p[0]) ** 2 + (c[1] - p[1]) ** 2 + (c[2] - p[2]) ** 2 <= meshes.radius[k] ** 2:

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,9 @@ import numpy as np
 
 from .advance import advance
 from .closing import close_items
-from .depth import penetration
 from .exact import planes_only, settle_pair, sweep_stage
 from .family_section import cut_first_families
+from .frames import FrameArrays, place_links, relate_poses
 from .layout import (
     ChainArrays,
     ClosingArrays,
@@ -33,9 +34,11 @@ from .layout import (
     SectionArrays,
     Work,
 )
+from .link_meshes import LinkMeshArrays, ObjectMesh, find_contained, measure_depths
 from .nearness import smallest_gap
 from .overlap import find_overlaps
 from .sweeping import SweepWork
+from .touches import SurfaceArrays, TouchArrays, read_touches
 from .touching import describe_hit, settle_hit
 from .tree import MeshTree, build_tree
 
@@ -48,8 +51,12 @@ HERE: tuple[Any, ...] = (
     settle_hit,
     describe_hit,
     find_overlaps,
-    penetration,
     smallest_gap,
+    relate_poses,
+    place_links,
+    measure_depths,
+    find_contained,
+    read_touches,
 )
 THERE: tuple[Any, ...] = (advance, close_items)
 
@@ -111,17 +118,21 @@ def sample_values() -> dict[str, Any]:
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 i1")),
     }
     values |= {"links": values["exact"].links, "target": values["exact"].object}
+    values["frames"] = FrameArrays(*_arrays("i1 i1 f3 f2 f2 f1 i1 f1 f1 f1 i1 i1 f1 f1 f2 i1 i1"))
+    owners = _arrays("b1")[0]
+    values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1"), tree, owners])
+    values["solid"] = ObjectMesh(tree, owners, True, _arrays("f2")[0])
+    values["surface"] = SurfaceArrays(*[*_arrays("f2 s1"), values["rounds"], *_arrays("s1 s1 i1")])
+    values["touches"] = TouchArrays(*_arrays("i3 f3"))
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
-    values |= dict.fromkeys(("tree", "link", "obj"), tree)
-    values |= dict.fromkeys(("closed", "link_closed", "obj_closed", "together"), True)
+    values["tree"] = tree
+    values |= dict.fromkeys(("closed", "together"), True)
     values |= dict.fromkeys(("family", "start", "base", "low", "high", "i", "times", "group", "plane", "entry"), 0)
     kinds = {
-        "f1": ("turns", "rates", "crossings", "point"),
-        "f2": ("T_palm_object", "T_palm_family", "T_obj_link", "T_link_obj"),
+        "f1": ("turns", "rates", "point", "q"),
+        "f2": ("T_palm_object", "T_palm_family", "first", "second", "out"),
         "i1": ("overlaps", "hit", "wanted"),
-        "f3": ("poses",),
-        "s1": ("stack",),
-        "b1": ("link_owners", "obj_owners"),
+        "f3": ("poses", "placed"),
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])
@@ -133,13 +144,30 @@ def _arrays(kinds: str) -> list[Any]:
     return [np.empty((0,) * int(kind[1]), dtype=_TYPES[kind[0]]) for kind in kinds.split()]
 
 
-def _is_cold() -> bool:
+@cache
+def announce(batch: bool = False) -> None:
+    """Say on standard error that what comes compiles, where it does; once per process.
+
+    Args:
+        batch: the kernels of a batch are asked for, too.
+    """
+    if _is_cold():
+        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes about a minute.\n")
+    if batch:
+        from .batch_closing import close_poses
+
+        if _is_cold(close_poses):
+            sys.stderr.write("clench: compiling the kernels of a batch, once on this machine; about a minute more.\n")
+
+
+def _is_cold(kernel: Any = close_items) -> bool:
     """Say whether the cache on disk has no closing yet; never where NUMBA_DISABLE_JIT leaves functions as they are."""
-    stats = getattr(close_items, "stats", None)
+    stats = getattr(kernel, "stats", None)
     if stats is None:
         return False
-    folder = Path(stats.cache_path)
-    return not any(folder.glob("closing.close_items-*.nbi"))
+    function = kernel.py_func
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+    return not any(Path(stats.cache_path).glob(f"{name}-*.nbi"))
 
 
 if __name__ == "__main__":

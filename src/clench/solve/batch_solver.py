@@ -38,6 +38,9 @@ class BatchSolver:
     """
 
     def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
+        from clench.kernels.warming import announce
+
+        announce(batch=True)
         self._question = Question(hand, obj, command, {})
         self._start = make_problem(hand, obj, command)
         asked = asked_fingers(hand, command)

@@ -85,7 +85,8 @@ class Problem:
         from clench.kernels.frames import relate_poses
 
         T = np.eye(4)
-        relate_poses(self.T_world_palm.wxyz_xyz[None], self.T_world_object.wxyz_xyz[None], T[None, :3])
+        palm, there = (np.array([pose.wxyz_xyz]) for pose in (self.T_world_palm, self.T_world_object))
+        relate_poses(palm, there, T[None, :3])
         return T
 
 
@@ -100,6 +101,9 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     Raises:
         ClenchError: a command that does not fit the hand, or a hand that no plane can close.
     """
+    from clench.kernels.warming import announce
+
+    announce()
     if command.orders:
         check_command(hand, command)
         solution = best_order(command, lambda single: solve(hand, obj, single))

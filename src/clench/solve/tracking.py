@@ -68,7 +68,8 @@ class Tracker:
                 raise CommandError(f"{key}: expected a clench.Pose, got {type(pose).__name__}.")
         self._hand_pose = hand_pose or self._hand_pose
         self._object_pose = object_pose or self._object_pose
-        answer = self._solver.solve(self._hand_pose.wxyz_xyz[None], self._object_pose.wxyz_xyz[None], 1)
+        hand_rows, object_rows = (np.array([pose.wxyz_xyz]) for pose in (self._hand_pose, self._object_pose))
+        answer = self._solver.solve(hand_rows, object_rows, 1)
         self._stay(answer)
         return answer
 

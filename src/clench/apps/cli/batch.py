@@ -57,7 +57,7 @@ def batch(
     from dataclasses import replace
 
     import clench
-    from clench.kernels.warming import warm_up
+    from clench.kernels.warming import announce, warm_up
 
     from .printing import print_batch, print_files
     from .results import print_json
@@ -73,6 +73,7 @@ def batch(
         asked = replace(asked, full_width=False)
     if planes is not None:
         asked = replace(asked, planes=planes)
+    announce(batch=True)
     warm_up()
     rows = _approaches(the_hand, the_object, count, seed) if poses is None else _read(poses)
     began = time.perf_counter()

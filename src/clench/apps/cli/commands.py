@@ -102,7 +102,7 @@ def solve(
     import clench
     from clench.grasp.mechanics.contacts import check_friction
     from clench.grasp.mechanics.loads import check_mass
-    from clench.kernels.warming import warm_up
+    from clench.kernels.warming import announce, warm_up
     from clench.solve.orders import settled
     from clench.solve.pareto import hand_front
     from clench.solve.quality import DEFAULT_MASS
@@ -126,6 +126,7 @@ def solve(
         the_command = in_orders(the_command, order)
     if criteria is not None:
         the_command = replace(the_command, criteria=criteria)
+    announce()
     warm_up()
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
