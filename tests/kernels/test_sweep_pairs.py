@@ -75,6 +75,8 @@ def test_cores_that_cross_at_the_start_are_said_to_overlap(deep):
     face = [(-0.02, -0.02, 0.05), (0.02, -0.02, 0.05), (0.0, 0.02, 0.05)]
     assert swept([(0.0, 0.0, 0.03), (0.001, 0.0, 0.05 + deep)], face) == OVERLAP
     assert swept([(0.0, 0.0, 0.05 - 0.01 + deep)], face, w=0.01) == OVERLAP
+    # No corner and no edge is near: only the crossing tells.
+    assert swept([(0.0, 0.0, 0.03), (0.0, 0.0, 0.07)], face, w=deep) == OVERLAP
 
 
 def test_what_touches_at_the_start_has_met_where_only_balls_are_asked_for():
