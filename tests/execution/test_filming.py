@@ -64,6 +64,17 @@ def test_what_cannot_be_written_is_said_before_anything_moves(tmp_path: Path) ->
     assert make_film(None, None) is None
 
 
+def test_without_a_screen_and_without_a_way_to_do_without(
+    pincer: Hand, pinch: GraspSolution, ball: GraspObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The engine's own default would end the whole program."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    with pytest.raises(ClenchError, match=r"OpenGL cannot draw here \(there is no screen\)\. .* set MUJOCO_GL=egl"):
+        execute(pinch, SimulatedHand(pincer, ball, film=Film(tmp_path / "a.gif")))
+
+
 def test_nothing_taken_is_nothing_written(tmp_path: Path) -> None:
     assert Film(tmp_path / "a.gif", tmp_path / "stills").finish() == ()
     assert not list(tmp_path.iterdir())

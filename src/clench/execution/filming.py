@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +19,9 @@ from .scene import Scene
 #: Time between two pictures [s]; a GIF counts hundredths.
 FRAME: Final = 0.04
 _WIDTH, _HEIGHT = 640, 480
+_NO_OPENGL: Final = (
+    "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1 and set MUJOCO_GL=egl."
+)
 #: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
 _DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
 #: How much higher it looks where the palm moves up [m].
@@ -63,13 +68,14 @@ class Film:
         """
         import mujoco
 
+        headless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+        if headless and os.environ.get("MUJOCO_GL", "") not in ("egl", "osmesa"):
+            # The engine's default needs a screen, and ends the program where there is none.
+            raise ClenchError(_NO_OPENGL.format("there is no screen"))
         try:
             self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
         except Exception as error:  # whatever the graphics library raises
-            raise ClenchError(
-                f"No video: OpenGL cannot draw here ({error}). Without a screen, install Mesa's libegl1 and set "
-                "MUJOCO_GL=egl."
-            ) from None
+            raise ClenchError(_NO_OPENGL.format(error)) from None
         bodies = [body for body in scene.link_bodies if body >= 0] + [scene.object_body]
         places = data.xipos[bodies]
         self._camera = mujoco.MjvCamera()
