@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .advance import make_work
 from .closing import close_item
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel
 from .exact import ExactArrays
 from .family_section import cut_first_families
 from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays
@@ -13,7 +13,7 @@ from .sweeping import make_sweep_work
 from .tree import MeshTree
 
 
-@inner_kernel
+@inner_allocating_kernel
 def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
     """Return the answers of all items at one pose."""
     return ClosingArrays(
@@ -29,7 +29,7 @@ def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
     )
 
 
-@inner_kernel
+@inner_allocating_kernel
 def clear_answer(answer: ClosingArrays, i: int) -> None:
     """Make an item's answer what the closing starts from."""
     answer.travel[i] = 0.0
@@ -38,7 +38,7 @@ def clear_answer(answer: ClosingArrays, i: int) -> None:
     answer.overlap[i] = -1
 
 
-@inner_kernel
+@inner_allocating_kernel
 def with_links(exact: ExactArrays, link_pose: Floats) -> ExactArrays:
     """Return what sweeps read, with the links elsewhere."""
     return ExactArrays(
@@ -57,7 +57,7 @@ def with_links(exact: ExactArrays, link_pose: Floats) -> ExactArrays:
     )
 
 
-@inner_kernel
+@inner_allocating_kernel
 def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
     """Return fingers whose groups have other limits."""
     c = hand.chain
@@ -75,7 +75,7 @@ def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
     )
 
 
-@kernel
+@allocating_kernel
 def close_poses(
     hand: HandArrays,
     exact: ExactArrays,

@@ -12,7 +12,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION, PASSED_GAP
 from .batch_closing import answer_at
 from .batch_layout import Solved, Wanted
 from .batch_sequence import any_deep, take_joints
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel
 from .exact import ExactArrays, find_link_overlap
 from .frames import FrameArrays, couple, place_links, put_angles
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
@@ -47,13 +47,13 @@ class Scratch(NamedTuple):
     touches: TouchArrays
 
 
-@inner_kernel
+@inner_allocating_kernel
 def holds(touches: TouchArrays, i: int, n: int) -> bool:
     """Say whether a touch is one with what is to be grasped, and still there."""
     return bool(touches.number[i, n, TOUCH_GRASPABLE] != 0 and not touches.value[i, n, TOUCH_GAP] > PASSED_GAP)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
     """Return how many links touch what is to be grasped."""
     count = 0
@@ -68,7 +68,7 @@ def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
     return count
 
 
-@inner_kernel
+@inner_allocating_kernel
 def set_total(hand: HandArrays, frames: FrameArrays, wanted: Wanted, entry: int, links: int, q: Floats) -> float:
     """Return the weighted sum of a set's criteria, in steps; see `clench.grasp.finger_criteria`."""
     motion = 0.0
@@ -94,7 +94,7 @@ def set_total(hand: HandArrays, frames: FrameArrays, wanted: Wanted, entry: int,
     return math.floor(total / SAME_TOTAL + 0.5)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def read_item(
     hand: HandArrays,
     frames: FrameArrays,
@@ -112,7 +112,7 @@ def read_item(
     return int(holding_links(touches, i, answer.contacts[i]))
 
 
-@inner_kernel
+@inner_allocating_kernel
 def choose_sets(
     hand: HandArrays,
     frames: FrameArrays,
@@ -138,7 +138,7 @@ def choose_sets(
             scratch.chosen[entry], held, best = i, links > 0, total
 
 
-@inner_kernel
+@inner_allocating_kernel
 def opposed(answer: ClosingArrays, wanted: Wanted, scratch: Scratch) -> bool:
     """Say whether contacts of a thumb and of a finger oppose each other."""
     for thumb in range(wanted.thumb.shape[0]):
@@ -152,7 +152,7 @@ def opposed(answer: ClosingArrays, wanted: Wanted, scratch: Scratch) -> bool:
     return False
 
 
-@inner_kernel
+@inner_allocating_kernel
 def touches_oppose(touches: TouchArrays, a: int, n: int, b: int, m: int) -> bool:
     """Say whether two touches hold the object from opposite sides."""
     if not (holds(touches, a, n) and holds(touches, b, m)):
@@ -163,7 +163,7 @@ def touches_oppose(touches: TouchArrays, a: int, n: int, b: int, m: int) -> bool
     return bool(cosine < OPPOSED)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def finger_status(hand: HandArrays, entry: int, blocked: bool, links: int) -> int:
     """Return how a finger ended; see `FingerStatus`."""
     if blocked:
@@ -176,7 +176,7 @@ def finger_status(hand: HandArrays, entry: int, blocked: bool, links: int) -> in
     return NO_MOTION
 
 
-@inner_kernel
+@inner_allocating_kernel
 def is_certified(
     exact: ExactArrays,
     frames: FrameArrays,
@@ -200,7 +200,7 @@ def is_certified(
     return bool(find_link_overlap(exact, scratch.poses, T_palm_object, ALLOWED_PENETRATION)[0] < 0)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def write_fingers(
     hand: HandArrays,
     frames: FrameArrays,
@@ -227,7 +227,7 @@ def write_fingers(
     couple(frames, angles)
 
 
-@kernel
+@allocating_kernel
 def judge_poses(
     hand: HandArrays,
     exact: ExactArrays,

@@ -8,7 +8,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 
 from .batch_closing import answer_at, clear_answer
 from .batch_layout import Wanted
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel
 from .depth import CROSSINGS
 from .frames import FrameArrays, place_links, put_angles
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
@@ -16,7 +16,7 @@ from .link_meshes import LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
 from .tree import STACK_SIZE
 
 
-@inner_kernel
+@inner_allocating_kernel
 def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
     """Say whether a link that is wanted overlaps the object by more than is allowed."""
     crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
@@ -28,7 +28,7 @@ def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectM
     return False
 
 
-@inner_kernel
+@inner_allocating_kernel
 def starts_blocked(
     link_pose: Floats,
     meshes: LinkMeshArrays,
@@ -43,7 +43,7 @@ def starts_blocked(
     return bool(any_deep(meshes, mask, link_pose, solid, T_palm_object))
 
 
-@kernel
+@allocating_kernel
 def find_blocked(
     link_pose: Floats,
     meshes: LinkMeshArrays,
@@ -75,7 +75,7 @@ def find_blocked(
                 clear_answer(answer, i)
 
 
-@kernel
+@allocating_kernel
 def place_fingers(
     hand: HandArrays, frames: FrameArrays, wanted: Wanted, travel: Floats, link_pose: Floats, length: Floats
 ) -> None:
@@ -100,7 +100,7 @@ def place_fingers(
             take_joints(wanted, entry, angles, q)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def take_joints(wanted: Wanted, entry: int, angles: Floats, q: Floats) -> None:
     """Copy the angles of a finger's own joints into the posture of the hand."""
     for j in wanted.joints[entry]:

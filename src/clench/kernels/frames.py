@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel
 from .family_pose import compose, compose_inverse
 from .layout import Floats, Ints
 
@@ -45,7 +45,7 @@ class FrameArrays(NamedTuple):
     chain_joint: Ints
 
 
-@inner_kernel
+@inner_allocating_kernel
 def turn_link(axis: Floats, anchor: Floats, angle: float, T: Floats) -> None:
     """Turn a link's pose about an axis of its own frame that goes through an anchor, in place (Rodrigues)."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -61,7 +61,7 @@ def turn_link(axis: Floats, anchor: Floats, angle: float, T: Floats) -> None:
     T[:] = out
 
 
-@kernel
+@allocating_kernel
 def place_links(frames: FrameArrays, q: Floats, poses: Floats) -> None:
     """Write `T_palm_link` of every link at a posture (J,) [rad] to `poses`, (L, 3, 4)."""
     links = frames.parent.shape[0]
@@ -80,7 +80,7 @@ def place_links(frames: FrameArrays, q: Floats, poses: Floats) -> None:
         compose_inverse(in_root[frames.palm[0]], in_root[i], poses[i])
 
 
-@inner_kernel
+@inner_allocating_kernel
 def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: Floats, q: Floats) -> None:
     """Write all joints' angles when the groups `first` to `last` of an entry have travelled (G,); see `FingerPlan`."""
     q[:] = frames.posture[entry]
@@ -90,7 +90,7 @@ def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: F
     couple(frames, q)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def couple(frames: FrameArrays, q: Floats) -> None:
     """Make followers obey their couplings, each inside its limits, in place; see `Hand.coupled`."""
     for c in range(frames.leader.shape[0]):
@@ -99,7 +99,7 @@ def couple(frames: FrameArrays, q: Floats) -> None:
         q[f] = inside(angle, frames.lower[f], frames.upper[f])
 
 
-@inner_kernel
+@inner_allocating_kernel
 def inside(value: float, low: float, high: float) -> float:
     """Return a value, or the limit that it passes."""
     if low > value:
@@ -107,7 +107,7 @@ def inside(value: float, low: float, high: float) -> float:
     return high if high < value else value
 
 
-@kernel
+@allocating_kernel
 def relate_poses(first: Floats, second: Floats, placed: Floats) -> None:
     """Write where the second pose is in the first one, row by row: `T_first_second`, (N, 3, 4).
 
@@ -121,7 +121,7 @@ def relate_poses(first: Floats, second: Floats, placed: Floats) -> None:
         compose_inverse(a, b, placed[n])
 
 
-@inner_kernel
+@inner_allocating_kernel
 def put_pose(wxyz_xyz: Floats, out: Floats) -> None:
     """Write a pose as a matrix, (3, 4)."""
     w, x, y, z = wxyz_xyz[0], wxyz_xyz[1], wxyz_xyz[2], wxyz_xyz[3]

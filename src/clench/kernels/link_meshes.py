@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel
 from .depth import CROSSINGS, penetration
 from .distance import is_inside
 from .family_pose import compose_inverse
@@ -49,7 +49,7 @@ class ObjectMesh(NamedTuple):
     points: Floats
 
 
-@inner_kernel
+@inner_allocating_kernel
 def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
     """Return the tree of one link."""
     v0, v1 = meshes.vertex_first[k], meshes.vertex_first[k + 1]
@@ -71,21 +71,21 @@ def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
     )
 
 
-@inner_kernel
+@inner_allocating_kernel
 def put_at(T: Floats, p: Floats, out: Floats) -> None:
     """Map a point by a pose, (3, 4)."""
     for r in range(3):
         out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
 
 
-@inner_kernel
+@inner_allocating_kernel
 def put_back(T: Floats, p: Floats, out: Floats) -> None:
     """Map a point by the inverse of a pose, (3, 4)."""
     for c in range(3):
         out[c] = T[0, c] * (p[0] - T[0, 3]) + T[1, c] * (p[1] - T[1, 3]) + T[2, c] * (p[2] - T[2, 3])
 
 
-@inner_kernel
+@inner_allocating_kernel
 def in_box(obj: MeshTree, p: Floats) -> bool:
     """Say whether a point lies in the box around a mesh."""
     inside = True
@@ -94,7 +94,7 @@ def in_box(obj: MeshTree, p: Floats) -> bool:
     return bool(inside)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree) -> bool:
     """Say whether the ball around a link meets the box around the object."""
     if obj.low.shape[0] == 0:
@@ -106,7 +106,7 @@ def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTr
     return bool(outside <= meshes.radius[k] ** 2)
 
 
-@kernel
+@allocating_kernel
 def measure_depths(
     meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, out: Floats
 ) -> None:
@@ -125,7 +125,7 @@ def measure_depths(
             )
 
 
-@inner_kernel
+@inner_allocating_kernel
 def depth_of(
     meshes: LinkMeshArrays,
     k: int,
@@ -157,7 +157,7 @@ def depth_of(
     return found
 
 
-@kernel
+@allocating_kernel
 def find_contained(
     meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats
 ) -> int:
@@ -179,7 +179,7 @@ def find_contained(
     return -1
 
 
-@inner_kernel
+@inner_allocating_kernel
 def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree, p: Floats) -> bool:
     """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
     if meshes.point_first[k + 1] - meshes.point_first[k] != 1:
@@ -194,7 +194,7 @@ def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree
     return True
 
 
-@inner_kernel
+@inner_allocating_kernel
 def may_hold_part(meshes: LinkMeshArrays, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
     """Say whether a part of the object may lie inside a link, as the links' balls tell."""
     p, c = np.empty(3), np.empty(3)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel
 from .frames import FrameArrays, place_links, put_angles
 from .layout import (
     HIT_CURVE_X,
@@ -69,7 +69,7 @@ class SurfaceArrays(NamedTuple):
     graspable: Ints
 
 
-@inner_kernel
+@inner_allocating_kernel
 def put_round_normal(rounds: RoundArrays, i: int, T_palm_object: Floats, position: Floats, out: Floats) -> None:
     """Write the outward unit normal of a round shape at a point of its surface, both in the palm frame."""
     p, n = np.empty(3), np.zeros(3)
@@ -99,7 +99,7 @@ def put_round_normal(rounds: RoundArrays, i: int, T_palm_object: Floats, positio
         out[r] = T_palm_object[r, 0] * p[0] + T_palm_object[r, 1] * p[1] + T_palm_object[r, 2] * p[2]
 
 
-@inner_kernel
+@inner_allocating_kernel
 def carried(
     hand: HandArrays, frames: FrameArrays, entry: int, link: int, family: int, travel: Floats, position: Floats
 ) -> float:
@@ -131,7 +131,7 @@ def carried(
     return math.sqrt(away)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def read_plane_touch(
     hand: HandArrays,
     frames: FrameArrays,
@@ -168,7 +168,7 @@ def read_plane_touch(
     value[TOUCH_OFFSET] = offset
 
 
-@inner_kernel
+@inner_allocating_kernel
 def read_exact_touch(
     surface: SurfaceArrays, links: int, hit: Ints, point: Floats, pose: Floats, number: Ints, value: Floats
 ) -> None:
@@ -188,7 +188,7 @@ def read_exact_touch(
     value[TOUCH_SIDE] = value[TOUCH_CURVE] if hit[HIT_KIND] == KIND_SIDE else math.nan
 
 
-@inner_kernel
+@inner_allocating_kernel
 def read_touch(
     hand: HandArrays,
     frames: FrameArrays,
@@ -215,7 +215,7 @@ def read_touch(
     number[TOUCH_GRASPABLE] = surface.graspable[body] if body >= 0 else 0
 
 
-@kernel
+@allocating_kernel
 def read_touches(
     hand: HandArrays,
     frames: FrameArrays,
