@@ -84,3 +84,10 @@ def test_what_touches_at_the_start_has_met_where_only_balls_are_asked_for():
     face = [(-0.1, -0.1, -1e-12), (0.1, -0.1, -1e-12), (0.0, 0.1, -1e-12)]
     assert swept([(0.05, 0.0, 0.0)], face) > 0.5
     assert swept([(0.05, 0.0, 0.0)], face, rough=True) == 0.0
+
+
+@pytest.mark.parametrize("below", [0.0, 1e-12])
+def test_what_leaves_a_face_comes_back_to_it_after_half_a_turn(below):
+    face = [(-0.1, -0.1, -below), (0.1, -0.1, -below), (0.0, 0.1, -below)]
+    assert swept([(0.04, 0.0, 0.0)], face, best=4.0) == pytest.approx(np.pi, abs=1e-8)
+    assert swept([(0.04, 0.0, 0.0)], face, best=3.0) == 3.0
