@@ -87,7 +87,10 @@ def test_what_touches_at_the_start_has_met_where_only_balls_are_asked_for():
 
 
 @pytest.mark.parametrize("below", [0.0, 1e-12])
-def test_what_leaves_a_face_comes_back_to_it_after_half_a_turn(below):
-    face = [(-0.1, -0.1, -below), (0.1, -0.1, -below), (0.0, 0.1, -below)]
-    assert swept([(0.04, 0.0, 0.0)], face, best=4.0) == pytest.approx(np.pi, abs=1e-8)
-    assert swept([(0.04, 0.0, 0.0)], face, best=3.0) == 3.0
+@pytest.mark.parametrize("at", [0.0, 0.5, 1.0, 1.4])
+def test_what_leaves_a_face_comes_back_to_it(below, at):
+    """A point at an angle below the vertical comes down to the same height at that angle beyond it."""
+    x, z = 0.04 * np.cos(at), 0.04 * np.sin(at)
+    face = [(-0.1, -0.1, z - below), (0.1, -0.1, z - below), (0.0, 0.1, z - below)]
+    assert swept([(x, 0.0, z)], face, best=4.0) == pytest.approx(np.pi - 2.0 * at, abs=1e-8)
+    assert swept([(x, 0.0, z)], face, best=3.0 - 2.0 * at) == 3.0 - 2.0 * at
