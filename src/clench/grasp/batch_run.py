@@ -16,7 +16,7 @@ from .closing import CAPACITY, KernelObject, kernel_threads, nothing_to_close
 
 if TYPE_CHECKING:
     from clench.kernels.batch_layout import Solved
-    from clench.kernels.layout import ClosingArrays
+    from clench.kernels.layout import ClosingArrays, SectionArrays
 
 Whole = NDArray[np.int64]
 
@@ -51,6 +51,7 @@ class _Range:
         self._count, self._items = len(T_palm_object), len(problem.items.entry)
         self._blocked = np.zeros((self._count, len(problem.frames.posture)), dtype=np.int64)
         self._answers = _empty_answers(problem, self._count)
+        self._arenas: dict[tuple[int, int], tuple[SectionArrays, SectionArrays]] = {}
 
     def solve(self, solved: Solved) -> None:
         """Close the fingers, each with the earlier ones in its way, and judge the answer, which is written."""
@@ -103,13 +104,14 @@ class _Range:
         waiting, capacity = np.arange(len(poses)), CAPACITY
         while len(waiting):
             rows = poses[waiting]
-            answers = _rows(self._answers, rows)
+            everyone = len(rows) == self._count
+            answers = self._answers if everyone else _rows(self._answers, rows)
             found = np.empty((len(rows), overlaps.shape[1]), dtype=np.int64)
             links = p.exact.link_pose[None] if placed is None else placed[waiting]
             exact = p.exact if placed is None else p.exact._replace(checked=p.bodies.across)
             length = np.repeat(p.hand.chain.group_length[None], len(links), axis=0)
             self._run(exact, p.target, rows, links, length, asked[waiting], capacity, found, answers)
-            for column, values in zip(self._answers, answers, strict=True):
+            for column, values in () if everyone else zip(self._answers, answers, strict=True):
                 column[rows] = values
             overlaps[waiting] = found
             wanted = (answers.overflow * asked[waiting]).max(axis=1, initial=0)
@@ -129,9 +131,8 @@ class _Range:
         answers: ClosingArrays,
     ) -> None:
         from clench.kernels.batch_closing import close_poses
-        from clench.kernels.family_section import make_sections
 
-        p, rounds = self._problem, len(target.rounds.kind)
+        p = self._problem
         close_poses(
             p.hand,
             exact,
@@ -143,11 +144,21 @@ class _Range:
             length,
             p.items,
             asked,
-            make_sections(len(p.hand.plane_offset), capacity, rounds),
-            make_sections(p.most_planes, capacity, rounds),
+            *self._arenas_of(capacity, len(target.rounds.kind)),
             overlaps,
             answers,
         )
+
+    def _arenas_of(self, capacity: int, rounds: int) -> tuple[SectionArrays, SectionArrays]:
+        """Return arenas for the sections of all first families, and for those of an entry's later ones."""
+        from clench.kernels.family_section import make_sections
+
+        p, key = self._problem, (capacity, rounds)
+        if key not in self._arenas:
+            planes = (len(p.hand.plane_offset), p.most_planes)
+            first, later = (make_sections(count, capacity, rounds) for count in planes)
+            self._arenas[key] = (first, later)
+        return self._arenas[key]
 
     def _close_in_sequence(self) -> None:
         """Close fingers anew that meet another one, each with the earlier ones where they are by then.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -56,13 +57,13 @@ class PackedProblem:
     bodies: HandBodies
     alone: bool
 
-    @property
+    @cached_property
     def most_planes(self) -> int:
         """Return the number of planes of the largest entry."""
         firsts = self.hand.family_plane[self.hand.entry_family]
         return int(np.diff(firsts).max())
 
-    @property
+    @cached_property
     def most_contacts(self) -> int:
         """Return the number of joints of the largest entry, each of which one contact may stop."""
         return int(np.diff(self.exact.joint_first).max())
