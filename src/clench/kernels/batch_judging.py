@@ -12,7 +12,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION, PASSED_GAP
 from .batch_closing import answer_at
 from .batch_layout import Solved, Wanted
 from .batch_sequence import any_deep, take_joints
-from .compiling import allocating_kernel, inner_allocating_kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays, find_link_overlap
 from .frames import FrameArrays, couple, place_links, put_angles
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
@@ -47,13 +47,13 @@ class Scratch(NamedTuple):
     touches: TouchArrays
 
 
-@inner_allocating_kernel
+@inner_kernel
 def holds(touches: TouchArrays, i: int, n: int) -> bool:
     """Say whether a touch is one with what is to be grasped, and still there."""
     return bool(touches.number[i, n, TOUCH_GRASPABLE] != 0 and not touches.value[i, n, TOUCH_GAP] > PASSED_GAP)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
     """Return how many links touch what is to be grasped."""
     count = 0
@@ -68,11 +68,12 @@ def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
     return count
 
 
-@inner_allocating_kernel
+@inner_kernel
 def set_total(hand: HandArrays, frames: FrameArrays, wanted: Wanted, entry: int, links: int, q: Floats) -> float:
     """Return the weighted sum of a set's criteria, in steps; see `clench.grasp.finger_criteria`."""
     motion = 0.0
-    for j in wanted.joints[entry]:
+    for k in range(wanted.joints.shape[1]):
+        j = wanted.joints[entry, k]
         if j >= 0:
             motion += abs(q[j] - wanted.start[j])
     least = 1.0
@@ -94,7 +95,7 @@ def set_total(hand: HandArrays, frames: FrameArrays, wanted: Wanted, entry: int,
     return math.floor(total / SAME_TOTAL + 0.5)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def read_item(
     hand: HandArrays,
     frames: FrameArrays,
@@ -112,7 +113,7 @@ def read_item(
     return int(holding_links(touches, i, answer.contacts[i]))
 
 
-@inner_allocating_kernel
+@inner_kernel
 def choose_sets(
     hand: HandArrays,
     frames: FrameArrays,
@@ -124,7 +125,8 @@ def choose_sets(
     scratch: Scratch,
 ) -> None:
     """Choose an item of every entry: the full width, else the plane that `clench.grasp.choice` takes; read touches."""
-    scratch.chosen[:] = -1
+    for entry in range(scratch.chosen.shape[0]):
+        scratch.chosen[entry] = -1
     held, best = False, 0.0
     for i in range(items.entry.shape[0]):
         entry = items.entry[i]
@@ -138,7 +140,7 @@ def choose_sets(
             scratch.chosen[entry], held, best = i, links > 0, total
 
 
-@inner_allocating_kernel
+@inner_kernel
 def opposed(answer: ClosingArrays, wanted: Wanted, scratch: Scratch) -> bool:
     """Say whether contacts of a thumb and of a finger oppose each other."""
     for thumb in range(wanted.thumb.shape[0]):
@@ -152,7 +154,7 @@ def opposed(answer: ClosingArrays, wanted: Wanted, scratch: Scratch) -> bool:
     return False
 
 
-@inner_allocating_kernel
+@inner_kernel
 def touches_oppose(touches: TouchArrays, a: int, n: int, b: int, m: int) -> bool:
     """Say whether two touches hold the object from opposite sides."""
     if not (holds(touches, a, n) and holds(touches, b, m)):
@@ -163,7 +165,7 @@ def touches_oppose(touches: TouchArrays, a: int, n: int, b: int, m: int) -> bool
     return bool(cosine < OPPOSED)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def finger_status(hand: HandArrays, entry: int, blocked: bool, links: int) -> int:
     """Return how a finger ended; see `FingerStatus`."""
     if blocked:
@@ -191,8 +193,8 @@ def is_certified(
     """Say whether chosen sets from a free start keep the promise of `clench.solve.certificate`."""
     if wanted.nested:
         return False
-    for i in scratch.chosen:
-        if answer.skipped[i]:
+    for entry in range(scratch.chosen.shape[0]):
+        if answer.skipped[scratch.chosen[entry]]:
             return False
     if find_contained(meshes, wanted.fingers, wanted.start_pose, mesh, T_palm_object) >= 0:
         return False
@@ -200,7 +202,7 @@ def is_certified(
     return bool(find_link_overlap(exact, scratch.poses, T_palm_object, ALLOWED_PENETRATION)[0] < 0)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def write_fingers(
     hand: HandArrays,
     frames: FrameArrays,
@@ -213,15 +215,19 @@ def write_fingers(
 ) -> None:
     """Write status, contacts and angles of every finger, and the posture of the hand."""
     angles = solved.angles[n]
-    angles[:] = wanted.start
+    for j in range(angles.shape[0]):
+        angles[j] = wanted.start[j]
     for entry in range(scratch.chosen.shape[0]):
         i, first, last = scratch.chosen[entry], hand.entry_group[entry], hand.entry_group[entry + 1]
         contacts = answer.contacts[i]
         links = holding_links(scratch.touches, i, contacts)
         solved.fingers[n, entry] = finger_status(hand, entry, blocked[entry] != 0, links)
         solved.chosen[n, entry], solved.contacts[n, entry] = i, contacts
-        solved.number[n, entry, :contacts] = scratch.touches.number[i, :contacts]
-        solved.value[n, entry, :contacts] = scratch.touches.value[i, :contacts]
+        for m in range(contacts):
+            for k in range(TOUCH_INTEGERS):
+                solved.number[n, entry, m, k] = scratch.touches.number[i, m, k]
+            for k in range(TOUCH_FLOATS):
+                solved.value[n, entry, m, k] = scratch.touches.value[i, m, k]
         put_angles(frames, entry, first, last, answer.travel[i], scratch.angles)
         take_joints(wanted, entry, scratch.angles, angles)
     couple(frames, angles)

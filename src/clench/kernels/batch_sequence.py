@@ -8,9 +8,9 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 
 from .batch_closing import answer_at, clear_answer
 from .batch_layout import Wanted
-from .compiling import allocating_kernel, inner_allocating_kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .depth import CROSSINGS
-from .frames import FrameArrays, place_links, put_angles
+from .frames import FrameArrays, put_angles, put_links
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
 from .link_meshes import LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
 from .tree import STACK_SIZE
@@ -86,23 +86,43 @@ def place_fingers(
         link_pose: written, (N, E, L, 3, 4). length: written with the travel of each group, (N, G).
     """
     q, angles = wanted.start.copy(), wanted.start.copy()
+    scratch = np.empty((frames.parent.shape[0] + 2, 3, 4))
     for n in range(travel.shape[0]):
-        q[:] = wanted.start
-        for entry in range(travel.shape[1]):
-            first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
-            angles[:] = q
-            for j in wanted.joints[entry]:
-                if j >= 0:
-                    angles[j] = frames.posture[entry, j]
-            place_links(frames, angles, link_pose[n, entry])
-            length[n, first:last] = travel[n, entry, first:last]
-            put_angles(frames, entry, first, last, travel[n, entry], angles)
-            take_joints(wanted, entry, angles, q)
+        place_one(hand, frames, wanted, travel[n], link_pose[n], length[n], q, angles, scratch)
 
 
-@inner_allocating_kernel
+@inner_kernel
+def place_one(
+    hand: HandArrays,
+    frames: FrameArrays,
+    wanted: Wanted,
+    travel: Floats,
+    link_pose: Floats,
+    length: Floats,
+    q: Floats,
+    angles: Floats,
+    scratch: Floats,
+) -> None:
+    """Do as `place_fingers` for one pose of the object; `q`, `angles` and `scratch` are overwritten."""
+    for j in range(q.shape[0]):
+        q[j] = wanted.start[j]
+    for entry in range(travel.shape[0]):
+        first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
+        for j in range(q.shape[0]):
+            angles[j] = q[j]
+        for k in range(wanted.joints.shape[1]):
+            if wanted.joints[entry, k] >= 0:
+                angles[wanted.joints[entry, k]] = frames.posture[entry, wanted.joints[entry, k]]
+        put_links(frames, angles, scratch, link_pose[entry])
+        for g in range(first, last):
+            length[g] = travel[entry, g]
+        put_angles(frames, entry, first, last, travel[entry], angles)
+        take_joints(wanted, entry, angles, q)
+
+
+@inner_kernel
 def take_joints(wanted: Wanted, entry: int, angles: Floats, q: Floats) -> None:
     """Copy the angles of a finger's own joints into the posture of the hand."""
-    for j in wanted.joints[entry]:
-        if j >= 0:
-            q[j] = angles[j]
+    for k in range(wanted.joints.shape[1]):
+        if wanted.joints[entry, k] >= 0:
+            q[wanted.joints[entry, k]] = angles[wanted.joints[entry, k]]

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiling import allocating_kernel, inner_allocating_kernel
-from .family_pose import compose, compose_inverse
+from .compiling import allocating_kernel, inner_kernel
+from .family_pose import compose, compose_inverse, copy_pose
 from .layout import Floats, Ints
 
 
@@ -45,52 +45,57 @@ class FrameArrays(NamedTuple):
     chain_joint: Ints
 
 
-@inner_allocating_kernel
-def turn_link(axis: Floats, anchor: Floats, angle: float, T: Floats) -> None:
-    """Turn a link's pose about an axis of its own frame that goes through an anchor, in place (Rodrigues)."""
+@inner_kernel
+def turn_link(axis: Floats, anchor: Floats, angle: float, T: Floats, R: Floats, out: Floats) -> None:
+    """Write a pose turned about an axis of its own frame through an anchor; R is scratch (Rodrigues)."""
     x, y, z = axis[0], axis[1], axis[2]
     s, v = math.sin(angle), 1.0 - math.cos(angle)
-    R = np.empty((3, 4))
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - v * (y * y + z * z), v * x * y - s * z, v * x * z + s * y
     R[1, 0], R[1, 1], R[1, 2] = v * x * y + s * z, 1.0 - v * (x * x + z * z), v * y * z - s * x
     R[2, 0], R[2, 1], R[2, 2] = v * x * z - s * y, v * y * z + s * x, 1.0 - v * (x * x + y * y)
     for r in range(3):
         R[r, 3] = anchor[r] - R[r, 0] * anchor[0] - R[r, 1] * anchor[1] - R[r, 2] * anchor[2]
-    out = np.empty((3, 4))
     compose(T, R, out)
-    T[:] = out
 
 
 @allocating_kernel
 def place_links(frames: FrameArrays, q: Floats, poses: Floats) -> None:
     """Write `T_palm_link` of every link at a posture (J,) [rad] to `poses`, (L, 3, 4)."""
+    put_links(frames, q, np.empty((frames.parent.shape[0] + 2, 3, 4)), poses)
+
+
+@inner_kernel
+def put_links(frames: FrameArrays, q: Floats, scratch: Floats, poses: Floats) -> None:
+    """Do as `place_links` with scratch space, (L + 2, 3, 4)."""
     links = frames.parent.shape[0]
-    in_root = np.empty((links, 3, 4))
-    local = np.empty((3, 4))
+    R, turned = scratch[links], scratch[links + 1]
     for i in range(links):
-        local[:] = frames.T_parent_link[i]
-        j = frames.joint[i]
+        j, parent = frames.joint[i], frames.parent[i]
         if j >= 0:
-            turn_link(frames.axis[j], frames.anchor[j], q[j] - frames.reference[j], local)
-        if frames.parent[i] < 0:
-            in_root[i] = local
+            angle = q[j] - frames.reference[j]
+            turn_link(frames.axis[j], frames.anchor[j], angle, frames.T_parent_link[i], R, turned)
         else:
-            compose(in_root[frames.parent[i]], local, in_root[i])
+            copy_pose(frames.T_parent_link[i], turned)
+        if parent < 0:
+            copy_pose(turned, scratch[i])
+        else:
+            compose(scratch[parent], turned, scratch[i])
     for i in range(links):
-        compose_inverse(in_root[frames.palm[0]], in_root[i], poses[i])
+        compose_inverse(scratch[frames.palm[0]], scratch[i], poses[i])
 
 
-@inner_allocating_kernel
+@inner_kernel
 def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: Floats, q: Floats) -> None:
     """Write all joints' angles when the groups `first` to `last` of an entry have travelled (G,); see `FingerPlan`."""
-    q[:] = frames.posture[entry]
+    for j in range(q.shape[0]):
+        q[j] = frames.posture[entry, j]
     for g in range(first, last):
         j = frames.group_leader[g]
         q[j] = inside(q[j] + frames.direction[j] * travel[g], frames.lower[j], frames.upper[j])
     couple(frames, q)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def couple(frames: FrameArrays, q: Floats) -> None:
     """Make followers obey their couplings, each inside its limits, in place; see `Hand.coupled`."""
     for c in range(frames.leader.shape[0]):
@@ -99,7 +104,7 @@ def couple(frames: FrameArrays, q: Floats) -> None:
         q[f] = inside(angle, frames.lower[f], frames.upper[f])
 
 
-@inner_allocating_kernel
+@inner_kernel
 def inside(value: float, low: float, high: float) -> float:
     """Return a value, or the limit that it passes."""
     if low > value:
@@ -121,7 +126,7 @@ def relate_poses(first: Floats, second: Floats, placed: Floats) -> None:
         compose_inverse(a, b, placed[n])
 
 
-@inner_allocating_kernel
+@inner_kernel
 def put_pose(wxyz_xyz: Floats, out: Floats) -> None:
     """Write a pose as a matrix, (3, 4)."""
     w, x, y, z = wxyz_xyz[0], wxyz_xyz[1], wxyz_xyz[2], wxyz_xyz[3]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiling import allocating_kernel, inner_allocating_kernel
+from .compiling import inner_allocating_kernel, inner_kernel, kernel
 from .frames import FrameArrays, place_links, put_angles
 from .layout import (
     HIT_CURVE_X,
@@ -69,34 +69,55 @@ class SurfaceArrays(NamedTuple):
     graspable: Ints
 
 
-@inner_allocating_kernel
+@inner_kernel
 def put_round_normal(rounds: RoundArrays, i: int, T_palm_object: Floats, position: Floats, out: Floats) -> None:
     """Write the outward unit normal of a round shape at a point of its surface, both in the palm frame."""
-    p, n = np.empty(3), np.zeros(3)
-    pose, size = rounds.pose[i], rounds.size[i]
-    for c in range(3):
-        p[c] = 0.0
-        for r in range(3):
-            p[c] += T_palm_object[r, c] * (position[r] - T_palm_object[r, 3])
-    for c in range(3):
-        for r in range(3):
-            n[c] += pose[r, c] * (p[r] - pose[r, 3])
-    if rounds.kind[i] == ELLIPSOID:
-        for c in range(3):
-            n[c] /= size[c] ** 2
-    elif rounds.kind[i] == CYLINDER:
-        across = math.hypot(n[0], n[1])
-        if abs(abs(n[2]) - size[1]) < abs(across - size[0]):
-            n[0], n[1] = 0.0, 0.0
+    pose, size, kind = rounds.pose[i], rounds.size[i], rounds.kind[i]
+    x, y, z = back(T_palm_object, position[0], position[1], position[2])
+    x, y, z = back(pose, x, y, z)
+    if kind == ELLIPSOID:
+        x, y, z = x / size[0] ** 2, y / size[1] ** 2, z / size[2] ** 2
+    elif kind == CYLINDER:
+        if abs(abs(z) - size[1]) < abs(math.hypot(x, y) - size[0]):
+            x, y = 0.0, 0.0
         else:
-            n[2] = 0.0
-    elif rounds.kind[i] == CAPSULE:
-        n[2] -= min(max(n[2], -size[1]), size[1])
-    length = math.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
-    for r in range(3):
-        p[r] = (pose[r, 0] * n[0] + pose[r, 1] * n[1] + pose[r, 2] * n[2]) / length
-    for r in range(3):
-        out[r] = T_palm_object[r, 0] * p[0] + T_palm_object[r, 1] * p[1] + T_palm_object[r, 2] * p[2]
+            z = 0.0
+    elif kind == CAPSULE:
+        z -= min(max(z, -size[1]), size[1])
+    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = turned(pose, x / length, y / length, z / length)
+    out[0], out[1], out[2] = turned(T_palm_object, x, y, z)
+
+
+@inner_kernel
+def back(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Map a point by the inverse of a pose, (3, 4)."""
+    x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]
+    return (
+        T[0, 0] * x + T[1, 0] * y + T[2, 0] * z,
+        T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
+        T[0, 2] * x + T[1, 2] * y + T[2, 2] * z,
+    )
+
+
+@inner_kernel
+def turned(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Turn a direction as a pose does, (3, 4)."""
+    return (
+        T[0, 0] * x + T[0, 1] * y + T[0, 2] * z,
+        T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
+        T[2, 0] * x + T[2, 1] * y + T[2, 2] * z,
+    )
+
+
+@inner_kernel
+def is_carried(hand: HandArrays, entry: int, family: int, travel: Floats) -> bool:
+    """Say whether joints of families after a touch's own have moved."""
+    for j in range(hand.chain.joint_family.shape[0]):
+        later = family < hand.chain.joint_family[j] < hand.entry_family[entry + 1]
+        if later and travel[hand.chain.joint_group[j]] > 0.0:
+            return True
+    return False
 
 
 @inner_allocating_kernel
@@ -107,13 +128,10 @@ def carried(
 
     Their planes are not those of the touch, so its outline does not tell; the distance is an upper bound of the gap.
     """
-    before, moved = travel.copy(), False
+    before = travel.copy()
     for j in range(hand.chain.joint_family.shape[0]):
-        g = hand.chain.joint_group[j]
-        if family < hand.chain.joint_family[j] < hand.entry_family[entry + 1] and travel[g] > 0.0:
-            before[g], moved = 0.0, True
-    if not moved:
-        return 0.0
+        if family < hand.chain.joint_family[j] < hand.entry_family[entry + 1]:
+            before[hand.chain.joint_group[j]] = 0.0
     first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
     q = np.empty(frames.posture.shape[1])
     then, now = np.empty((frames.parent.shape[0], 3, 4)), np.empty((frames.parent.shape[0], 3, 4))
@@ -131,7 +149,7 @@ def carried(
     return math.sqrt(away)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def read_plane_touch(
     hand: HandArrays,
     frames: FrameArrays,
@@ -162,13 +180,15 @@ def read_plane_touch(
     number[TOUCH_LINK], number[TOUCH_KIND] = link, kind
     number[TOUCH_BODY] = surface.body[source] if source >= 0 else surface.round_body[-1 - source]
     number[TOUCH_PLANE] = plane - hand.family_plane[family]
-    value[TOUCH_GAP] = max(point[HIT_GAP], carried(hand, frames, entry, link, family, travel, position))
+    value[TOUCH_GAP] = point[HIT_GAP]
+    if is_carried(hand, entry, family, travel):
+        value[TOUCH_GAP] = max(point[HIT_GAP], carried(hand, frames, entry, link, family, travel, position))
     value[TOUCH_CURVE] = math.atan2(point[HIT_CURVE_X], -point[HIT_CURVE_Z])
     value[TOUCH_SIDE] = math.atan2(point[HIT_NX], -point[HIT_NZ]) if kind == KIND_SIDE else math.nan
     value[TOUCH_OFFSET] = offset
 
 
-@inner_allocating_kernel
+@inner_kernel
 def read_exact_touch(
     surface: SurfaceArrays, links: int, hit: Ints, point: Floats, pose: Floats, number: Ints, value: Floats
 ) -> None:
@@ -188,7 +208,7 @@ def read_exact_touch(
     value[TOUCH_SIDE] = value[TOUCH_CURVE] if hit[HIT_KIND] == KIND_SIDE else math.nan
 
 
-@inner_allocating_kernel
+@inner_kernel
 def read_touch(
     hand: HandArrays,
     frames: FrameArrays,
@@ -215,7 +235,7 @@ def read_touch(
     number[TOUCH_GRASPABLE] = surface.graspable[body] if body >= 0 else 0
 
 
-@allocating_kernel
+@kernel
 def read_touches(
     hand: HandArrays,
     frames: FrameArrays,
