@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -184,6 +185,39 @@ def inner_kernels() -> set[str]:
             ):
                 names.add(node.name)
     return names
+
+
+def kernels_that_do_not_allocate() -> dict[str, ast.FunctionDef]:
+    return {
+        node.name: node
+        for path in (PACKAGE / "kernels").glob("*.py")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+        and any(isinstance(d, ast.Name) and d.id in ("kernel", "inner_kernel") for d in node.decorator_list)
+    }
+
+
+def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
+    # What they hand out would be freed once too often, and what they are handed would never be freed.
+    numbers = {"None", "bool", "int", "float", "tuple", "Point", "Flat", "Triple", "Deepest", "Separation", "Outline"}
+    plain = kernels_that_do_not_allocate()
+    assert len(plain) > 100
+    for name, node in plain.items():
+        assert node.returns is not None
+        words = set(re.findall(r"\w+", ast.unparse(node.returns)))
+        assert words <= numbers, f"{name} returns {ast.unparse(node.returns)}"
+    arrays = {
+        node.name
+        for path in (PACKAGE / "kernels").glob("*.py")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+        and any(isinstance(d, ast.Name) and d.id.endswith("allocating_kernel") for d in node.decorator_list)
+        and not set(re.findall(r"\w+", ast.unparse(node.returns or ast.Constant(None)))) <= numbers
+    }
+    assert "make_work" in arrays
+    for name, node in plain.items():
+        called = {c.func.id for c in ast.walk(node) if isinstance(c, ast.Call) and isinstance(c.func, ast.Name)}
+        assert not called & arrays, f"{name} calls {called & arrays}"
 
 
 def test_python_never_imports_a_kernel_without_an_entry() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiling import inner_kernel, kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 
 #: Growth and slopes below this are rounding [-].
 _SMALL = 1e-11
@@ -20,7 +20,7 @@ _CORNERS = 30
 _STEPS = 100
 
 
-@kernel
+@allocating_kernel
 def nearer_facets(points: np.ndarray, starts: np.ndarray, found: np.ndarray, reach: np.ndarray) -> None:
     """Write a direction in which the hull of 0 and points reaches least far near every start, and how far.
 
@@ -51,7 +51,7 @@ def nearer_facets(points: np.ndarray, starts: np.ndarray, found: np.ndarray, rea
             reach[m] = max(reach[m], _dot(points[w], found[m]))
 
 
-@inner_kernel
+@inner_allocating_kernel
 def _farthest_corner(points: np.ndarray, c: np.ndarray, y: np.ndarray) -> bool:
     """Write the y with `w y <= 1` for all points that maximises `c y`; without one, a direction that has no bound.
 
@@ -106,7 +106,7 @@ def _orthogonal(points: np.ndarray, active: np.ndarray, count: int, basis: np.nd
         basis[k] /= max(np.sqrt(_dot(basis[k], basis[k])), 1e-300)
 
 
-@inner_kernel
+@inner_allocating_kernel
 def _least_multiplier(points: np.ndarray, active: np.ndarray, count: int, basis: np.ndarray, c: np.ndarray) -> int:
     """Return the place of the active point with the most negative multiplier in `c = sum of m w`, -1 for none."""
     m = np.zeros(count)
