@@ -95,7 +95,7 @@ def _farthest_corner(points: np.ndarray, c: np.ndarray, y: np.ndarray) -> bool:
     return True
 
 
-@inner_kernel
+@inner_allocating_kernel
 def _orthogonal(points: np.ndarray, active: np.ndarray, count: int, basis: np.ndarray) -> None:
     """Write orthonormal rows that span the active points, one after another."""
     for k in range(count):
