@@ -35,7 +35,9 @@ class FakeSolver:
 
     def load(self, *arguments: object, **options: object) -> SimpleNamespace:
         self.loaded.append((*arguments, options))
-        return SimpleNamespace(name="pincer", warnings=("looks like [millimetres]",), open_angles=dict)
+        return SimpleNamespace(
+            name="pincer", warnings=("looks like [millimetres]",), open_angles=dict, joints=(), couplings=()
+        )
 
     def solve(self, hand: object, obj: object, command: GraspCommand) -> GraspSolution:
         self.commands.append(command)
@@ -226,6 +228,41 @@ def test_solve_with_a_command_file(solver: FakeSolver, tmp_path: Path) -> None:
     assert main([*SOLVE, "--command", str(file), "--planes", "2"]) == 0
     assert [c.planes for c in solver.commands] == [7, 2]
     assert solver.commands[0].hand_pose == clench.Pose([0, 0, 1])
+
+
+@pytest.mark.parametrize("verb", ["solve", "batch"])
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"criteria": {"range_of_motion": -1}}, "criteria.range_of_motion: expected a number of at least 0, got -1"),
+        ({"criteria": {"range": 1}}, "Criterion 'range' is not in criteria."),
+        ({"criteria": {}}, "criteria: nothing counts in the choice; expected a weight above 0."),
+        ({"planes": 0}, "planes: expected"),
+    ],
+)
+def test_what_is_wrong_in_a_command_file_is_said_with_its_name(
+    solver: FakeSolver,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    verb: str,
+    keys: dict[str, object],
+    said: str,
+) -> None:
+    file = tmp_path / "c.json"
+    file.write_text(json.dumps({"hand_pose": {"position": [0, 0, 1]}, **keys}))
+    assert main([verb, *SOLVE[1:], "--command", str(file)]) == 2
+    assert capsys.readouterr().err.startswith(f"clench: error: {file}: {said}")
+    assert not solver.commands
+
+
+def test_a_calibration_file_that_a_command_file_names_is_named(
+    solver: FakeSolver, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, weights = tmp_path / "c.json", tmp_path / "w.toml"
+    file.write_text(json.dumps({"hand_pose": {"position": [0, 0, 1]}, "criteria": "w.toml"}))
+    weights.write_text("")
+    assert main([*SOLVE, "--command", str(file)]) == 2
+    assert capsys.readouterr().err.startswith(f"clench: error: {weights}: nothing counts in the choice;")
 
 
 CHOICE = {

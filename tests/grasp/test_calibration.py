@@ -113,6 +113,9 @@ def test_what_is_written_is_read_again(tmp_path):
         ("[limits]\nrange_of_motion = inf\n", "a finite number"),
         ("[joints]\nindex_yaw = -1\n", r"joints\.index_yaw.*at least 0"),
         ("[joints]\nindex_yaw = nan\n", r"joints\.index_yaw.*at least 0"),
+        ("", r"nothing counts in the choice; expected a weight above 0 in \[weights\], or \[limits\]"),
+        ("[weights]\nrange_of_motion = 0\ntouching_links = 0.0\n", "nothing counts"),
+        ("[scales]\nrange_of_motion = 2\n[joints]\nindex_yaw = 2\n", "nothing counts"),
     ],
 )
 def test_malformed_files(tmp_path, text, message):
@@ -127,6 +130,16 @@ def test_a_missing_file_and_a_folder(tmp_path):
         load_calibration(tmp_path / "none.toml")
     with pytest.raises(FileError, match="it is a folder, expected a file"):
         load_calibration(tmp_path)
+
+
+def test_limits_alone_count(tmp_path):
+    assert load_calibration(write(tmp_path, "[limits]\nlimit_distance = 0.1\n")).criteria == ("limit_distance",)
+
+
+@pytest.mark.parametrize("weights", [{}, {"range_of_motion": 0.0}])
+def test_weights_of_which_none_counts_are_refused(weights):
+    with pytest.raises(CommandError, match="criteria: nothing counts in the choice; expected a weight above 0"):
+        calibration_of(weights)
 
 
 def test_negative_weights_of_a_command_are_refused():

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.errors import ClenchError, FileError, UnknownNameError
+from clench.base.errors import ClenchError, CommandError, FileError, UnknownNameError
 from clench.base.files import read_text
 from clench.base.pose import FloatArray
 
@@ -75,12 +75,15 @@ def calibration_of(criteria: Mapping[str, float] | Path | str | None) -> Calibra
 
     Raises:
         FileError: a file that is missing or malformed. UnknownNameError: no such preset or criterion.
-        CommandError: a number out of range.
+        CommandError: a number out of range, weights of which none is above 0.
     """
     if criteria is None:
         return load_preset(DEFAULT_PRESET)
     if isinstance(criteria, Mapping):
-        return Calibration("criteria", check_numbers(criteria, "criteria", 0.0, above=False))
+        calibration = Calibration("criteria", check_numbers(criteria, "criteria", 0.0, above=False))
+        if not calibration.criteria:
+            raise CommandError("criteria: nothing counts in the choice; expected a weight above 0.")
+        return calibration
     if isinstance(criteria, str) and not set(criteria) & set("./\\~"):
         return load_preset(criteria)
     return load_calibration(Path(criteria))
@@ -110,7 +113,7 @@ def load_calibration(path: Path, name: str | None = None) -> Calibration:
         path: the file. name: what to call it; its path by default.
 
     Raises:
-        FileError: missing, not TOML, or with other keys.
+        FileError: missing, not TOML, with other keys, or with neither a weight above 0 nor a limit.
     """
     try:
         presets = ", ".join(preset_names())
@@ -123,7 +126,7 @@ def load_calibration(path: Path, name: str | None = None) -> Calibration:
         raise FileError(path, f"unknown key '{unknown[0]}'; expected tables {listed}.")
     tables = {table: _numbers(path, table, data.get(table, {})) for table in _TABLES}
     try:
-        return Calibration(
+        calibration = Calibration(
             name or str(path),
             check_numbers(tables["weights"], "weights", 0.0, above=False),
             check_numbers(tables["scales"], "scales", 0.0, above=True),
@@ -132,6 +135,9 @@ def load_calibration(path: Path, name: str | None = None) -> Calibration:
         )
     except ClenchError as error:
         raise FileError(path, str(error)) from None
+    if not calibration.criteria:
+        raise FileError(path, "nothing counts in the choice; expected a weight above 0 in [weights], or [limits].")
+    return calibration
 
 
 def calibration_to_toml(calibration: Calibration, comments: Mapping[str, str] | None = None) -> str:

@@ -59,6 +59,7 @@ def batch(
     import clench
     from clench.kernels.warming import announce, warm_up
 
+    from .command_files import read_command
     from .printing import print_batch, print_files
     from .results import print_json
 
@@ -68,7 +69,7 @@ def batch(
     the_object = clench.GraspObject.load(object, scale=scale)
     asked = clench.GraspCommand(hand_pose=clench.Pose.identity())
     if command is not None:
-        asked = clench.load_command(command)
+        asked = read_command(command, the_hand)
     if planes_only:
         asked = replace(asked, full_width=False)
     if planes is not None:

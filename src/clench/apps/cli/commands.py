@@ -107,6 +107,7 @@ def solve(
     from clench.solve.pareto import hand_front
     from clench.solve.quality import DEFAULT_MASS
 
+    from .command_files import read_command
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
@@ -117,7 +118,7 @@ def solve(
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     if command is not None:
-        the_command = clench.load_command(command)
+        the_command = read_command(command, the_hand)
     else:
         the_command = clench.GraspCommand(hand_pose=first_approach(the_hand, the_object, seed), seed=seed)
     if planes is not None:

@@ -1,0 +1,32 @@
+"""Command files of the command line: what does not fit the hand or the criteria is said with the file's name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clench.base.errors import ClenchError, CommandError, FileError
+
+if TYPE_CHECKING:
+    from clench.models.command import GraspCommand
+    from clench.models.hand.hand import Hand
+
+
+def read_command(path: Path, hand: Hand) -> GraspCommand:
+    """Read a command file and check it against a hand and the criteria that exist.
+
+    Raises:
+        FileError: the command file, or the calibration file that it names. CommandError: what is wrong in it.
+    """
+    from clench.grasp.calibration import calibration_of
+    from clench.models.command_file import check_command, load_command
+
+    command = load_command(path)
+    try:
+        check_command(hand, command)
+        calibration_of(command.criteria)
+    except FileError:
+        raise  # names the calibration file
+    except ClenchError as error:
+        raise CommandError(f"{path}: {error}") from None
+    return command
