@@ -102,3 +102,26 @@ def test_bad_weights_are_refused_with_their_place(weight):
 def test_unknown_criteria_are_refused_with_those_that_exist():
     with pytest.raises(UnknownNameError, match=r"Did you mean 'touching_links'\? Criteria: range_of_motion"):
         check_numbers({"touching_link": 1.0}, "criteria", 0.0, above=False)
+
+
+def test_a_class_is_not_a_criterion():
+    with pytest.raises(CommandError, match="criterion Gentle: expected an object, got its class"):
+        register_criterion(Gentle)
+    assert "gentle" not in criterion_names()
+
+
+@pytest.mark.parametrize(
+    ("member", "value", "expected"),
+    [
+        ("name", 3, "name: expected text, got 3"),
+        ("unit", None, "unit: expected text, got None"),
+        ("scale", "2", "scale: expected a number above 0, got '2'"),
+        ("scale", True, "scale: expected a number above 0, got True"),
+        ("larger_is_better", "less", "larger_is_better: expected True or False, got 'less'"),
+    ],
+)
+def test_members_of_another_kind_are_refused(member, value, expected):
+    criterion = Gentle()
+    setattr(criterion, member, value)
+    with pytest.raises(CommandError, match=f"criterion Gentle: {expected}"):
+        register_criterion(criterion)

@@ -9,6 +9,8 @@ from clench.base.pose import Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import JointRole
 from clench.solve.controller import finger_sets, make_problem
+from clench.solve.orders import best_order
+from handmade import make_solution
 
 RADIUS = 0.007
 
@@ -372,3 +374,17 @@ def test_what_is_wrong_with_the_command_is_said_once():
         solve(three_links(), bar(0.03, 0.02), orders=("proximal-first", "together"), preshape={"index_0": 9.0})
     with pytest.raises(clench.ClenchError, match="steadines"):
         solve(three_links(), bar(0.03, 0.02), orders=("proximal-first",), criteria={"steadines": 1.0})
+
+
+def test_an_order_without_a_value_is_not_inside_its_limit():
+    """One needs more force than allowed, the other cannot hold at all: the first is the lesser evil."""
+    force = {"weight": 0.0, "scale": 0.02, "limit": 0.05, "unit": "Nm/N", "better": "less", "source": "x"}
+    strained = make_solution(
+        choice={"criteria": {"actuation_force": force}, "final_hand_scores": {"actuation_force": 1}}
+    )
+    loose = make_solution(choice={"criteria": {}, "final_hand_scores": {}})
+    found = {"proximal-first": loose, "together": strained}
+    command = clench.GraspCommand(hand_pose=Pose.identity(), orders=tuple(found))
+    said = best_order(command, lambda single: found[single.order]).choice["orders"]
+    assert said["chosen"] == "together"
+    assert said["text"] == "together comes before proximal-first because it has a value for every criterion."

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from numbers import Real
 from typing import Final, TypeGuard
 
 import numpy as np
@@ -38,7 +39,8 @@ ENTRY_POINTS: Final = "clench.criteria"
 #: Scored for every set, whatever the weights: they cost next to nothing, and readers of a solution expect them.
 ALWAYS: Final = ("range_of_motion", "touching_links", "limit_distance")
 
-_MEMBERS: Final = ("name", "unit", "source", "scale", "larger_is_better")
+_KINDS: Final = {"name": str, "unit": str, "source": str, "scale": Real, "larger_is_better": bool}
+_SAID: Final = {str: "text", Real: "a number above 0", bool: "True or False"}
 _registry: dict[str, Criterion | HandCriterion] = {
     c.name: c
     for c in (
@@ -64,14 +66,23 @@ def register_criterion(criterion: Criterion | HandCriterion) -> None:
     """Add a criterion, or replace the one of the same name.
 
     Raises:
-        CommandError: it lacks a member of `Criterion` or `HandCriterion`, or its scale is not above 0.
+        CommandError: it is a class, lacks a member of `Criterion` or `HandCriterion`, or has one of another kind; its
+            scale is not above 0.
     """
+    if isinstance(criterion, type):
+        raise CommandError(
+            f"criterion {criterion.__name__}: expected an object, got its class; register what it makes."
+        )
     what = type(criterion).__name__
-    missing = [name for name in _MEMBERS if not hasattr(criterion, name)]
+    missing = [name for name in _KINDS if not hasattr(criterion, name)]
     if not isinstance(criterion, Criterion | HandCriterion):
         missing = missing or ["score (or score_hand)"]
     if missing:
         raise CommandError(f"criterion {what}: has no {', '.join(missing)}; see clench.Criterion.")
+    for name, kind in _KINDS.items():
+        value = getattr(criterion, name)
+        if not isinstance(value, kind) or (kind is Real and isinstance(value, bool)):
+            raise CommandError(f"criterion {what}: {name}: expected {_SAID[kind]}, got {value!r}.")
     if not (math.isfinite(criterion.scale) and criterion.scale > 0.0):
         raise CommandError(f"criterion {what}: scale: expected a number above 0, got {criterion.scale!r}.")
     _registry[criterion.name] = criterion

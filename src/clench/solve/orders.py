@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from clench.base.errors import ClenchError
+from clench.grasp.criterion_registry import find_criterion, is_of_hand
 from clench.grasp.explaining import say_what_decided
 from clench.models.command import ClosingOrder, GraspCommand
 
@@ -34,12 +35,18 @@ _BEST_FIRST: Final = (
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Hold the solution of one order, its scores by criterion, and what each adds to its weighted sum [-]."""
+    """Hold the solution of one order and how it is judged.
+
+    Args:
+        order, solution: what was solved. scores: by criterion. worth: what each adds to the weighted sum [-].
+        inside: its values are inside the limits.
+    """
 
     order: ClosingOrder
     solution: GraspSolution
     scores: Mapping[str, float]
     worth: Mapping[str, float]
+    inside: bool
 
     @property
     def total(self) -> float:
@@ -51,7 +58,7 @@ class _Solved:
         """What is larger for the better order."""
         solution = self.solution
         place = -_BEST_FIRST.index(solution.status)
-        return solution.is_valid(), place, _inside_limits(solution), len(self.worth), round(self.total, 9)
+        return solution.is_valid(), place, self.inside, len(self.worth), round(self.total, 9)
 
 
 def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolution]) -> GraspSolution:
@@ -65,15 +72,20 @@ def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolut
     Raises:
         ClenchError: no order can be solved; what the first says.
     """
-    solved: list[_Solved] = []
+    solutions: dict[ClosingOrder, GraspSolution] = {}
     refused: dict[ClosingOrder, ClenchError] = {}
     for order in command.orders:
         try:
-            solved.append(_judged(order, solve(replace(command, order=order, orders=()))))
+            solutions[order] = solve(replace(command, order=order, orders=()))
         except ClenchError as error:
             refused[order] = error
-    if not solved:
+    if not solutions:
         raise refused[command.orders[0]]
+    # What says something about one order counts for all: an order without a value is not inside its limit.
+    criteria: dict[str, Any] = {}
+    for solution in solutions.values():
+        criteria |= (solution.choice or {}).get("criteria", {})
+    solved = [_judged(order, solution, criteria) for order, solution in solutions.items()]
     ranked = sorted(solved, key=lambda s: s.rank, reverse=True)
     best = ranked[0]
     compared: dict[str, Any] = {str(s.order): _described(s) for s in solved}
@@ -93,24 +105,25 @@ def settled(command: GraspCommand, solution: GraspSolution) -> GraspCommand:
     return replace(command, order=ClosingOrder(orders["chosen"]), orders=())
 
 
-def _judged(order: ClosingOrder, solution: GraspSolution) -> _Solved:
+def _judged(order: ClosingOrder, solution: GraspSolution, criteria: Mapping[str, Any]) -> _Solved:
     scores, worth = solve_scores(solution), {}
-    for name, c in (solution.choice or {}).get("criteria", {}).items():
+    for name, c in criteria.items():
         if name in scores:
             sign = 1.0 if c["better"] == "more" else -1.0
             worth[name] = sign * c["weight"] * scores[name] / c["scale"]
-    return _Solved(order, solution, scores, worth)
+    inside = all(_inside_limit(name, c, solution) for name, c in criteria.items() if c["limit"] is not None)
+    return _Solved(order, solution, scores, worth, inside)
 
 
-def _inside_limits(solution: GraspSolution) -> bool:
-    choice = solution.choice or {}
-    chosen = [f.candidates[f.chosen].scores for f in solution.fingers.values() if f.candidates]
-    for name, c in choice.get("criteria", {}).items():
-        values = [scores[name] for scores in (*chosen, choice["final_hand_scores"]) if name in scores]
-        limit = c["limit"]
-        if limit is not None and not all(v >= limit if c["better"] == "more" else v <= limit for v in values):
-            return False
-    return True
+def _inside_limit(name: str, criterion: Mapping[str, Any], solution: GraspSolution) -> bool:
+    """Say whether all values of a criterion are inside its limit; one that is not known is not."""
+    if is_of_hand(find_criterion(name, "orders")):
+        values = [(solution.choice or {}).get("final_hand_scores", {}).get(name)]
+    else:  # a finger of whose sets it says nothing is left aside, as among sets
+        fingers = [f for f in solution.fingers.values() if any(name in c.scores for c in f.candidates)]
+        values = [f.candidates[f.chosen].scores.get(name) for f in fingers]
+    limit, more = criterion["limit"], criterion["better"] == "more"
+    return all(v is not None and (v >= limit if more else v <= limit) for v in values)
 
 
 def _described(solved: _Solved) -> dict[str, Any]:
