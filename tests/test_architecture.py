@@ -231,6 +231,33 @@ def test_python_never_imports_a_kernel_without_an_entry() -> None:
                 assert not inner & {alias.name for alias in node.names}, path
 
 
+PLAIN_KERNELS = {"kernel", "inner_kernel"}
+#: What makes an array; a kernel without counts of references cannot, and says so only when its cache is empty.
+MAKERS = {"zeros", "empty", "ones", "full", "eye", "arange", "array", "zeros_like", "empty_like", "copy", "astype"}
+
+
+def makers_of_arrays(source: str) -> list[str]:
+    """Return the kernels that may not allocate, and do."""
+    found = []
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef) and {ast.unparse(d) for d in node.decorator_list} & PLAIN_KERNELS:
+            calls = [
+                c.func.attr for c in ast.walk(node) if isinstance(c, ast.Call) and isinstance(c.func, ast.Attribute)
+            ]
+            found += [node.name] if MAKERS & set(calls) else []
+    return found
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "kernels").glob("*.py")), ids=lambda p: p.stem)
+def test_kernels_that_allocate_are_marked(path: Path) -> None:
+    assert not makers_of_arrays(path.read_text(encoding="utf-8"))
+
+
+def test_a_kernel_that_allocates_unmarked_is_found() -> None:
+    assert makers_of_arrays("@kernel\ndef f(a):\n    return np.zeros(3)\n") == ["f"]
+    assert not makers_of_arrays("@allocating_kernel\ndef f(a):\n    return np.zeros(3)\n")
+
+
 def test_import_is_light_and_quick() -> None:
     program = (
         "import sys, time; t = time.perf_counter(); import clench; t = time.perf_counter() - t; "
