@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from clench.base.errors import CommandError, FileError
 
+from .command_files import read_command
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -59,7 +61,6 @@ def batch(
     import clench
     from clench.kernels.warming import announce, warm_up
 
-    from .command_files import read_command
     from .printing import print_batch, print_files
     from .results import print_json
 

@@ -11,6 +11,7 @@ from clench.base.errors import CommandError, FileError
 
 from .batch import batch
 from .calibrating import calibrate
+from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
 
@@ -107,7 +108,6 @@ def solve(
     from clench.solve.pareto import hand_front
     from clench.solve.quality import DEFAULT_MASS
 
-    from .command_files import read_command
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
