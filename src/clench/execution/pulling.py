@@ -15,6 +15,7 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 from clench.solve.squeezing import DOWN, SqueezePlan, plan_squeeze
 
+from .drives import Drive
 from .filming import Film
 from .hold import FingerForce, Hold, HoldReport, HoldTest, ObjectMotion, Pulled
 from .scene import TABLE, TIMESTEP, Scene, build_scene
@@ -60,6 +61,7 @@ def hold_and_pull(
     hold: Hold,
     trajectory: Trajectory,
     *,
+    drive: Drive = Drive.SERVO,
     film: Film | None = None,
     show_progress: bool = False,
 ) -> HoldReport:
@@ -71,6 +73,7 @@ def hold_and_pull(
     Args:
         solution: the solution. hand: the hand. obj: the object, at its pose. hold: the test.
         trajectory: the way to the touch, from its pregrasp on; all of it where it has none.
+        drive: what moves the joints.
         film: takes pictures of closing, squeeze, and the last pull or the lift.
         show_progress: show a bar while convex pieces are computed.
 
@@ -81,19 +84,18 @@ def hold_and_pull(
 
     alone = replace(obj, bodies=tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE))
     plan = _plan(solution, hand, alone, hold)
-    scene = build_scene(
-        hand, alone, solution.hand_pose, trajectory.positions[0], free=hold, show_progress=show_progress
-    )
+    start = trajectory.positions[0]
+    scene = build_scene(hand, alone, solution.hand_pose, start, free=hold, drive=drive, show_progress=show_progress)
     computed = posture(solution.joint_angles, hand, "joint_angles")
     torques = hold.squeeze * joint_torques(plan, hand, computed)
-    count = len(hand.joints)
-    command = computed + torques / scene.model.actuator_gainprm[:count, 0]
+    told = scene.drives.command(computed)
+    ends = told, told + scene.drives.pressing(hand, computed, torques)
     data = mujoco.MjData(scene.model)
     sunk = _in_table(scene, (trajectory.positions[trajectory.pregrasp or 0], computed))
     watch = TouchWatch(scene, hand, film)
     before = _close(scene, data, trajectory, watch)
     touch = _place_of(scene, data)
-    _squeeze(scene, data, (computed, command), watch)
+    _squeeze(scene, data, ends, watch)
     squeezed, stable = _place_of(scene, data), _stable(data)
     pulls = _tested(scene, data, hold, before, film) if stable and sunk <= TABLE_OVERLAP else {}
     return HoldReport(
@@ -154,15 +156,15 @@ def _close(scene: Scene, data: Any, trajectory: Trajectory, watch: TouchWatch) -
 
     begin = trajectory.pregrasp or 0
     at = float(trajectory.times[begin])
-    count = len(trajectory.joints)
+    drives = scene.drives
     data.qpos[scene.qpos] = trajectory.positions[begin]
-    data.ctrl[:count] = trajectory.positions[begin]
+    data.ctrl[drives.numbers] = drives.command(trajectory.positions[begin])
     mujoco.mj_forward(scene.model, data)
     before = _place_of(scene, data)
     if watch.film is not None:
         watch.film.begin(scene, data)
     for _ in range(round((trajectory.duration - at + SETTLING) / TIMESTEP)):
-        data.ctrl[:count] = trajectory.at(at + data.time)
+        data.ctrl[drives.numbers] = drives.command(trajectory.at(at + data.time))
         mujoco.mj_step(scene.model, data)
         watch.look(data)
     mujoco.mj_forward(scene.model, data)
@@ -176,7 +178,7 @@ def _squeeze(scene: Scene, data: Any, ends: tuple[FloatArray, FloatArray], watch
     touch, command = ends
     for step in range(round((SQUEEZING + STANDING) / TIMESTEP)):
         done = min(1.0, (step + 1) * TIMESTEP / SQUEEZING)
-        data.ctrl[: len(touch)] = touch + done * (command - touch)
+        data.ctrl[scene.drives.numbers] = touch + done * (command - touch)
         mujoco.mj_step(scene.model, data)
         watch.look(data)
     mujoco.mj_forward(scene.model, data)

@@ -66,6 +66,7 @@ class ExecutionReport:
         notes: sentences about what the comparison does not show.
         history: what was told and measured on the way, None when it was not kept.
         hold: what came of a hold test, None without one.
+        driven_by: what moved every joint of a simulated hand: an actuator of the model, "servo" or "coupled".
     """
 
     actuator: str
@@ -82,6 +83,7 @@ class ExecutionReport:
     notes: tuple[str, ...] = ()
     history: ExecutionHistory | None = None
     hold: HoldReport | None = None
+    driven_by: Mapping[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, schema `clench.execution/1`."""
@@ -115,6 +117,7 @@ class ExecutionReport:
             "notes": list(self.notes),
             "history": None if self.history is None else self.history.to_dict(),
             "hold": None if self.hold is None else self.hold.to_dict(),
+            "driven_by": dict(self.driven_by),
         }
 
     def save(self, path: str | Path) -> None:

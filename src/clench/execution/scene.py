@@ -1,8 +1,7 @@
-"""A MuJoCo scene: the hand fixed in space at its palm, every joint on a servo, and the object, fixed or free."""
+"""A MuJoCo scene: the hand fixed in space at its palm, what moves its joints, and the object, fixed or free."""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,7 @@ from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 from .convex_pieces import convex_pieces, hull_of
+from .drives import SERVO, Drive, Driven, Drives, driving_spec, find_drives
 from .hold import Hold, HoldTest
 
 PREFIX = "hand/"
@@ -31,8 +31,6 @@ ARMATURE = 1e-3
 HEAVY = 100.0
 #: Nearer than that is touching [m]: the engine lists such pairs as contacts, forces begin at 0.
 TOUCHING = 1e-5
-#: Elements of a hand's model that would compete with the servos, and settings that the scene makes.
-_REPLACED = ("actuator", "sensor", "tendon", "equality", "keyframe", "option", "size", "statistic", "visual")
 #: Of the object in pictures: red, green, blue, and how solid.
 COLOR = (0.93, 0.55, 0.2, 1.0)
 _ALL_BITS = 0x7FFFFFFF
@@ -49,6 +47,7 @@ class Scene:
         link_geoms: colliding geoms of every link.
         object_body: body of the object and its obstacles. object_geoms: its geoms.
         approximated: names of the bodies whose simulated shape is only near the object's.
+        drives: what the hand's actuators are told.
         lift: address of the palm's way up, -1 without one.
     """
 
@@ -59,6 +58,7 @@ class Scene:
     object_body: int
     object_geoms: tuple[int, ...]
     approximated: tuple[str, ...]
+    drives: Drives
     lift: int = -1
 
 
@@ -69,13 +69,15 @@ def build_scene(
     q: FloatArray,
     *,
     free: Hold | None = None,
+    drive: Drive = Drive.SERVO,
     show_progress: bool = False,
 ) -> Scene:
     """Place a hand and an object in a scene without gravity, or for a lift on a table, with gravity on the object.
 
-    The model's own actuators, tendons, equalities and sensors are left out: every joint has a position servo of
-    `SERVO_BANDWIDTH`, within its effort limit, and coupling holds because trajectories obey it. Joint friction, springs
-    and damping are left out too: the servos are ideal, so differences come from contact alone.
+    Unless the model's own actuators shall move the hand, they, tendons and equalities are left out: every joint has a
+    position servo of `SERVO_BANDWIDTH`, within its effort limit, and coupling holds because trajectories obey it. Joint
+    friction, springs and damping are left out too: the servos are ideal, so differences come from contact alone.
+    Joints before the palm have such a servo in any case: the palm stays where it is.
 
     Args:
         hand: the hand.
@@ -83,6 +85,7 @@ def build_scene(
         hand_pose: `T_world_palm`.
         q: posture [rad], shape (J,), at which the palm is placed (matters when a wrist is upstream of it).
         free: mass and friction of an object that can move; None fixes it in place.
+        drive: what moves the joints.
         show_progress: show a bar while convex pieces are computed.
 
     Raises:
@@ -97,7 +100,7 @@ def build_scene(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     _light(spec)
-    _add_hand(spec, hand, lifted)
+    driven = _add_hand(spec, hand, lifted, drive)
     if free is not None:
         # Without these, friction of the engine creeps: a held object slides out slowly.
         spec.option.impratio = 10.0
@@ -107,12 +110,13 @@ def build_scene(
         model = spec.compile()
     except ValueError as error:
         raise HandError(f"Hand '{hand.name}' and object '{obj.name}' cannot be simulated: {error}.") from None
-    scene = _located(model, hand, approximated)
     if free is not None:
-        share = free.mass / model.body_mass[scene.object_body]
-        model.body_mass[scene.object_body] *= share
-        model.body_inertia[scene.object_body] *= share
-    _tune(scene, hand)
+        body = model.body("object").id
+        share = free.mass / model.body_mass[body]
+        model.body_mass[body] *= share
+        model.body_inertia[body] *= share
+    _tune(model, hand, driven)  # after the mass: it computes what follows from masses
+    scene = _located(model, hand, approximated, driven)
     _place(scene, hand, hand_pose, q)
     return scene
 
@@ -126,12 +130,10 @@ def _light(spec: Any) -> None:
     spec.add_texture(name="sky", width=16, height=96, rgb1=[1.0] * 3, rgb2=[1.0] * 3, **sky)
 
 
-def _add_hand(spec: Any, hand: Hand, lifted: bool) -> None:
+def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive) -> Driven:
     import mujoco
 
-    if not hand.spec_xml:
-        raise HandError(f"Hand '{hand.name}' has no model that can be simulated.")
-    child = mujoco.MjSpec.from_string(_without_replaced(hand.spec_xml), assets=dict(hand.assets))
+    child, driven = driving_spec(hand, drive, _joints_before_palm(hand))
     for joint in list(child.joints):
         if joint.type == mujoco.mjtJoint.mjJNT_FREE:
             child.delete(joint)
@@ -151,8 +153,10 @@ def _add_hand(spec: Any, hand: Hand, lifted: bool) -> None:
     for joint in hand.joints:
         if PREFIX + joint.name not in joints:
             raise HandError(f"Joint '{joint.name}' of hand '{hand.name}' is missing in the model that is simulated.")
+        if driven.by[joint.name] != Drive.SERVO:
+            continue
         actuator = spec.add_actuator(
-            name=f"servo {joint.name}", target=PREFIX + joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+            name=SERVO + joint.name, target=PREFIX + joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
         )
         actuator.set_to_position(kp=1.0, kv=0.0)
         if joint.effort:
@@ -163,14 +167,7 @@ def _add_hand(spec: Any, hand: Hand, lifted: bool) -> None:
             body.gravcomp = 1.0
         lift = spec.add_actuator(name=LIFT, target=LIFT, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         lift.set_to_position(kp=1.0, kv=0.0)
-
-
-def _without_replaced(xml: str) -> str:
-    root = ET.fromstring(xml)
-    for tag in _REPLACED:
-        for element in root.findall(tag):
-            root.remove(element)
-    return ET.tostring(root, encoding="unicode")
+    return driven
 
 
 def _add_object(spec: Any, obj: GraspObject, free: Hold | None, show_progress: bool) -> tuple[str, ...]:
@@ -260,7 +257,7 @@ def _surface(free: Hold | None) -> dict[str, Any]:
     return found
 
 
-def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
+def _located(model: Any, hand: Hand, approximated: tuple[str, ...], driven: Driven) -> Scene:
     import mujoco
 
     def index(kind: Any, name: str) -> int:
@@ -272,6 +269,7 @@ def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
     owner = model.geom_bodyid
     object_body = index(mujoco.mjtObj.mjOBJ_BODY, "object")
     lift = index(mujoco.mjtObj.mjOBJ_JOINT, LIFT)
+    of_hand = np.array([a for a in range(model.nu) if model.actuator(a).name != LIFT], dtype=np.int64)
     return Scene(
         model=model,
         qpos=model.jnt_qposadr[joints],
@@ -280,28 +278,34 @@ def _located(model: Any, hand: Hand, approximated: tuple[str, ...]) -> Scene:
         object_body=object_body,
         object_geoms=tuple(np.flatnonzero(owner == object_body).tolist()),
         approximated=approximated,
+        drives=find_drives(model, np.array(joints), of_hand, driven),
         lift=int(model.jnt_qposadr[lift]) if lift >= 0 else -1,
     )
 
 
-def _tune(scene: Scene, hand: Hand) -> None:
-    """Give every servo the same bandwidth, critically damped; take passive forces away; hold the palm still."""
+def _tune(model: Any, hand: Hand, driven: Driven) -> None:
+    """Give every servo the same bandwidth, critically damped; take passive forces away there; hold the palm still."""
     import mujoco
 
-    model = scene.model
-    of_hand = model.dof_bodyid != scene.object_body
-    model.dof_armature[of_hand] = np.maximum(model.dof_armature[of_hand], ARMATURE)
+    joints = [model.joint(PREFIX + name).id for name in driven.servos]
+    if not driven.by_model:
+        joints = np.flatnonzero(model.jnt_bodyid != model.body("object").id).tolist()
+    dofs = model.jnt_dofadr[joints]
+    model.dof_armature[dofs] = np.maximum(model.dof_armature[dofs], ARMATURE)
     for i in _joints_before_palm(hand):
-        model.dof_armature[model.jnt_dofadr[model.actuator_trnid[i, 0]]] = HEAVY
-        model.actuator_forcelimited[i] = 0
-    if scene.lift >= 0:
-        model.dof_armature[model.body_dofadr[model.body(LIFT).id]] = HEAVY
-    model.dof_damping[:] = 0.0
-    model.dof_frictionloss[:] = 0.0
-    model.jnt_stiffness[:] = 0.0
+        name = hand.joint_names[i]
+        model.dof_armature[model.joint(PREFIX + name).dofadr] = HEAVY
+        model.actuator(SERVO + name).forcelimited = 0
+    servos = [model.actuator(SERVO + name).id for name in driven.servos]
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, LIFT) >= 0:
+        model.dof_armature[model.joint(LIFT).dofadr] = HEAVY
+        servos.append(model.actuator(LIFT).id)
+    model.dof_damping[dofs] = 0.0
+    model.dof_frictionloss[dofs] = 0.0
+    model.jnt_stiffness[joints] = 0.0
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
-    for i in range(model.nu):
+    for i in servos:
         inertia = float(model.dof_M0[model.jnt_dofadr[model.actuator_trnid[i, 0]]])
         stiffness = SERVO_BANDWIDTH**2 * inertia
         model.actuator_gainprm[i, 0] = stiffness

@@ -13,6 +13,7 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import Contact, FingerStatus, GraspSolution
 
+from .drives import Drive, check_drive, sentences
 from .filming import Film
 from .history import ExecutionHistory
 from .hold import Hold, HoldReport
@@ -42,6 +43,7 @@ class SimulatedHand:
         show_progress: show a bar while convex pieces are computed.
         hold: once the touch is reached, do it again with a free object, squeeze it as planned, and pull or lift it;
             without it the object stays where it is.
+        drive: what moves its joints, in the hold test, too: "servo" or "model", see `Drive`.
         film: takes pictures: of the hold test where there is one, else of closing.
         on_step: called with time [s], joint angles [rad] in model order, shape (J,), every 20 ms and at the end.
     """
@@ -57,6 +59,7 @@ class SimulatedHand:
         contact_tolerance: float = 0.001,
         show_progress: bool = False,
         hold: Hold | None = None,
+        drive: Drive | str = Drive.SERVO,
         film: Film | None = None,
         on_step: Callable[[float, FloatArray], None] | None = None,
     ) -> None:
@@ -66,6 +69,7 @@ class SimulatedHand:
         self.contact_tolerance = contact_tolerance
         self.show_progress = show_progress
         self.hold = hold
+        self.drive = check_drive(drive)
         self.film = film
         self.on_step = on_step
 
@@ -84,7 +88,9 @@ class SimulatedHand:
         computed = posture(solution.joint_angles, self.hand, "joint_angles")
         obj = self.obj.posed(solution.object_pose)
         start = trajectory.positions[0]
-        scene = build_scene(self.hand, obj, solution.hand_pose, start, show_progress=self.show_progress)
+        scene = build_scene(
+            self.hand, obj, solution.hand_pose, start, drive=self.drive, show_progress=self.show_progress
+        )
         watch = TouchWatch(scene, self.hand, self.film if self.hold is None else None)
         data, history = self._run(scene, trajectory, watch)
         reached = np.array(data.qpos[scene.qpos])
@@ -118,7 +124,8 @@ class SimulatedHand:
             largest_angle_error=error,
             angle_tolerance=self.angle_tolerance,
             contact_tolerance=self.contact_tolerance,
-            notes=(*_notes(scene, solution), *self._notes_on_hold(held)),
+            notes=(*_notes(scene, solution), *sentences(scene.drives.driven, self.drive), *self._notes_on_hold(held)),
+            driven_by=scene.drives.driven.by,
             history=history,
             hold=held,
         )
@@ -127,7 +134,14 @@ class SimulatedHand:
         if self.hold is None:
             return None
         return hold_and_pull(
-            solution, self.hand, obj, self.hold, trajectory, film=self.film, show_progress=self.show_progress
+            solution,
+            self.hand,
+            obj,
+            self.hold,
+            trajectory,
+            drive=self.drive,
+            film=self.film,
+            show_progress=self.show_progress,
         )
 
     def _notes_on_hold(self, held: HoldReport | None) -> tuple[str, ...]:
@@ -146,7 +160,7 @@ class SimulatedHand:
 
         data = mujoco.MjData(scene.model)
         data.qpos[scene.qpos] = trajectory.positions[0]
-        data.ctrl[:] = trajectory.positions[0]
+        data.ctrl[:] = scene.drives.command(trajectory.positions[0])
         mujoco.mj_forward(scene.model, data)
         if watch.film is not None:
             watch.film.begin(scene, data)
@@ -159,7 +173,7 @@ class SimulatedHand:
                     self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
                 times.append(float(data.time))
                 measured.append(np.array(data.qpos[scene.qpos]))
-            data.ctrl[:] = trajectory.at(data.time)
+            data.ctrl[:] = scene.drives.command(trajectory.at(data.time))
             mujoco.mj_step(scene.model, data)
             watch.look(data)
         mujoco.mj_forward(scene.model, data)

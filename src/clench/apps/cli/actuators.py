@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from clench.models.objects.grasp_object import GraspObject
 
 ActuatorName = Literal["simulated", "ros2", "orca", "orca-mock", "signal"]
+DriveName = Literal["servo", "model"]
 Interface = Literal["auto", "rclpy", "cyclonedds", "action"]
 
 
@@ -37,11 +38,12 @@ class ActuatorOptions:
     hold: Hold | None = None
     squeeze: float | None = None
     film: Film | None = None
+    drive: DriveName | None = None
 
 
 #: Which options mean something to which actuator; any other that is given is refused.
 _TAKEN: dict[str, tuple[str, ...]] = {
-    "simulated": ("hold", "film"),
+    "simulated": ("hold", "film", "drive"),
     "ros2": ("controller", "joint_states", "interface", "joint_map", "squeeze"),
     "orca": ("joint_map", "config", "squeeze"),
     "orca-mock": ("joint_map", "config", "squeeze"),
@@ -65,7 +67,10 @@ def make_actuator(
     if not options.timeout > 0.0:
         raise CommandError(f"--timeout: expected seconds above 0, got {options.timeout:g}.")
     if name == "simulated":
-        return clench.SimulatedHand(hand, obj, show_progress=show_progress, hold=options.hold, film=options.film)
+        drive = options.drive or "servo"
+        return clench.SimulatedHand(
+            hand, obj, show_progress=show_progress, hold=options.hold, drive=drive, film=options.film
+        )
     if name == "signal":
         if options.to is None or options.record is None:
             raise CommandError("--actuator signal needs --to (file:PATH, tcp:HOST:PORT, …) and --record DB.")

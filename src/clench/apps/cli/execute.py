@@ -6,7 +6,7 @@ from pathlib import Path
 
 from clench.base.errors import FileError
 
-from .actuators import ActuatorName, ActuatorOptions, Interface, make_actuator, make_film, make_hold
+from .actuators import ActuatorName, ActuatorOptions, DriveName, Interface, make_actuator, make_film, make_hold
 from .interrupts import stopped_by_signals
 
 
@@ -26,6 +26,7 @@ def execute(
     lift: bool = False,
     mass: float | None = None,
     friction: float | None = None,
+    drive: DriveName | None = None,
     controller: str | None = None,
     joint_states: str | None = None,
     interface: Interface | None = None,
@@ -58,6 +59,7 @@ def execute(
         lift: simulated: close on the object where it stands on a table, squeeze it as planned, lift it.
         mass: hold, lift: of the object, kg (0.1).
         friction: hold, lift: of its contacts (0.6).
+        drive: simulated: what moves the joints: stiff servos, or the model's own actuators (servo).
         controller: ros2: name of the joint_trajectory_controller (hand_controller).
         joint_states: ros2: topic of the joint states (/joint_states).
         interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
@@ -94,7 +96,7 @@ def execute(
         collision_source=the_solution.object_collision_source,
     )
     options = ActuatorOptions(
-        controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze, film
+        controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze, film, drive
     )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
