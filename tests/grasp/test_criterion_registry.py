@@ -125,3 +125,11 @@ def test_members_of_another_kind_are_refused(member, value, expected):
     setattr(criterion, member, value)
     with pytest.raises(CommandError, match=f"criterion Gentle: {expected}"):
         register_criterion(criterion)
+
+
+@pytest.mark.parametrize("value", ["abc", [1, 2], np.array([3.0, 4.0]), np.inf, 1e300])
+def test_values_that_are_no_numbers_to_sum_are_refused(value, monkeypatch):
+    monkeypatch.setattr(Gentle, "score", lambda *_: value)
+    register_criterion(Gentle())
+    with pytest.raises(CommandError, match=r"criterion 'gentle': gave .*; expected "):
+        score_sets([candidate((0.3, 0.4))], ["gentle"], SETTING)

@@ -193,16 +193,23 @@ def checked_value(criterion: Criterion | HandCriterion, value: float) -> float:
     """Return what a criterion gave as a plain number.
 
     Raises:
-        CommandError: it is not a finite number.
+        CommandError: it is not a finite number, or too large to be summed.
     """
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
     if not math.isfinite(number):
         raise CommandError(f"criterion '{criterion.name}': gave {value!r}; expected a finite number or None.")
+    if abs(number) > LARGEST_VALUE:
+        raise CommandError(f"criterion '{criterion.name}': gave {value!r}; expected {LARGEST_VALUE:g} at most in size.")
     return number
 
 
 #: Weights, scales and limits are at most this, and scales at least its inverse, so that no sum of them overflows [-].
 LARGEST = 1e12
+#: Values that a criterion gives are at most this in size, for the same reason [the criterion's unit].
+LARGEST_VALUE: Final = 1e100
 
 
 def check_numbers(values: Mapping[str, float], source: str, least: float, above: bool) -> dict[str, float]:
