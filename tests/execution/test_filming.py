@@ -53,8 +53,33 @@ def test_a_film_is_as_long_as_what_it_shows(
 _ALL = ("1_start.png", "2_touch.png", "3_squeeze.png", "4_end.png")
 
 
-def test_what_cannot_be_written_is_said_before_anything_moves(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"a\.mp4: cannot be written: expected a file name that ends with \.gif"):
+def test_pictures_come_back_from_an_mp4_in_order(tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    from PIL import Image
+
+    shades = [(250, 10, 10), (10, 250, 10), (10, 10, 250)]
+    frames = [Image.new("RGB", (640, 480), shade) for shade in shades for _ in range(5)]
+    files = []
+    for name in ("a.mp4", "b.MP4"):
+        film = Film(tmp_path / name)
+        film._frames = frames
+        files += film.finish()
+    assert files[0].read_bytes() == files[1].read_bytes()
+    reader = ffmpeg.read_frames(str(files[0]))
+    about = next(reader)
+    assert about["source_size"] == (640, 480)
+    assert about["fps"] == pytest.approx(1.0 / FRAME)
+    shown = [np.frombuffer(frame, np.uint8).reshape(480, 640, 3)[240, 320] for frame in reader]
+    assert len(shown) == len(frames)
+    for k, shade in enumerate(shades):
+        np.testing.assert_allclose(shown[5 * k + 2].astype(int), shade, atol=12)
+
+
+def test_what_cannot_be_written_is_said_before_anything_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(FileError, match=r"a\.avi: cannot be written: expected .* ends with \.gif or \.mp4"):
+        Film(tmp_path / "a.avi")
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(ClenchError, match=r"MP4 needs imageio-ffmpeg: pip install 'clench\[video\]'"):
         Film(tmp_path / "a.mp4")
     with pytest.raises(FileError, match="no folder"):
         Film(tmp_path / "nowhere" / "a.gif")

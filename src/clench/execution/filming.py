@@ -1,10 +1,12 @@
-"""Film a simulation: a moving picture (GIF) and stills (PNG), on request."""
+"""Film a simulation: a moving picture (GIF or MP4) and stills (PNG), on request."""
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import os
 import sys
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -35,8 +37,8 @@ class Film:
     Drawing needs OpenGL: without a screen set MUJOCO_GL=egl before anything of MuJoCo is imported.
 
     Args:
-        video: a GIF file, at the speed of the simulation. stills: a folder for pictures of the start, the touch, the
-            squeeze and the end.
+        video: a GIF or MP4 file, at the speed of the simulation; MP4 needs `clench[video]`.
+        stills: a folder for pictures of the start, the touch, the squeeze and the end.
     """
 
     video: Path | None = None
@@ -51,10 +53,13 @@ class Film:
         """Refuse what cannot be written.
 
         Raises:
-            FileError: another kind of file than GIF, or a folder that does not exist.
+            FileError: another kind of file than GIF or MP4, or a folder that does not exist.
+            ClenchError: MP4 without the library that writes it.
         """
-        if self.video is not None and self.video.suffix.lower() != ".gif":
-            raise FileError(self.video, "cannot be written: expected a file name that ends with .gif.")
+        if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
+            raise FileError(self.video, "cannot be written: expected a file name that ends with .gif or .mp4.")
+        if self._is_mp4() and importlib.util.find_spec("imageio_ffmpeg") is None:
+            raise ClenchError("MP4 needs imageio-ffmpeg: pip install 'clench[video]', or choose a .gif file.")
         if self.video is not None and not self.video.parent.is_dir():
             raise FileError(self.video, f"cannot be written (no folder '{self.video.parent}').")
         if self.stills is not None and self.stills.exists() and not self.stills.is_dir():
@@ -110,18 +115,17 @@ class Film:
             self._renderer = None
         written = []
         if self.video is not None and self._frames:
-            first, *others = self._frames
-            content = io.BytesIO()
-            first.save(
-                content, "GIF", save_all=True, append_images=others, duration=round(FRAME * 1000), loop=0, optimize=True
-            )
-            written.append(_written(self.video, content))
+            film = (_mp4 if self._is_mp4() else _gif)(self._frames)
+            written.append(_written(self.video, film))
         for number, (name, picture) in enumerate(self._kept.items(), start=1):
             assert self.stills is not None
             content = io.BytesIO()
             picture.save(content, "PNG")
-            written.append(_written(self.stills / f"{number}_{name}.png", content))
+            written.append(_written(self.stills / f"{number}_{name}.png", content.getvalue()))
         return tuple(written)
+
+    def _is_mp4(self) -> bool:
+        return self.video is not None and self.video.suffix.lower() == ".mp4"
 
     def _drawn(self, data: Any) -> Any:
         from PIL import Image
@@ -130,10 +134,40 @@ class Film:
         return Image.fromarray(self._renderer.render())
 
 
-def _written(path: Path, content: io.BytesIO) -> Path:
+def _gif(frames: list[Any]) -> bytes:
+    first, *others = frames
+    content = io.BytesIO()
+    first.save(content, "GIF", save_all=True, append_images=others, duration=round(FRAME * 1000), loop=0, optimize=True)
+    return content.getvalue()
+
+
+def _mp4(frames: list[Any]) -> bytes:
+    """Return H.264 that browsers play, the same bytes for the same pictures.
+
+    Raises:
+        ClenchError: ffmpeg cannot be run.
+    """
+    import imageio_ffmpeg
+
+    same = ["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart"]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        try:
+            writer = imageio_ffmpeg.write_frames(str(path), frames[0].size, fps=1.0 / FRAME, output_params=same)
+            writer.send(None)
+            for frame in frames:
+                writer.send(frame.tobytes())
+            writer.close()
+            return path.read_bytes()
+        except (OSError, RuntimeError) as error:
+            why = (str(error).strip() or type(error).__name__).splitlines()[-1]
+            raise ClenchError(f"No video: ffmpeg could not write it ({why.rstrip('.')}).") from None
+
+
+def _written(path: Path, content: bytes) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(path.parent, f"cannot be made a folder ({error.strerror or error}).") from None
-    write_atomically(path, content.getvalue())
+    write_atomically(path, content)
     return path

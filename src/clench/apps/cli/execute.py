@@ -65,7 +65,7 @@ def execute(
         interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
         joint_map: ros2, orca: TOML file with the controller's joint names, units, offsets and limits.
         config: orca: the hand's config.yaml.
-        video: simulated: file for a moving picture (GIF).
+        video: simulated: file for a moving picture (.gif, or .mp4 with clench[video]).
         stills: simulated: folder for pictures of the start, the touch, the squeeze and the end (PNG).
         squeeze: ros2, orca: share of the squeeze plan's angle offsets that is told beyond the touch (1).
         timeout: seconds to look for the controller.
