@@ -18,4 +18,5 @@ def test_a_sample(order):
     assert counted["contact"] > len(found) / 3, counted
     stages = sum(judged.stages for judged in found)
     assert sum(judged.grazing for judged in found) < 0.02 * stages
-    assert sum(judged.unresolved for judged in found) < 0.01 * stages
+    # With speeds of their own, more stages end at joints that still move, of which the oracle says nothing.
+    assert sum(judged.unresolved for judged in found) < (0.06 if order == "speeds" else 0.01) * stages

@@ -17,12 +17,10 @@ from .plan import FingerPlan, closing_joints, last_closing_joint
 from .scene import ROUND_POLYHEDRA, SWEEP_DEVIATION, PackedObject, shape_elements
 
 if TYPE_CHECKING:
-    from clench.kernels.bodies import BodyArrays, Elements
+    from clench.kernels.bodies import BodyArrays
     from clench.kernels.exact import ExactArrays
 
 _KEPT_HANDS: Final = 16
-#: By how much boxes are grown, more than rounding [m].
-_ROUNDING: Final = 1e-9
 _kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, HandBodies]] = OrderedDict()
 
 
@@ -33,13 +31,11 @@ class HandBodies(NamedTuple):
         links: every link that can touch as a body, in its own frame.
         within: whether a moving link (row) may not overlap a resting one, of the same finger or fixed, (L, L).
         across: the same, with links of different fingers, (L, L).
-        boxes: middle and half size of the box around each link, in its frame [m], (L, 6).
     """
 
     links: BodyArrays
     within: np.ndarray
     across: np.ndarray
-    boxes: FloatArray
 
 
 def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
@@ -55,21 +51,11 @@ def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
         for i, link in enumerate(hand.links)
     ]
     across = _across(hand)
-    bodies = HandBodies(pack_bodies(parts), _within(hand, across), across, np.array([_box(part) for part in parts]))
+    bodies = HandBodies(pack_bodies(parts), _within(hand, across), across)
     _kept[id(hand), source] = (hand, bodies)
     while len(_kept) > _KEPT_HANDS:
         _kept.popitem(last=False)
     return bodies
-
-
-def _box(part: Elements) -> FloatArray:
-    """Return middle and half size of the box around elements, shape (6,); nothing has a size below zero."""
-    if not len(part.elements):
-        return np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
-    corners = part.vertices[part.elements]
-    low = (corners - part.radius[:, None, None]).min(axis=(0, 1))
-    high = (corners + part.radius[:, None, None]).max(axis=(0, 1))
-    return np.concatenate([0.5 * (low + high), 0.5 * (high - low) + _ROUNDING])
 
 
 def boxes_meet(bodies: HandBodies, poses: FloatArray) -> np.ndarray:
@@ -78,8 +64,8 @@ def boxes_meet(bodies: HandBodies, poses: FloatArray) -> np.ndarray:
     Args:
         poses: `T_palm_link` of every link, shape (L, 3, 4).
     """
-    R, size = poses[:, :, :3], bodies.boxes[:, 3:]
-    middle = np.einsum("lij,lj->li", R, bodies.boxes[:, :3]) + poses[:, :, 3]
+    R, size = poses[:, :, :3], bodies.links.box[:, 3:]
+    middle = np.einsum("lij,lj->li", R, bodies.links.box[:, :3]) + poses[:, :, 3]
     # Of link m (row) and r, along the axes k of m's frame: how far apart they are, and the half size of r.
     away = np.abs(np.einsum("mik,mri->mrk", R, middle - middle[:, None]))
     with np.errstate(invalid="ignore"):

@@ -36,8 +36,8 @@ def links_that_may_meet(
         low, high = {}, {}
         for own, pose, sine in zip(paths, poses, sines, strict=True):
             for link, path in own.items():
-                middle = n @ (pose[link, :, :3] @ bodies.boxes[link, :3] + pose[link, :, 3])
-                reach = np.abs(n @ pose[link, :, :3]) @ bodies.boxes[link, 3:] + float(path @ sine)
+                middle = n @ (pose[link, :, :3] @ bodies.links.box[link, :3] + pose[link, :, 3])
+                reach = np.abs(n @ pose[link, :, :3]) @ bodies.links.box[link, 3:] + float(path @ sine)
                 low[link], high[link] = middle - reach, middle + reach
         apart |= {(m, r) for m in paths[0] for r in paths[1] if low[m] > high[r] or low[r] > high[m]}
     return {(m, r) for m in paths[0] for r in paths[1]} - apart

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,10 @@ from .tree import build_tree
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+
+
+#: By how much boxes are grown, more than rounding [m].
+ROUNDING: Final = 1e-9
 
 
 class BodyArrays(NamedTuple):
@@ -28,6 +32,7 @@ class BodyArrays(NamedTuple):
         node: centre and radius of the ball around each node [m], (N, 4).
         first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
         right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
+        box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
     """
 
     vertices: Floats
@@ -41,6 +46,7 @@ class BodyArrays(NamedTuple):
     count: Ints  # type: ignore[assignment]
     right: Ints
     root: Ints
+    box: Floats
 
 
 class Elements(NamedTuple):
@@ -99,7 +105,18 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         for k, (shape, kind) in enumerate(zip(shapes, kinds, strict=True))
     ]
     columns: dict[str, NDArray[Any]] = dict(zip(BodyArrays._fields, joined, strict=False))
-    return BodyArrays(**columns, root=np.array(root, dtype=np.int32))
+    box = np.array([_box(body) for body in bodies]).reshape(-1, 6)
+    return BodyArrays(**columns, root=np.array(root, dtype=np.int32), box=box)
+
+
+def _box(body: Elements) -> Floats:
+    """Return middle and half size of the box around elements, a little too large, shape (6,)."""
+    if not len(body.elements):
+        return np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
+    corners = body.vertices[body.elements]
+    low = (corners - body.radius[:, None, None]).min(axis=(0, 1))
+    high = (corners + body.radius[:, None, None]).max(axis=(0, 1))
+    return np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])
 
 
 def no_body() -> BodyArrays:

@@ -148,6 +148,16 @@ def place_resting(T_palm_family: Floats, T_palm_body: Floats, x: float, z: float
 
 
 @inner_kernel
+def lanes_apart(box: Floats, T: Floats, other: Floats, T_other: Floats) -> bool:
+    """Say whether two boxes lie apart along the axis that the joints of a family turn about: then nothing meets."""
+    away, reach = T[1, 3] - T_other[1, 3], 0.0
+    for k in range(3):
+        away += T[1, k] * box[k] - T_other[1, k] * other[k]
+        reach += abs(T[1, k]) * box[3 + k] + abs(T_other[1, k]) * other[3 + k]
+    return bool(abs(away) > reach)
+
+
+@inner_kernel
 def sweep_links(
     exact: ExactArrays,
     entry: int,
@@ -177,6 +187,8 @@ def sweep_links(
             continue
         x, z = work.place[after, 0], work.place[after, 1]
         place_resting(T_palm_family, sweep.poses[r], x, z, sweep.resting)
+        if lanes_apart(exact.links.box[m], sweep.start, exact.links.box[r], sweep.resting):
+            continue
         found = sweep_link(exact.links, m, exact.links, r, after, joint, rates, touch, best, work, sweep)
         if found < 0.0:
             sweep.skipped[0] += 1
