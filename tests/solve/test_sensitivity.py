@@ -70,7 +70,7 @@ def test_random_chains():
     seen = Counter()
     for seed in range(40):
         case = make_case(seed)
-        command = clench.GraspCommand(hand_pose=Pose.identity(), planes=1)
+        command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, planes=1)
         seen += judge(case.hand, case.obj, command)
     assert seen["compared"] > 200, seen
     assert seen["unknown"] + seen["rough"] < 0.1 * seen["compared"], seen
@@ -231,7 +231,7 @@ def test_another_hand_or_object_is_refused():
 
 def test_a_set_of_one_plane_says_so():
     case = make_case(3)
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=2, full_width=False)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, planes=2, full_width=False)
     solution = clench.solve(case.hand, case.obj, command)
     found = clench.sensitivity(solution, case.hand, case.obj)
     unknown = [name for name, row in zip(found.joints, found.matrix, strict=True) if not np.isfinite(row).all()]
@@ -240,7 +240,8 @@ def test_a_set_of_one_plane_says_so():
 
 def test_a_small_error_does_what_was_predicted():
     case = make_case(12)
-    error = clench.pose_error(case.hand, case.obj, clench.GraspCommand(hand_pose=Pose.identity()), 1e-5, 1e-5)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place)
+    error = clench.pose_error(case.hand, case.obj, command, 1e-5, 1e-5)
     assert len(error.corners) == 64
     assert error.predicted.max() > 1e-5
     np.testing.assert_allclose(error.measured, error.predicted, rtol=0.01, atol=1e-8)
