@@ -56,5 +56,5 @@ def test_links_without_shapes_meet_nothing():
     found = boxes_meet(bodies, placed(Pose.identity(), Pose.identity()))
     assert not found[0].any()
     assert not found[:, 0].any()
-    empty = HandBodies(pack_bodies([]), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 6)))
+    empty = HandBodies(pack_bodies([]), np.zeros((0, 0)), np.zeros((0, 0)))
     assert boxes_meet(empty, np.zeros((0, 3, 4))).shape == (0, 0)

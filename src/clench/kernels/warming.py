@@ -152,7 +152,7 @@ def announce(batch: bool = False) -> None:
         batch: the kernels of a batch are asked for, too.
     """
     if _is_cold():
-        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes about a minute.\n")
+        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
     if batch:
         from .batch_closing import close_poses
 

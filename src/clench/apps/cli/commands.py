@@ -101,20 +101,15 @@ def solve(
     from math import radians
 
     import clench
-    from clench.grasp.mechanics.contacts import check_friction
-    from clench.grasp.mechanics.loads import check_mass
     from clench.kernels.warming import announce, warm_up
     from clench.solve.orders import settled
     from clench.solve.pareto import hand_front
-    from clench.solve.quality import DEFAULT_MASS
 
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
     forces = forces or mass is not None or friction is not None
-    mass = DEFAULT_MASS if mass is None else check_mass(mass, "--mass")
-    if friction is not None:
-        check_friction(friction, "--friction")
+    mass = _checked_mass(mass, friction, criteria)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     if command is not None:
@@ -157,6 +152,19 @@ def solve(
         if forces:
             print_forces(solution)
     return exit_code(solution, strict)
+
+
+def _checked_mass(mass: float | None, friction: float | None, criteria: str | None) -> float:
+    """Check options that need neither hand nor object, before anything is loaded or compiled; return the mass [kg]."""
+    from clench.grasp.calibration import calibration_of
+    from clench.grasp.mechanics.contacts import check_friction
+    from clench.grasp.mechanics.loads import check_mass
+    from clench.solve.quality import DEFAULT_MASS
+
+    if friction is not None:
+        check_friction(friction, "--friction")
+    calibration_of(criteria)
+    return DEFAULT_MASS if mass is None else check_mass(mass, "--mass")
 
 
 def hand(
