@@ -175,44 +175,33 @@ def test_the_other_checks_see_what_they_look_for() -> None:
     assert long_bodies(long + "    x = 1\n", path)
 
 
-def inner_kernels() -> set[str]:
-    names = set()
-    for path in (PACKAGE / "kernels").glob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef) and any(
-                isinstance(d, ast.Name) and d.id in ("inner_kernel", "inner_allocating_kernel")
-                for d in node.decorator_list
-            ):
-                names.add(node.name)
-    return names
+#: Compiled without counts of references.
+PLAIN_KERNELS = {"kernel", "inner_kernel"}
 
 
-def kernels_that_do_not_allocate() -> dict[str, ast.FunctionDef]:
+def kernels(*decorators: str) -> dict[str, ast.FunctionDef]:
+    """Return the kernels with one of some decorators, by name."""
     return {
         node.name: node
         for path in (PACKAGE / "kernels").glob("*.py")
         for node in ast.parse(path.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.FunctionDef)
-        and any(isinstance(d, ast.Name) and d.id in ("kernel", "inner_kernel") for d in node.decorator_list)
+        if isinstance(node, ast.FunctionDef) and {ast.unparse(d) for d in node.decorator_list} & set(decorators)
     }
 
 
 def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
     # What they hand out would be freed once too often, and what they are handed would never be freed.
     numbers = {"None", "bool", "int", "float", "tuple", "Point", "Flat", "Triple", "Deepest", "Separation", "Outline"}
-    plain = kernels_that_do_not_allocate()
+    plain = kernels(*PLAIN_KERNELS)
     assert len(plain) > 100
     for name, node in plain.items():
         assert node.returns is not None
         words = set(re.findall(r"\w+", ast.unparse(node.returns)))
         assert words <= numbers, f"{name} returns {ast.unparse(node.returns)}"
     arrays = {
-        node.name
-        for path in (PACKAGE / "kernels").glob("*.py")
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.FunctionDef)
-        and any(isinstance(d, ast.Name) and d.id.endswith("allocating_kernel") for d in node.decorator_list)
-        and not set(re.findall(r"\w+", ast.unparse(node.returns or ast.Constant(None)))) <= numbers
+        name
+        for name, node in kernels("allocating_kernel", "inner_allocating_kernel").items()
+        if not set(re.findall(r"\w+", ast.unparse(node.returns or ast.Constant(None)))) <= numbers
     }
     assert "make_work" in arrays
     for name, node in plain.items():
@@ -220,9 +209,15 @@ def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
         assert not called & arrays, f"{name} calls {called & arrays}"
 
 
+def test_no_two_test_files_have_one_name() -> None:
+    # pytest collects only one of two modules of the same name, where their folders are no packages.
+    names = [path.name for path in Path(__file__).parent.rglob("test_*.py")]
+    assert sorted(set(names)) == sorted(names)
+
+
 def test_python_never_imports_a_kernel_without_an_entry() -> None:
     # Calling one from Python ends the process without a word.
-    inner = inner_kernels()
+    inner = set(kernels("inner_kernel", "inner_allocating_kernel"))
     assert "close_item" in inner
     callers = [p for p in PACKAGE.rglob("*.py") if p.parent.name != "kernels"]
     for path in [*callers, *Path(__file__).parent.rglob("*.py")]:
@@ -231,7 +226,6 @@ def test_python_never_imports_a_kernel_without_an_entry() -> None:
                 assert not inner & {alias.name for alias in node.names}, path
 
 
-PLAIN_KERNELS = {"kernel", "inner_kernel"}
 #: What makes an array; a kernel without counts of references cannot, and says so only when its cache is empty.
 MAKERS = {"zeros", "empty", "ones", "full", "eye", "arange", "array", "zeros_like", "empty_like", "copy", "astype"}
 

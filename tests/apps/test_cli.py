@@ -18,6 +18,7 @@ from clench.apps.cli.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.base.errors import CommandError
 from clench.execution.report import ExecutionReport, JointReached
+from clench.kernels import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource
 from clench.solve.record import Record
@@ -54,6 +55,9 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
     monkeypatch.setitem(vars(clench), "approach_poses", lambda *_: poses)
     monkeypatch.setitem(vars(clench), "complete", lambda solution, *_, **__: solution)
+    # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
+    monkeypatch.setattr(warming, "announce", lambda: None)
+    monkeypatch.setattr(warming, "warm_up", lambda: None)
     return fake
 
 

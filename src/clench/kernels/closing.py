@@ -8,7 +8,7 @@ from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import advance, make_work
 from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
-from .exact import ExactArrays, describe_pair, pose_movers, settle_pair, sweep_stage
+from .exact import ExactArrays, describe_pair, last_mover, pose_movers, settle_pair, sweep_stage
 from .family_pose import compose_inverse, copy_pose, pose_family
 from .family_section import cut_planes
 from .layout import (
@@ -131,11 +131,7 @@ def moving_joint(hand: HandArrays, exact: ExactArrays, entry: int, met: int, wor
     """Return the last joint that moves the link which touches: by the exact sweep where `met` says so, else a plane."""
     if met < 0:
         return int(hand.outlines.joint[work.best[1]])
-    last = exact.joint_first[entry]
-    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
-        if exact.mover_link[n] == sweep.winner[2]:
-            last = max(last, exact.mover_joint[n])
-    return int(last)
+    return last_mover(exact, entry, sweep.winner[2], exact.joint_first[entry])
 
 
 @inner_kernel

@@ -14,13 +14,11 @@ from .sweep_pairs import step_to_plane
 NEAR = 0.125
 #: Steps of a ball along its arc towards a core at most, and of a plane's check.
 STEPS = 8
-#: The measure of a whole turn, see `turn_measure`.
-WHOLE = 4.0
 
 
 @inner_kernel
 def turn_measure(c: float, s: float) -> float:
-    """Return a measure from 0 to `WHOLE` that grows with a turn, whose cosine and sine are given up to a factor."""
+    """Return a measure from 0 to 4 that grows with a turn, whose cosine and sine are given up to a factor."""
     if s >= 0.0:
         return s / (c + s) if c >= 0.0 else 1.0 - c / (s - c)
     return 2.0 + s / (c + s) if c < 0.0 else 3.0 + c / (c - s)

@@ -272,13 +272,18 @@ def keep_pair(sweep: SweepWork) -> None:
 
 
 @inner_kernel
-def first_after(exact: ExactArrays, entry: int, link: int, first: int, joint: int, rates: Floats) -> int:
-    """Return the first active joint, up to `joint`, that does not move a link, or one more than `joint`."""
-    last = first - 1
+def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
+    """Return the last joint of an entry that moves a link; `last` where that is later, or none does."""
     for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
         if exact.mover_link[n] == link:
             last = max(last, exact.mover_joint[n])
-    j = last + 1
+    return int(last)
+
+
+@inner_kernel
+def first_after(exact: ExactArrays, entry: int, link: int, first: int, joint: int, rates: Floats) -> int:
+    """Return the first active joint, up to `joint`, that does not move a link, or one more than `joint`."""
+    j = last_mover(exact, entry, link, first - 1) + 1
     while j <= joint and rates[j] == 0.0:
         j += 1
     return j

@@ -20,6 +20,17 @@ def copy_pose(T: Floats, out: Floats) -> None:
 
 
 @inner_kernel
+def back(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Map a point by the inverse of a pose, (3, 4)."""
+    x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]
+    return (
+        T[0, 0] * x + T[1, 0] * y + T[2, 0] * z,
+        T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
+        T[0, 2] * x + T[1, 2] * y + T[2, 2] * z,
+    )
+
+
+@inner_kernel
 def compose(a: Floats, b: Floats, out: Floats) -> None:
     """Write the product of two rigid poses, shape (3, 4) each."""
     for r in range(3):

@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiling import allocating_kernel, inner_allocating_kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .depth import CROSSINGS, penetration
 from .distance import is_inside
-from .family_pose import compose_inverse
+from .family_pose import back, compose_inverse
 from .layout import Floats
 from .layout import Ints as Numbers
+from .sweeping import put_point
 from .tree import STACK_SIZE, Ints, MeshTree
 
 
@@ -71,21 +72,7 @@ def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
     )
 
 
-@inner_allocating_kernel
-def put_at(T: Floats, p: Floats, out: Floats) -> None:
-    """Map a point by a pose, (3, 4)."""
-    for r in range(3):
-        out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
-
-
-@inner_allocating_kernel
-def put_back(T: Floats, p: Floats, out: Floats) -> None:
-    """Map a point by the inverse of a pose, (3, 4)."""
-    for c in range(3):
-        out[c] = T[0, c] * (p[0] - T[0, 3]) + T[1, c] * (p[1] - T[1, 3]) + T[2, c] * (p[2] - T[2, 3])
-
-
-@inner_allocating_kernel
+@inner_kernel
 def in_box(obj: MeshTree, p: Floats) -> bool:
     """Say whether a point lies in the box around a mesh."""
     inside = True
@@ -100,7 +87,7 @@ def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTr
     if obj.low.shape[0] == 0:
         return False
     center, outside = np.empty(3), 0.0
-    put_at(T_object_link, meshes.center[k], center)
+    put_point(T_object_link, meshes.center[k], center)
     for r in range(3):
         outside += max(max(obj.low[0, r] - center[r], center[r] - obj.high[0, r]), 0.0) ** 2
     return bool(outside <= meshes.radius[k] ** 2)
@@ -136,11 +123,11 @@ def depth_of(
     stack: Ints,
 ) -> tuple[float, float, float, float]:
     """Return depth and place of one link."""
-    T, back = np.empty((3, 4)), np.empty((3, 4))
+    T, T_link_object = np.empty((3, 4)), np.empty((3, 4))
     compose_inverse(T_palm_object, T_palm_link, T)
     if not may_touch(meshes, k, T, solid.tree):
         return 0.0, 0.0, 0.0, 0.0
-    compose_inverse(T_palm_link, T_palm_object, back)
+    compose_inverse(T_palm_link, T_palm_object, T_link_object)
     closed = meshes.closed[k] != 0
     found: tuple[float, float, float, float] = penetration(
         mesh_of(meshes, k),
@@ -150,7 +137,7 @@ def depth_of(
         solid.owners,
         solid.closed,
         T,
-        back,
+        T_link_object,
         crossings,
         stack,
     )
@@ -169,26 +156,26 @@ def find_contained(
         compose_inverse(T_palm_object, poses[meshes.link[k]], T)
         if solid.tree.low.shape[0] > 0 and may_fit(meshes, k, T, solid.tree, p):
             for i in range(meshes.point_first[k], meshes.point_first[k + 1]):
-                put_at(T, meshes.points[i], p)
+                put_point(T, meshes.points[i], p)
                 if is_inside(solid.tree, (p[0], p[1], p[2]), solid.closed):
                     return int(meshes.link[k])
         for i in range(solid.points.shape[0]):
-            put_back(T, solid.points[i], p)
-            if is_inside(mesh_of(meshes, k), (p[0], p[1], p[2]), meshes.closed[k] != 0):
+            part = back(T, solid.points[i, 0], solid.points[i, 1], solid.points[i, 2])
+            if is_inside(mesh_of(meshes, k), part, meshes.closed[k] != 0):
                 return int(meshes.link[k])
     return -1
 
 
-@inner_allocating_kernel
+@inner_kernel
 def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree, p: Floats) -> bool:
     """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
     if meshes.point_first[k + 1] - meshes.point_first[k] != 1:
         return True
-    put_at(T_object_link, meshes.points[meshes.point_first[k]], p)
+    put_point(T_object_link, meshes.points[meshes.point_first[k]], p)
     if not in_box(obj, p):
         return False
     for i in range(meshes.vertex_first[k], meshes.vertex_first[k + 1]):
-        put_at(T_object_link, meshes.tree.vertices[i], p)
+        put_point(T_object_link, meshes.tree.vertices[i], p)
         if not in_box(obj, p):
             return False
     return True
@@ -199,9 +186,9 @@ def may_hold_part(meshes: LinkMeshArrays, poses: Floats, solid: ObjectMesh, T_pa
     """Say whether a part of the object may lie inside a link, as the links' balls tell."""
     p, c = np.empty(3), np.empty(3)
     for i in range(solid.points.shape[0]):
-        put_at(T_palm_object, solid.points[i], p)
+        put_point(T_palm_object, solid.points[i], p)
         for k in range(meshes.link.shape[0]):
-            put_at(poses[meshes.link[k]], meshes.center[k], c)
+            put_point(poses[meshes.link[k]], meshes.center[k], c)
             if (c[0] - p[0]) ** 2 + (c[1] - p[1]) ** 2 + (c[2] - p[2]) ** 2 <= meshes.radius[k] ** 2:
                 return True
     return False

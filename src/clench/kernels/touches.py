@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiling import inner_allocating_kernel, inner_kernel, kernel
+from .family_pose import back
 from .frames import FrameArrays, place_links, put_angles
 from .layout import (
     HIT_CURVE_X,
@@ -87,17 +88,6 @@ def put_round_normal(rounds: RoundArrays, i: int, T_palm_object: Floats, positio
     length = math.sqrt(x * x + y * y + z * z)
     x, y, z = turned(pose, x / length, y / length, z / length)
     out[0], out[1], out[2] = turned(T_palm_object, x, y, z)
-
-
-@inner_kernel
-def back(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Map a point by the inverse of a pose, (3, 4)."""
-    x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]
-    return (
-        T[0, 0] * x + T[1, 0] * y + T[2, 0] * z,
-        T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
-        T[0, 2] * x + T[1, 2] * y + T[2, 2] * z,
-    )
 
 
 @inner_kernel

@@ -8,9 +8,6 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 
-#: Standard deviations of a 95 % interval [-].
-_DEVIATIONS = 1.959963984540054
-
 
 def wilson(yes: int, count: int) -> tuple[float, float]:
     """Return the 95 % interval of a proportion (E. B. Wilson, 1927); 0 to 1 when nothing was counted.
@@ -18,12 +15,12 @@ def wilson(yes: int, count: int) -> tuple[float, float]:
     Args:
         yes: how many were. count: of how many.
     """
+    from scipy.stats import binomtest
+
     if count == 0:
         return 0.0, 1.0
-    share, z2 = yes / count, _DEVIATIONS**2
-    middle = (share + z2 / (2 * count)) / (1 + z2 / count)
-    half = _DEVIATIONS * np.sqrt(share * (1 - share) / count + z2 / (4 * count**2)) / (1 + z2 / count)
-    return max(0.0, float(middle - half)), min(1.0, float(middle + half))
+    interval = binomtest(yes, count).proportion_ci(confidence_level=0.95, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def roc_auc(scores: Sequence[float] | FloatArray, yes: Sequence[bool]) -> float | None:

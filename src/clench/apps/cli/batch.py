@@ -13,8 +13,6 @@ from .command_files import read_command
 if TYPE_CHECKING:
     import numpy as np
 
-    from clench.models.hand.hand import Hand
-    from clench.models.objects.grasp_object import GraspObject
 
 SCHEMA = "clench.batch/1"
 
@@ -75,9 +73,13 @@ def batch(
         asked = replace(asked, full_width=False)
     if planes is not None:
         asked = replace(asked, planes=planes)
+    if poses is None and count < 1:
+        raise CommandError(f"--count: expected at least 1, got {count}.")
+    # A file that cannot be read is told before anything is compiled.
+    read = None if poses is None else _read(poses)
     announce(batch=True)
     warm_up()
-    rows = _approaches(the_hand, the_object, count, seed) if poses is None else _read(poses)
+    rows = clench.approach_poses(the_hand, the_object, count, seed) if read is None else read
     began = time.perf_counter()
     answers = clench.solve_batch(the_hand, the_object, rows, asked, threads=threads)
     seconds = time.perf_counter() - began
@@ -101,14 +103,6 @@ def batch(
         print_files([] if out is None else [out])
     counts = answers.counts()
     return 0 if counts["grasp"] or (counts["partial"] and not strict) else 1
-
-
-def _approaches(hand: Hand, obj: GraspObject, count: int, seed: int) -> Any:
-    import clench
-
-    if count < 1:
-        raise CommandError(f"--count: expected at least 1, got {count}.")
-    return clench.approach_poses(hand, obj, count, seed)
 
 
 def _read(path: Path) -> np.ndarray:
