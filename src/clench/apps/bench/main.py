@@ -98,6 +98,43 @@ def batch(
     return _print(bench_batch(hand, object, scale, planes, poses, passes, stream, seed), json)
 
 
+def peers(
+    *,
+    hand: str = "robonaut2",
+    object: tuple[str, ...] = ("sphere:r=0.035", "cylinder:r=0.03,h=0.12", "box:x=0.05,y=0.06,z=0.1", "mug"),
+    scale: float = 1.0,
+    planes: int = 5,
+    poses: int = 30,
+    passes: int = 5,
+    seed: int = 0,
+    simulate: bool = True,
+    plot: Path | None = None,
+    table: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Close by stepping as GraspIt!, Simox and OpenRAVE do, in MuJoCo, and by our solve: time, queries, gaps left.
+
+    Args:
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
+        scale: multiplies the objects' lengths, e.g. 0.001 for meshes in millimetres.
+        planes: curl planes per finger.
+        poses: how many approach poses per object.
+        passes: how often each is timed, all kinds in turn.
+        seed: of the approach poses.
+        simulate: also close in MuJoCo.
+        plot: file (PNG) for a picture of cost against accuracy, with steps of several sizes.
+        table: file for a table (Markdown).
+        json: print one JSON document on standard output.
+    """
+    from .peers import PeerBench, bench_peers
+
+    _at_least(1, planes=planes, poses=poses, passes=passes)
+    _writable(plot, table)
+    asked = PeerBench(planes, poses, passes, seed, simulate, show_progress=not json)
+    return _print(bench_peers(hand, object, scale, asked, plot, table), json)
+
+
 def choose(
     *,
     hand: str = "patent15",
@@ -191,9 +228,7 @@ def hold(
     for key, count, least in (("poses", poses, 1), ("best", best, 1), ("others", others, 0), ("seed", seed, 0)):
         if count < least:
             raise CommandError(f"--{key}: expected at least {least}, got {count}.")
-    for file in (table, trials):
-        if file is not None and not file.parent.is_dir():
-            raise FileError(file, f"cannot be written (no folder '{file.parent}').")
+    _writable(table, trials)
     asked = HoldBench(poses, best, others, seed, Hold(mass=mass, friction=friction, test=test))
     return _print(bench_hold(hand, object, scale, asked, HoldFiles(table, trials), show_progress=not json), json)
 
@@ -204,6 +239,7 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "choose": choose,
     "steadiness": steadiness,
     "hold": hold,
+    "peers": peers,
 }
 
 
@@ -211,6 +247,12 @@ def _at_least(least: int, **counts: int) -> None:
     for key, count in counts.items():
         if count < least:
             raise CommandError(f"--{key}: expected at least {least}, got {count}.")
+
+
+def _writable(*files: Path | None) -> None:
+    for file in files:
+        if file is not None and not file.parent.is_dir():
+            raise FileError(file, f"cannot be written (no folder '{file.parent}').")
 
 
 def _print(report: BenchReport, json: bool) -> int:
