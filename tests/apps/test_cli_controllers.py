@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -134,6 +135,63 @@ def test_what_no_finger_touches_is_dropped(
     assert held["held"] is False
     assert held["settings"]["mass"] == 0.3
     assert any(not pulled["held"] for pulled in held["pulls"].values())
+
+
+def test_a_hand_in_the_table_is_not_lifted_and_no_motion_is_made_up(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    replace(solution, hand_pose=clench.Pose([0.5, 0.0, -0.2])).save(tmp_path / "s.json")
+    assert main(["execute", str(tmp_path / "s.json"), "--lift", "--out", str(tmp_path / "r.json")]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert printed.startswith("not tested: Every joint is within")
+    assert "Not tested: the hand would be" in printed
+    assert "mm deep in the table." in printed
+    assert "squeeze alone" not in printed
+    held = json.loads((tmp_path / "r.json").read_text())["hold"]
+    assert (held["held"], held["closed"], held["squeezed"], held["pulls"]) == (False, None, None, {})
+
+
+def test_next_steps_are_carried_out_unless_told_otherwise(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = str(tmp_path / "s.json")
+    replace(solution, next_steps=({"index_proximal": 0.5}, {"thumb_roll": -0.2})).save(file)
+    assert main(["execute", file]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "Next step 1 was reached" in printed
+    assert "next steps" in printed
+    assert main(["execute", file, "--json"]) == 0
+    steps = json.loads(capsys.readouterr().out)["next_steps"]
+    assert [list(step["joints"]) for step in steps] == [["index_proximal"], ["thumb_roll"]]
+    assert steps[0]["joints"]["index_proximal"]["reached"] == pytest.approx(0.5, abs=1e-3)
+    assert main(["execute", file, "--no-next-steps", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["next_steps"] == []
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        ({"indx_proximal": 0.5}, "Joint 'indx_proximal' is not in hand 'robonaut2'. Did you mean 'index_proximal'?"),
+        (
+            {"index_proximal": 5.0},
+            "next_steps[1].index_proximal: 5 rad is outside the joint's limits [0, 1.65806] rad.",
+        ),
+    ],
+)
+def test_a_next_step_that_cannot_be_taken_moves_nothing(
+    solution: GraspSolution,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    step: dict[str, float],
+    message: str,
+) -> None:
+    replace(solution, next_steps=({}, step)).save(tmp_path / "s.json")
+    monkeypatch.setattr(clench.SimulatedHand, "carry_out", lambda *_: pytest.fail("moved"))
+    assert main(["execute", str(tmp_path / "s.json")]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"clench: error: {message}")
+    assert err.count("\n") == 1
 
 
 def test_the_simulated_hand_is_logged(solution: GraspSolution, tmp_path: Path) -> None:

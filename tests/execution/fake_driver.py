@@ -45,15 +45,16 @@ class FakeDriver:
         self.connected = False
 
     def where(self) -> dict[str, float]:
-        if self.path is None:
+        path = self.path  # a stop from another thread takes it away
+        if path is None:
             return dict(self.start)
         since = time.monotonic() - self.sent_at
-        times = np.concatenate([[0.0], self.path.times])
+        times = np.concatenate([[0.0], path.times])
         return {
             **self.start,
             **{
-                name: float(np.interp(since, times, [self.start[name], *self.path.positions[:, j]]))
-                for j, name in enumerate(self.path.joints)
+                name: float(np.interp(since, times, [self.start[name], *path.positions[:, j]]))
+                for j, name in enumerate(path.joints)
             },
         }
 

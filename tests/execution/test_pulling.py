@@ -157,7 +157,8 @@ def test_a_hand_that_would_be_in_the_table_is_not_tested(pincer: Hand, pinch: Gr
     way = plan_trajectory(solution, pincer, obj=placed)
     held = hold_and_pull(solution, pincer, placed, replace(FIRM, test="lift"), way)
     assert not held.held
-    assert held.pulls == {}
+    assert held.pulls == held.forces == held.angles == {}
+    assert held.closed is held.squeezed is None
     found = re.fullmatch(r"Not tested: the hand would be (.*) mm deep in the table\.", held.reason)
     assert found is not None, held.reason
     q = posture(pinch.joint_angles, pincer, "joint_angles")

@@ -79,7 +79,7 @@ def test_opposition_varies_the_first_posture_joint_of_a_thumb_alone():
 
 def test_next_steps_leave_joints_alone_that_they_do_not_name_and_carry_followers():
     hand = chain([POSTURE, CLOSING, CLOSING, CLOSING], couplings=[(1, 2, 0.5)])
-    steps = next_postures(hand, command(next_steps=({"j1": 0.4, "j2": 0.9}, {"j3": 0.1}, {})))
+    steps = next_postures(hand, ({"j1": 0.4, "j2": 0.9}, {"j3": 0.1}, {}))
     np.testing.assert_array_equal(steps[0], [np.nan, 0.4, 0.2, np.nan])
     np.testing.assert_array_equal(steps[1], [np.nan, np.nan, np.nan, 0.1])
     assert np.isnan(steps[2]).all()

@@ -40,6 +40,12 @@ def test_one_set_per_plane_and_the_full_width():
     assert all(solution.joint_angles[name] == angle for name, angle in chosen.joint_angles.items())
 
 
+def test_next_steps_are_in_the_solution_as_commanded():
+    steps = ({"index_0": 0, "index_2": 0.1}, {})
+    assert clench.solve(three_links(), BALL, command(next_steps=steps)).next_steps == steps
+    assert clench.solve(three_links(), BALL, command()).next_steps == ()
+
+
 def test_the_full_width_gets_no_farther_than_any_plane_in_its_first_joint():
     finger = clench.solve(three_links(), BALL, command(planes=7)).fingers["index"]
     first = [c.joint_angles["index_0"] for c in finger.candidates]

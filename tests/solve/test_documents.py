@@ -66,6 +66,15 @@ def test_round_trip_keeps_every_bit(number: float, vector: list[float], text: st
     assert again == solution
 
 
+def test_next_steps_come_back_and_older_documents_have_none(tmp_path: Path) -> None:
+    steps = ({"index_curl": 0.1, "index_yaw": -0.2}, {})
+    make_solution(next_steps=steps).save(tmp_path / "s.json")
+    assert GraspSolution.load(tmp_path / "s.json").next_steps == steps
+    document = make_solution().to_dict()
+    assert document.pop("next_steps") == []
+    assert GraspSolution.from_dict(document) == make_solution()
+
+
 def test_the_choice_comes_back(tmp_path: Path) -> None:
     choice = {"text": "x", "fingers": {"index": {"totals": [0.5, -1.0], "pareto": [1], "runner_up": None}}}
     make_solution(choice=choice).save(tmp_path / "s.json")
@@ -145,6 +154,9 @@ def edited(path: str, value: Any) -> dict[str, Any]:
         ("decomposition/closing", [1], r"decomposition\.closing: expected 'object', got 'array'"),
         ("joint_limits/index_tip", [0.0], r"joint_limits\.index_tip: expected 'array' of length 2"),
         ("certified", 1, r"certified: expected 'bool', got 'int'"),
+        ("next_steps", {"index_tip": 0.1}, r"next_steps: expected 'array', got 'object'"),
+        ("next_steps", [{}, 0.1], r"next_steps\[1\]: expected 'object', got 'float'"),
+        ("next_steps", [{"index_tip": "far"}], r"next_steps\[0\]\.index_tip: expected 'float', got 'str'"),
     ],
 )
 def test_malformed_documents_name_file_and_key(path: str, value: Any, message: str, tmp_path: Path) -> None:

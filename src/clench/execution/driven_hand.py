@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,16 +17,32 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, check_tensions, command_limits, slowed_down
-from .driven_squeeze import DrivenSqueeze, squeeze_by_driver
+from .driven_squeeze import DrivenSqueeze, plan_driven_squeeze, squeeze_by_driver
+from .driven_steps import DrivenStep, go_to_steps, plan_driven_steps
 from .driver import DriverError, HandDriver, HandState, TendonDriver
-from .following import CLOSEST, HORIZON, Followed, Follower, TimedPlan
+from .following import CLOSEST, Followed, Follower, TimedPlan
 from .history import ExecutionHistory
 from .joint_map import JointMap, MappedJoint
-from .report import ExecutionReport, JointReached
+from .report import ExecutionReport, JointReached, NextStepReached, judge_steps, notes_on_steps
 from .trajectory import Trajectory
 
 #: Points of the way from where the hand is found to the trajectory's start.
 WAY_POINTS = 9
+
+
+@dataclass
+class _Done:
+    """Collect what a hand has done: the way to the start [rad], the path, the squeeze, the tendons, the next steps."""
+
+    way: float
+    squeeze: DrivenSqueeze
+    followed: Followed = field(default_factory=Followed)
+    squeezed: Followed = field(default_factory=Followed)
+    pulled: str = ""
+    stepped: list[tuple[NextStepReached, Followed]] = field(default_factory=list)
+
+    def untroubled(self) -> bool:
+        return self.followed.trouble is None and self.squeezed.trouble is None
 
 
 class DrivenHand:
@@ -114,14 +131,18 @@ class DrivenHand:
             check.state(state)
             plan, way = self._plan(trajectory, mapped, check, state)
             check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
+            squeeze = plan_driven_squeeze(solution, self.hand, mapped, check, self.squeeze)
+            steps = self._steps(solution, trajectory, squeeze, mapped, check)
+            done = _Done(way, squeeze)
             arrived = {joint.name: 0.2 * self.angle_tolerance * abs(joint.scale) for joint in mapped.values()}
-            followed = Follower(self.driver, check, self._stopping, self.settling, arrived).follow(plan)
-            squeezed = DrivenSqueeze()
-            if followed.trouble is None:
-                squeezed = squeeze_by_driver(
-                    solution, self.hand, self.driver, mapped, check, self._stopping, self.squeeze
+            done.followed = Follower(self.driver, check, self._stopping, self.settling, arrived).follow(plan)
+            if done.followed.trouble is None:
+                done.squeezed = squeeze_by_driver(squeeze, self.driver, mapped, check, self._stopping)
+            if done.untroubled():
+                done.pulled = self._pull(solution)
+                done.stepped = go_to_steps(
+                    steps, self.driver, mapped, check, self._stopping, self.settling, self.angle_tolerance
                 )
-            pulled = self._pull(solution) if _untroubled(followed, squeezed) else ""
         except DriverError as error:
             return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}")
         except ClenchError:
@@ -133,7 +154,20 @@ class DrivenHand:
             if not self.stay_connected:
                 with suppress(Exception):  # what the hand did is known, however the line closes
                     self.driver.disconnect()
-        return self._report(followed, squeezed, mapped, computed, (_way(way), squeezed.text, pulled))
+        return self._report(solution, done, mapped, computed)
+
+    def _steps(
+        self,
+        solution: GraspSolution,
+        trajectory: Trajectory,
+        squeeze: DrivenSqueeze,
+        mapped: Mapping[str, MappedJoint],
+        check: CommandCheck,
+    ) -> tuple[DrivenStep, ...]:
+        told = posture(solution.joint_angles, self.hand, "joint_angles")
+        for name, offset in squeeze.offsets.items():
+            told[self.hand.joint_index(name)] += offset
+        return plan_driven_steps(solution, self.hand, told, trajectory.pace, mapped, check)
 
     def _check_joints(self, mapped: Mapping[str, MappedJoint]) -> None:
         for name, joint in mapped.items():
@@ -182,37 +216,43 @@ class DrivenHand:
         return f"The tendons were told the tensions of the squeeze plan, up to {tensions.max():.3g} N."
 
     def _report(
-        self,
-        followed: Followed,
-        squeezed: DrivenSqueeze,
-        mapped: Mapping[str, MappedJoint],
-        computed: FloatArray,
-        notes: tuple[str, ...],
+        self, solution: GraspSolution, done: _Done, mapped: Mapping[str, MappedJoint], computed: FloatArray
     ) -> ExecutionReport:
-        history = _history(followed, mapped)
+        followed = done.followed
+        at_touch = followed.measured[-1] if followed.measured else {}
         joints = {
-            name: JointReached(float(computed[self.hand.joint_index(name)]), float(angle))
-            for name, angle in zip(history.joints, history.measured[-1] if len(history.measured) else (), strict=False)
+            name: JointReached(float(computed[self.hand.joint_index(name)]), joint.to_angle(at_touch[joint.name]))
+            for name, joint in mapped.items()
+            if joint.name in at_touch
         }
         error = max((abs(joint.error) for joint in joints.values()), default=None)
         success, reason = self._judge(followed, joints, error)
-        if success and squeezed.followed is not None and squeezed.followed.trouble is not None:
-            success, reason = False, f"While squeezing: {_stopped(squeezed.followed)}"
+        if success and done.squeezed.trouble is not None:
+            success, reason = False, f"While squeezing: {done.squeezed.ending()}"
+        steps = tuple(step for step, _ in done.stepped)
+        if success:
+            success, reason = judge_steps(success, reason, steps)
+        history = _history([followed, done.squeezed, *(way for _, way in done.stepped)], mapped)
         return ExecutionReport(
             actuator=self.name,
             success=success,
             reason=reason,
             joints=joints,
-            duration=followed.times[-1] if followed.times else 0.0,
+            duration=float(history.times[-1]) if len(history.times) else 0.0,
             largest_angle_error=error,
             angle_tolerance=self.angle_tolerance,
-            notes=(*filter(None, notes), "Angles were compared; whether links touch was not measured."),
+            notes=(
+                *filter(None, (_way(done.way), done.squeeze.text, done.pulled)),
+                "Angles were compared; whether links touch was not measured.",
+                *notes_on_steps(solution, steps),
+            ),
             history=history,
+            next_steps=steps,
         )
 
     def _judge(self, followed: Followed, joints: Mapping[str, JointReached], error: float | None) -> tuple[bool, str]:
         if followed.trouble is not None:
-            return False, _stopped(followed)
+            return False, followed.ending()
         if error is None or error > self.angle_tolerance:
             worst = max(joints, key=lambda name: abs(joints[name].error))
             far = f"joint '{worst}' is {abs(joints[worst].error):.3g} rad from its computed angle"
@@ -220,31 +260,25 @@ class DrivenHand:
         return True, f"Every joint is within {error:.2g} rad of its computed angle."
 
 
-def _stopped(followed: Followed) -> str:
-    told = (
-        "it was seen to stand still"
-        if followed.stopped
-        else f"that was not confirmed; it was told nothing beyond {HORIZON:g} s"
-    )
-    return f"{followed.trouble} The hand was told to stop: {told}."
-
-
-def _untroubled(followed: Followed, squeezed: DrivenSqueeze) -> bool:
-    return followed.trouble is None and (squeezed.followed is None or squeezed.followed.trouble is None)
-
-
 def _way(way: float) -> str:
     return f"Before the trajectory the hand moved straight to its start, {way:.3g} rad at most."
 
 
-def _history(followed: Followed, mapped: Mapping[str, MappedJoint]) -> ExecutionHistory:
+def _history(ways: Sequence[Followed], mapped: Mapping[str, MappedJoint]) -> ExecutionHistory:
+    """Return the samples of ways that followed each other."""
+
     def angles(samples: list[Mapping[str, float]]) -> FloatArray:
         rows = [[joint.to_angle(sample[joint.name]) for joint in mapped.values()] for sample in samples]
         return np.array(rows, dtype=np.float64).reshape(len(rows), len(mapped))
 
-    return ExecutionHistory(
-        tuple(mapped), np.array(followed.times), angles(followed.commanded), angles(followed.measured)
-    )
+    times, commanded, measured = list[float](), list[Mapping[str, float]](), list[Mapping[str, float]]()
+    for way in ways:
+        # The first sample of a way is taken at the end of the one before.
+        first, begin = (1, times[-1]) if times else (0, 0.0)
+        times += [begin + time for time in way.times[first:]]
+        commanded += way.commanded[first:]
+        measured += way.measured[first:]
+    return ExecutionHistory(tuple(mapped), np.array(times), angles(commanded), angles(measured))
 
 
 def _largest_share(trajectory: Trajectory) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -17,36 +17,34 @@ from .command_check import CommandCheck, slowed_down
 from .driver import HandDriver, RefusedCommandError
 from .following import CLOSEST, Followed, Follower, TimedPlan
 from .joint_map import MappedJoint
+from .next_steps import BUILDING_UP
 
-#: How long the squeeze takes to build up, if no joint must be slower [s].
-BUILDING_UP: Final = 0.4
 #: Way-points of it.
 _POINTS: Final = 9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrivenSqueeze:
-    """Hold what came of a squeeze: a sentence, empty without one, and what was followed, None when nothing was sent."""
-
-    text: str = ""
-    followed: Followed | None = None
-
-
-def squeeze_by_driver(
-    solution: GraspSolution,
-    hand: Hand,
-    driver: HandDriver,
-    mapped: Mapping[str, MappedJoint],
-    check: CommandCheck,
-    stopping: threading.Event,
-    share: float,
-) -> DrivenSqueeze:
-    """Tell every joint the angle beyond its touch at which its servo exerts its share of the squeeze plan.
+    """Hold a squeeze as a controller is told it.
 
     Args:
-        solution: with `squeeze`, see `clench.complete`; without it, or without offsets, nothing is done.
-        hand: the model. driver: connected, at the touch. mapped: the joints as the controller says them.
-        check: what every command and state must pass. stopping: set to stop from elsewhere.
+        text: a sentence about it, empty without one. offsets: angles beyond the touch that are told [rad], by joint.
+        plan: the way there, None when nothing is told.
+    """
+
+    text: str = ""
+    offsets: Mapping[str, float] = field(default_factory=dict)
+    plan: TimedPlan | None = None
+
+
+def plan_driven_squeeze(
+    solution: GraspSolution, hand: Hand, mapped: Mapping[str, MappedJoint], check: CommandCheck, share: float
+) -> DrivenSqueeze:
+    """Plan to tell every joint the angle beyond its touch at which its servo exerts its share of the squeeze plan.
+
+    Args:
+        solution: with `squeeze`, see `clench.complete`; without it, or without offsets, nothing is told.
+        hand: the model. mapped: the joints as the controller says them. check: what every command must pass.
         share: of the planned offsets [-].
     """
     plan = solution.squeeze or {}
@@ -60,12 +58,28 @@ def squeeze_by_driver(
         check.command(timed.window(0.0, timed.duration + CLOSEST), timed.at(0.0))
     except RefusedCommandError as error:
         return DrivenSqueeze(f"There was no squeeze: {error}")
-    anywhere = {joint.name: np.inf for joint in mapped.values()}  # held by the object, joints stay behind
-    followed = Follower(driver, check, stopping, settling=BUILDING_UP, arrived=anywhere).follow(timed)
     largest = max(map(abs, offsets.values()))
-    return DrivenSqueeze(
-        f"Joints were told up to {largest:.3g} rad beyond the touch, as the squeeze plan says.", followed
-    )
+    text = f"Joints were told up to {largest:.3g} rad beyond the touch, as the squeeze plan says."
+    return DrivenSqueeze(text, offsets, timed)
+
+
+def squeeze_by_driver(
+    squeeze: DrivenSqueeze,
+    driver: HandDriver,
+    mapped: Mapping[str, MappedJoint],
+    check: CommandCheck,
+    stopping: threading.Event,
+) -> Followed:
+    """Squeeze as planned; nothing is done where nothing is told.
+
+    Args:
+        squeeze: planned. driver: connected, at the touch. mapped: the joints as the controller says them.
+        check: what every command and state must pass. stopping: set to stop from elsewhere.
+    """
+    if squeeze.plan is None:
+        return Followed()
+    anywhere = {joint.name: np.inf for joint in mapped.values()}  # held by the object, joints stay behind
+    return Follower(driver, check, stopping, settling=BUILDING_UP, arrived=anywhere).follow(squeeze.plan)
 
 
 def _timed(

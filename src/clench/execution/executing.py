@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 from clench.base.errors import CommandError
@@ -34,8 +35,10 @@ class Actuator(Protocol):
         """Open the hand, follow the trajectory to the touch, and compare with the solution."""
 
 
-def execute(solution: GraspSolution, actuator: Actuator, *, speed: float = 1.0, force: bool = False) -> ExecutionReport:
-    """Carry out a solution: open, close along the computed path, all fingers arriving together.
+def execute(
+    solution: GraspSolution, actuator: Actuator, *, speed: float = 1.0, force: bool = False, next_steps: bool = True
+) -> ExecutionReport:
+    """Carry out a solution: open, close along the computed path, all fingers arriving together; go to its next steps.
 
     A solution that is not valid is not carried out; the report says why.
 
@@ -44,11 +47,15 @@ def execute(solution: GraspSolution, actuator: Actuator, *, speed: float = 1.0, 
         actuator: what moves the hand, e.g. `SimulatedHand`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry it out although it is not valid.
+        next_steps: carry out its next steps, too, after the touch and the squeeze.
 
     Raises:
-        CommandError: the solution is for another hand or another geometry of hand or object, or `speed` is out of
-            range.
+        CommandError: the solution is for another hand or another geometry of hand or object, a next step is outside a
+            joint's limits, or `speed` is out of range.
+        UnknownNameError: a next step is of a joint that the hand does not have.
     """
+    if not next_steps:
+        solution = replace(solution, next_steps=())
     if solution.hand != actuator.hand.name:
         raise CommandError(f"The solution is for hand '{solution.hand}', the actuator moves '{actuator.hand.name}'.")
     check_geometry(solution, actuator.hand, actuator.obj)

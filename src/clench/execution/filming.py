@@ -99,6 +99,10 @@ class Film:
             self._frames.append(self._drawn(data))
             self._due += FRAME
 
+    def go_on(self, data: Any) -> None:
+        """Go on from a state that may be earlier than the last picture."""
+        self._due = float(data.time)
+
     def still(self, name: str, data: Any) -> None:
         """Keep a picture."""
         if self.stills is not None:

@@ -22,6 +22,7 @@ from .driver import DriverError, HandDriver, HandState, JointPath
 PERIOD = 0.05
 #: How far ahead it is told [s]: how long a hand moves on after its connection was cut.
 HORIZON = 0.3
+_TOLD_NOTHING = f"it was told nothing beyond {HORIZON:g} s"
 #: Points of a path that are closer than this are one [s].
 CLOSEST = 1e-4
 #: How long is waited for a hand to stand still after a stop [s].
@@ -89,6 +90,13 @@ class Followed:
     measured: list[Mapping[str, float]] = field(default_factory=list)
     trouble: str | None = None
     stopped: bool | None = None
+
+    def ending(self) -> str:
+        """Say why it ended early, and whether the hand was seen to stand still; empty when it did not."""
+        if self.trouble is None:
+            return ""
+        told = "it was seen to stand still" if self.stopped else f"that was not confirmed; {_TOLD_NOTHING}"
+        return f"{self.trouble} The hand was told to stop: {told}."
 
     def sample(self, moment: float, commanded: Mapping[str, float], state: HandState) -> None:
         """Keep one sample."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -127,6 +127,9 @@ class HoldReport:
         closed: motion from the pregrasp to the touch. squeezed: motion from there by the squeeze.
         forces: of every finger, squeezed, before the first pull.
         pulls: by direction in the world, "+x" to "-z", or "lift"; motions count from before the hand closed.
+
+    Where nothing was tested, because the hand would be in the table or the simulation did not stay finite, there are no
+    motions, forces and pulls, and the reason says so.
     """
 
     held: bool
@@ -135,12 +138,12 @@ class HoldReport:
     plan: str
     planned: bool
     torques: Mapping[str, float]
-    angles: Mapping[str, float]
-    first_touch: Mapping[str, float | None]
-    closed: ObjectMotion
-    squeezed: ObjectMotion
-    forces: Mapping[str, FingerForce]
-    pulls: Mapping[str, Pulled]
+    angles: Mapping[str, float] = field(default_factory=dict)
+    first_touch: Mapping[str, float | None] = field(default_factory=dict)
+    closed: ObjectMotion | None = None
+    squeezed: ObjectMotion | None = None
+    forces: Mapping[str, FingerForce] = field(default_factory=dict)
+    pulls: Mapping[str, Pulled] = field(default_factory=dict)
 
     @property
     def touch_spread(self) -> float | None:
@@ -164,8 +167,8 @@ class HoldReport:
             "angles": dict(self.angles),
             "first_touch": dict(self.first_touch),
             "touch_spread": self.touch_spread,
-            "closed": asdict(self.closed),
-            "squeezed": asdict(self.squeezed),
+            "closed": None if self.closed is None else asdict(self.closed),
+            "squeezed": None if self.squeezed is None else asdict(self.squeezed),
             "forces": {finger: asdict(force) for finger, force in self.forces.items()},
             "pulls": {direction: asdict(pulled) for direction, pulled in self.pulls.items()},
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,21 +38,38 @@ DIRECTIONS = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class Place:
     """Hold where an object is: its centre of mass [m], shape (3,), and its rotation, shape (3, 3)."""
 
     center: FloatArray
     rotation: FloatArray
 
-    def motion_to(self, other: _Place) -> ObjectMotion:
+    def motion_to(self, other: Place) -> ObjectMotion:
+        """Return how far another place is from here."""
         turned = other.rotation @ self.rotation.T
         # From sine and cosine: the cosine alone cannot tell angles below 1e-8 from 0.
         sine = np.linalg.norm([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
         angle = float(np.arctan2(sine, np.trace(turned) - 1.0))
         return ObjectMotion(float(np.linalg.norm(other.center - self.center)), angle)
 
-    def raised(self, height: float) -> _Place:
-        return _Place(self.center + np.array([0.0, 0.0, height]), self.rotation)
+    def raised(self, height: float) -> Place:
+        """Return the place so far above [m]."""
+        return Place(self.center + np.array([0.0, 0.0, height]), self.rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Hold a state in which the hand holds a free object: squeezed, or lifted.
+
+    Args:
+        scene, data: the simulation. told: where the joints are told to be [rad], shape (J,).
+        extra: what the controls of the squeeze have besides [of the actuators], shape (A,).
+    """
+
+    scene: Scene
+    data: Any
+    told: FloatArray
+    extra: FloatArray
 
 
 def hold_and_pull(
@@ -64,6 +82,7 @@ def hold_and_pull(
     drive: Drive = Drive.SERVO,
     film: Film | None = None,
     show_progress: bool = False,
+    then: Callable[[Held], None] | None = None,
 ) -> HoldReport:
     """Close from the pregrasp on a free object, squeeze it, and pull it in six directions from there, or lift it.
 
@@ -76,6 +95,7 @@ def hold_and_pull(
         drive: what moves the joints.
         film: takes pictures of closing, squeeze, and the last pull or the lift.
         show_progress: show a bar while convex pieces are computed.
+        then: called with the squeezed state, or the lifted one, where the object was held.
 
     Raises:
         HandError, ObjectError: see `build_scene`. CommandError: see `plan_squeeze`. ClenchError: nothing can be drawn.
@@ -90,28 +110,44 @@ def hold_and_pull(
     torques = hold.squeeze * joint_torques(plan, hand, computed)
     told = scene.drives.command(computed)
     ends = told, told + scene.drives.pressing(hand, computed, torques)
-    data = mujoco.MjData(scene.model)
-    sunk = _in_table(scene, (trajectory.positions[trajectory.pregrasp or 0], computed))
-    watch = TouchWatch(scene, hand, film)
-    before = _close(scene, data, trajectory, watch)
-    touch = _place_of(scene, data)
-    _squeeze(scene, data, ends, watch)
-    squeezed, stable = _place_of(scene, data), _stable(data)
-    pulls = _tested(scene, data, hold, before, film) if stable and sunk <= TABLE_OVERLAP else {}
-    return HoldReport(
-        held=bool(pulls) and all(pulled.held for pulled in pulls.values()),
-        reason=_sentence(pulls, hold, sunk),
+    report = HoldReport(
+        held=False,
+        reason="",
         settings=hold,
         plan=plan.text,
         planned=plan.feasible,
         torques=dict(zip(hand.joint_names, torques.tolist(), strict=True)),
+    )
+    sunk = _in_table(scene, (trajectory.positions[trajectory.pregrasp or 0], computed))
+    if sunk > TABLE_OVERLAP:
+        return replace(report, reason=f"Not tested: the hand would be {sunk * 1e3:.2g} mm deep in the table.")
+    data = mujoco.MjData(scene.model)
+    watch = TouchWatch(scene, hand, film)
+    before = _close(scene, data, trajectory, watch)
+    touch = place_of(scene, data)
+    _squeeze(scene, data, ends, watch)
+    forces = watch.normal_forces(data)
+    if not is_stable(data):
+        return replace(report, reason="Not tested: the simulation did not stay finite while the object was squeezed.")
+    squeezed = place_of(scene, data)
+    pulls, state = _tested(scene, data, hold, before, film)
+    report = replace(
+        report,
+        held=all(pulled.held for pulled in pulls.values()),
+        reason=_sentence(pulls, hold),
         angles=dict(zip(hand.joint_names, data.qpos[scene.qpos].tolist(), strict=True)),
         first_touch=watch.first,
         closed=before.motion_to(touch),
         squeezed=touch.motion_to(squeezed),
-        forces=_forces(plan, hold, watch.normal_forces(data)),
+        forces=_forces(plan, hold, forces),
         pulls=pulls,
     )
+    if report.held and then is not None:
+        pressing = ends[1] - ends[0]
+        # A servo is told angles; what actuators of the model are told besides is no angle.
+        by_model = scene.drives.driven.by_model
+        then(Held(scene, state, computed if by_model else computed + pressing, pressing * by_model))
+    return report
 
 
 def _plan(solution: GraspSolution, hand: Hand, obj: GraspObject, hold: Hold) -> SqueezePlan:
@@ -150,7 +186,7 @@ def _forces(plan: SqueezePlan, hold: Hold, measured: dict[str, float]) -> dict[s
     return {finger: FingerForce(planned[finger], measured[finger]) for finger in measured}
 
 
-def _close(scene: Scene, data: Any, trajectory: Trajectory, watch: TouchWatch) -> _Place:
+def _close(scene: Scene, data: Any, trajectory: Trajectory, watch: TouchWatch) -> Place:
     """Close from the pregrasp to the touch; return where the object was before."""
     import mujoco
 
@@ -160,7 +196,7 @@ def _close(scene: Scene, data: Any, trajectory: Trajectory, watch: TouchWatch) -
     data.qpos[scene.qpos] = trajectory.positions[begin]
     data.ctrl[drives.numbers] = drives.command(trajectory.positions[begin])
     mujoco.mj_forward(scene.model, data)
-    before = _place_of(scene, data)
+    before = place_of(scene, data)
     if watch.film is not None:
         watch.film.begin(scene, data)
     for _ in range(round((trajectory.duration - at + SETTLING) / TIMESTEP)):
@@ -185,28 +221,47 @@ def _squeeze(scene: Scene, data: Any, ends: tuple[FloatArray, FloatArray], watch
     watch.still("squeeze", data)
 
 
-def _tested(scene: Scene, squeezed: Any, hold: Hold, before: _Place, film: Film | None) -> dict[str, Pulled]:
-    import mujoco
+def _tested(scene: Scene, squeezed: Any, hold: Hold, before: Place, film: Film | None) -> tuple[dict[str, Pulled], Any]:
+    """Pull or lift; return what came of it, and the state from which to go on: squeezed, or lifted."""
+    if hold.test == HoldTest.LIFT:
+        data = _copied(scene, squeezed)
+        return {HoldTest.LIFT.value: _pull(scene, data, hold, before, film, lifted=True)}, data
+    return pull_each_way(scene, squeezed, hold, before, film), squeezed
 
-    tests = {"lift": np.zeros(3)} if hold.test == HoldTest.LIFT else DIRECTIONS
+
+def pull_each_way(scene: Scene, state: Any, hold: Hold, before: Place, film: Film | None = None) -> dict[str, Pulled]:
+    """Pull the object in six directions, or leave it to gravity where there is some, each time anew from a state.
+
+    Args:
+        scene: the scene. state: its `mujoco.MjData`, which stays as it is. hold: the test.
+        before: where the object is compared with. film: takes pictures of the last pull.
+    """
+    weighs = hold.test == HoldTest.LIFT
+    tests = {"gravity": np.zeros(3)} if weighs else DIRECTIONS
     found = {}
     for name, direction in tests.items():
-        data = mujoco.MjData(scene.model)
-        mujoco.mj_copyData(data, scene.model, squeezed)
+        data = _copied(scene, state)
         data.xfrc_applied[scene.object_body, :3] = hold.pull * hold.mass * direction
         found[name] = _pull(scene, data, hold, before, film if name == [*tests][-1] else None)
     return found
 
 
-def _pull(scene: Scene, data: Any, hold: Hold, before: _Place, film: Film | None) -> Pulled:
+def _copied(scene: Scene, state: Any) -> Any:
+    import mujoco
+
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_copyData(data, scene.model, state)
+    return data
+
+
+def _pull(scene: Scene, data: Any, hold: Hold, before: Place, film: Film | None, *, lifted: bool = False) -> Pulled:
     """Simulate a pull, or the lift; the object is compared with where it was before, raised with the palm."""
     import mujoco
 
-    lifted = hold.test == HoldTest.LIFT
     duration = hold.duration + (LIFTING if lifted else 0.0)
     steps, every = max(1, round(duration / TIMESTEP)), round(LOOK_INTERVAL / TIMESTEP)
     taken, height = 0, 0.0
-    motion = farthest = before.motion_to(_place_of(scene, data))
+    motion = farthest = before.motion_to(place_of(scene, data))
     while taken < steps and _within(motion, hold):
         for _ in range(min(every, steps - taken)):
             taken += 1
@@ -218,27 +273,28 @@ def _pull(scene: Scene, data: Any, hold: Hold, before: _Place, film: Film | None
                 film.look(data)
         mujoco.mj_kinematics(scene.model, data)
         mujoco.mj_comPos(scene.model, data)
-        if not _stable(data):
+        if not is_stable(data):
             return Pulled(False, motion, farthest, taken * TIMESTEP)
         if lifted:
             height = float(data.qpos[scene.lift])
-        motion = before.raised(height).motion_to(_place_of(scene, data))
+        motion = before.raised(height).motion_to(place_of(scene, data))
         farthest = ObjectMotion(max(farthest.distance, motion.distance), max(farthest.angle, motion.angle))
     if film is not None:
         film.still("end", data)
     return Pulled(_within(motion, hold), motion, farthest, taken * TIMESTEP)
 
 
-def _place_of(scene: Scene, data: Any) -> _Place:
+def place_of(scene: Scene, data: Any) -> Place:
+    """Return where the object is."""
     body = scene.object_body
-    return _Place(data.xipos[body].copy(), data.xmat[body].reshape(3, 3).copy())
+    return Place(data.xipos[body].copy(), data.xmat[body].reshape(3, 3).copy())
 
 
 def _within(motion: ObjectMotion, hold: Hold) -> bool:
     return motion.within(hold.max_distance, hold.max_angle)
 
 
-def _stable(data: Any) -> bool:
+def is_stable(data: Any) -> bool:
     """Return whether the simulation has stayed finite: the engine starts again from the beginning where it has not."""
     import mujoco
 
@@ -261,11 +317,7 @@ def _in_table(scene: Scene, postures: tuple[FloatArray, ...]) -> float:
     return deepest
 
 
-def _sentence(pulls: dict[str, Pulled], hold: Hold, sunk: float) -> str:
-    if sunk > TABLE_OVERLAP:
-        return f"Not tested: the hand would be {sunk * 1e3:.2g} mm deep in the table."
-    if not pulls:
-        return "Not tested: the simulation did not stay finite while the object was squeezed."
+def _sentence(pulls: dict[str, Pulled], hold: Hold) -> str:
     far = max(p.farthest.distance for p in pulls.values())
     turned = np.rad2deg(max(p.farthest.angle for p in pulls.values()))
     moved = f"it moved by up to {far * 1e3:.2g} mm and {turned:.2g}°, closing and squeeze included."

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from clench.base.json_files import write_json
 from clench.base.pose import FloatArray
+from clench.solve.solution import GraspSolution
 
 from .history import ExecutionHistory
-from .hold import HoldReport
+from .hold import HoldReport, ObjectMotion, Pulled
 
 SCHEMA = "clench.execution/1"
 
@@ -52,6 +53,73 @@ class ContactReached:
 
 
 @dataclass(frozen=True)
+class NextStepReached:
+    """Hold what came of one of the solution's next steps, in their order.
+
+    Args:
+        joints: every joint that it moves, with where it should go. reached: all are there, up to the report's angle
+            tolerance. reason: in words.
+        touching: fingers that touch the object after it, None where that is not known.
+        held: whether the object is still held after it, None where that was not tested.
+        motion: of the object by the step alone, None where it could not move or was not seen.
+        pulls: with which it was tested, by direction, or "gravity"; motions count from after the step.
+    """
+
+    joints: Mapping[str, JointReached]
+    reached: bool
+    reason: str
+    touching: tuple[str, ...] | None = None
+    held: bool | None = None
+    motion: ObjectMotion | None = None
+    pulls: Mapping[str, Pulled] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form, one of `next_steps` in schema `clench.execution/1`."""
+        return {
+            "joints": _joints(self.joints),
+            "reached": self.reached,
+            "reason": self.reason,
+            "touching": None if self.touching is None else list(self.touching),
+            "held": self.held,
+            "motion": None if self.motion is None else asdict(self.motion),
+            "pulls": {direction: asdict(pulled) for direction, pulled in self.pulls.items()},
+        }
+
+
+def step_sentence(step: int, joints: Mapping[str, JointReached], tolerance: float) -> tuple[bool, str]:
+    """Return whether a next step was reached, and say so.
+
+    Args:
+        step: its index. joints: those that it moves. tolerance: largest difference that counts as reached [rad].
+    """
+    worst = max(joints, key=lambda name: abs(joints[name].error), default=None)
+    error = 0.0 if worst is None else abs(joints[worst].error)
+    if error <= tolerance:  # written so that NaN fails
+        return True, f"Next step {step + 1} was reached: every joint of it is within {error:.2g} rad."
+    return False, (
+        f"Next step {step + 1} was not reached: joint '{worst}' is {error:.3g} rad from its angle; tolerance "
+        f"{tolerance:g} rad."
+    )
+
+
+def judge_steps(success: bool, reason: str, steps: Sequence[NextStepReached]) -> tuple[bool, str]:
+    """Return success and reason of an execution after its next steps: all of them have to be reached."""
+    failed = [step for step in steps if not step.reached]
+    if failed:
+        return False, f"{reason} {failed[0].reason}"
+    return success, f"{reason} {''.join(step.reason + ' ' for step in steps)}".rstrip()
+
+
+def notes_on_steps(solution: GraspSolution, steps: Sequence[NextStepReached]) -> tuple[str, ...]:
+    """Return a sentence about next steps that were not carried out, if there are any."""
+    left = len(solution.next_steps) - len(steps)
+    if not left:
+        return ()
+    which = f"The last {left} of {len(solution.next_steps)} next steps" if steps else "The next steps"
+    return (f"{which} were not carried out: what comes before was not reached, or did not hold.",)
+
+
+@dataclass(frozen=True)
 class ExecutionReport:
     """Hold what was reached when a solution was carried out.
 
@@ -67,6 +135,7 @@ class ExecutionReport:
         history: what was told and measured on the way, None when it was not kept.
         hold: what came of a hold test, None without one.
         driven_by: what moved every joint of a simulated hand: an actuator of the model, "servo" or "coupled".
+        next_steps: what came of the solution's next steps; those after one that was not reached are left out.
     """
 
     actuator: str
@@ -84,6 +153,7 @@ class ExecutionReport:
     history: ExecutionHistory | None = None
     hold: HoldReport | None = None
     driven_by: Mapping[str, str] = field(default_factory=dict)
+    next_steps: tuple[NextStepReached, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, schema `clench.execution/1`."""
@@ -92,10 +162,7 @@ class ExecutionReport:
             "actuator": self.actuator,
             "success": self.success,
             "reason": self.reason,
-            "joints": {
-                name: {"computed": j.computed, "reached": j.reached, "error": j.error}
-                for name, j in self.joints.items()
-            },
+            "joints": _joints(self.joints),
             "contacts": [
                 {
                     "finger": c.finger,
@@ -118,6 +185,7 @@ class ExecutionReport:
             "history": None if self.history is None else self.history.to_dict(),
             "hold": None if self.hold is None else self.hold.to_dict(),
             "driven_by": dict(self.driven_by),
+            "next_steps": [step.to_dict() for step in self.next_steps],
         }
 
     def save(self, path: str | Path) -> None:
@@ -127,3 +195,7 @@ class ExecutionReport:
             ClenchError: a number is not finite. FileError: the file cannot be written.
         """
         write_json(path, self.to_dict(), "report")
+
+
+def _joints(joints: Mapping[str, JointReached]) -> dict[str, dict[str, float]]:
+    return {name: {"computed": j.computed, "reached": j.reached, "error": j.error} for name, j in joints.items()}

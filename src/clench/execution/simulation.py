@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from .filming import Film
 from .history import ExecutionHistory
 from .hold import Hold, HoldReport
 from .pulling import hold_and_pull
-from .report import ContactReached, ExecutionReport, JointReached
+from .report import ContactReached, ExecutionReport, JointReached, NextStepReached, judge_steps, notes_on_steps
 from .scene import TIMESTEP, Scene, body_pose, build_scene
+from .stepping import Stepper
 from .touching import TouchWatch
 from .trajectory import Trajectory
 
@@ -92,7 +94,8 @@ class SimulatedHand:
             self.hand, obj, solution.hand_pose, start, drive=self.drive, show_progress=self.show_progress
         )
         watch = TouchWatch(scene, self.hand, self.film if self.hold is None else None)
-        data, history = self._run(scene, trajectory, watch)
+        samples = _Samples(scene, trajectory.joints, self.on_step)
+        data = self._run(scene, trajectory, watch, samples)
         reached = np.array(data.qpos[scene.qpos])
         joints = {
             name: JointReached(float(c), float(r))
@@ -109,9 +112,17 @@ class SimulatedHand:
         )
         error = float(np.abs(reached - computed).max(initial=0.0))
         success, reason = self._judge(solution, joints, contacts, error)
-        held = self._held(solution, obj, trajectory) if success else None
-        if held is not None:
+        held: HoldReport | None = None
+        steps: tuple[NextStepReached, ...] = ()
+        if success and self.hold is not None:
+            held, steps = self._held(solution, obj, trajectory, self.hold)
             success, reason = held.held, f"{reason} {held.reason}"
+        elif success and solution.next_steps:
+            stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
+            steps = stepper.in_place(scene, data, trajectory.positions[-1], watch.film, samples.look)
+        samples.end(data)
+        if success:
+            success, reason = judge_steps(success, reason, steps)
         return ExecutionReport(
             actuator=self.name,
             success=success,
@@ -124,25 +135,35 @@ class SimulatedHand:
             largest_angle_error=error,
             angle_tolerance=self.angle_tolerance,
             contact_tolerance=self.contact_tolerance,
-            notes=(*_notes(scene, solution), *sentences(scene.drives.driven, self.drive), *self._notes_on_hold(held)),
+            notes=(
+                *_notes(scene, solution),
+                *sentences(scene.drives.driven, self.drive),
+                *self._notes_on_hold(held),
+                *notes_on_steps(solution, steps),
+            ),
             driven_by=scene.drives.driven.by,
-            history=history,
+            history=samples.history(),
             hold=held,
+            next_steps=steps,
         )
 
-    def _held(self, solution: GraspSolution, obj: GraspObject, trajectory: Trajectory) -> HoldReport | None:
-        if self.hold is None:
-            return None
-        return hold_and_pull(
+    def _held(
+        self, solution: GraspSolution, obj: GraspObject, trajectory: Trajectory, hold: Hold
+    ) -> tuple[HoldReport, tuple[NextStepReached, ...]]:
+        steps: list[NextStepReached] = []
+        stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
+        report = hold_and_pull(
             solution,
             self.hand,
             obj,
-            self.hold,
+            hold,
             trajectory,
             drive=self.drive,
             film=self.film,
             show_progress=self.show_progress,
+            then=lambda held: steps.extend(stepper.after_hold(held, hold, self.film)),
         )
+        return report, tuple(steps)
 
     def _notes_on_hold(self, held: HoldReport | None) -> tuple[str, ...]:
         if self.hold is None:
@@ -150,12 +171,15 @@ class SimulatedHand:
         if held is None:
             return ("Holding was not tested: the touch was not reached.",)
         notes = ["Angles and contacts are of a run with the object held in place; for the hold test it was free."]
+        if not held.pulls:
+            notes = ["Angles and contacts are of a run with the object held in place, alone."]
+            notes += ["There are no pictures: the hold test was not carried out."] * (self.film is not None)
         if not held.planned:
             notes.append(f"The squeeze is not one that holds: {held.plan}")
         return tuple(notes)
 
-    def _run(self, scene: Scene, trajectory: Trajectory, watch: TouchWatch) -> tuple[Any, ExecutionHistory]:
-        """Simulate the motion; return the final state and the samples on the way."""
+    def _run(self, scene: Scene, trajectory: Trajectory, watch: TouchWatch, samples: _Samples) -> Any:
+        """Simulate the motion to the touch; return the state there."""
         import mujoco
 
         data = mujoco.MjData(scene.model)
@@ -164,25 +188,16 @@ class SimulatedHand:
         mujoco.mj_forward(scene.model, data)
         if watch.film is not None:
             watch.film.begin(scene, data)
-        times: list[float] = []
-        measured: list[FloatArray] = []
-        every = round(WATCH_INTERVAL / TIMESTEP)
-        for step in range(int(np.ceil((trajectory.duration + SETTLING) / TIMESTEP)) + 1):
-            if step % every == 0:
-                if self.on_step is not None:
-                    self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
-                times.append(float(data.time))
-                measured.append(np.array(data.qpos[scene.qpos]))
-            data.ctrl[:] = scene.drives.command(trajectory.at(data.time))
+        for _ in range(int(np.ceil((trajectory.duration + SETTLING) / TIMESTEP)) + 1):
+            told = trajectory.at(data.time)
+            samples.look(data, told)
+            data.ctrl[:] = scene.drives.command(told)
             mujoco.mj_step(scene.model, data)
             watch.look(data)
         mujoco.mj_forward(scene.model, data)
         watch.look(data)
         watch.still("touch", data)
-        if self.on_step is not None:
-            self.on_step(float(data.time), np.array(data.qpos[scene.qpos]))
-        commanded = np.array([trajectory.at(time) for time in times])
-        return data, ExecutionHistory(trajectory.joints, np.array(times), commanded, np.array(measured))
+        return data
 
     def _contact(
         self, scene: Scene, data: Any, contact: Contact, hand_pose: Pose, T_palm_link: FloatArray
@@ -219,6 +234,37 @@ class SimulatedHand:
         if absent:
             return False, f"Finger '{absent[0]}' does not touch; tolerance {self.contact_tolerance:g} m."
         return True, f"Every joint is within {error:.2g} rad of its computed angle, and {len(wanted)} fingers touch."
+
+
+@dataclass
+class _Samples:
+    """Note what was told and measured every `WATCH_INTERVAL`, and show it to whoever watches."""
+
+    scene: Scene
+    joints: tuple[str, ...]
+    on_step: Callable[[float, FloatArray], None] | None
+    times: list[float] = field(default_factory=list)
+    told: list[FloatArray] = field(default_factory=list)
+    measured: list[FloatArray] = field(default_factory=list)
+    steps: int = 0
+
+    def look(self, data: Any, told: FloatArray) -> None:
+        """Note the state when it is time to."""
+        if self.steps % round(WATCH_INTERVAL / TIMESTEP) == 0:
+            self.end(data)
+            self.times.append(float(data.time))
+            self.told.append(told)
+            self.measured.append(np.array(data.qpos[self.scene.qpos]))
+        self.steps += 1
+
+    def end(self, data: Any) -> None:
+        """Show the state."""
+        if self.on_step is not None:
+            self.on_step(float(data.time), np.array(data.qpos[self.scene.qpos]))
+
+    def history(self) -> ExecutionHistory:
+        """Return what was noted."""
+        return ExecutionHistory(self.joints, np.array(self.times), np.array(self.told), np.array(self.measured))
 
 
 def nearest(scene: Scene, data: Any, link: int, within: float) -> tuple[float, FloatArray]:

@@ -49,6 +49,10 @@ class TouchWatch:
         if self.film is not None:
             self.film.still(name, data)
 
+    def touching(self, data: Any) -> tuple[str, ...]:
+        """Return the names of the fingers that touch the object now."""
+        return tuple(self._names[number] for number in sorted(set(self._touching(data)[1].tolist())))
+
     def normal_forces(self, data: Any) -> dict[str, float]:
         """Return the sum of the normal forces of every finger on the object [N]."""
         import mujoco

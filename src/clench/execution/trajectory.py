@@ -20,7 +20,9 @@ from clench.models.shapes import CollisionSource
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
+from .closing_path import STILL, closing_path, distinct
 from .landing import CLEARANCE, LANDING_SPEED, is_clear, plan_landing
+from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
 from .timing import ACCELERATION, TimedPath, time_path
 
 SCHEMA = "clench.trajectory/1"
@@ -30,11 +32,6 @@ SLOWEST = 1e-6
 STAGE_STEPS = 8
 #: Way-points of a path on which all joints move at once, besides those at which one stops.
 AT_ONCE_STEPS = 32
-#: Places of a path that differ by less than this share of its length are one [-].
-ROUNDING = 1e-12
-#: Joints that move less than this stand still [rad].
-STILL = 1e-9
-
 #: Where the way from a pregrasp is not clear, one nearer to the touch is tried: shares of the clearance [-].
 _CLEARANCES = (1.0, 0.4, 0.1)
 #: Times [s], shape (N,), and postures [rad], shape (N, J).
@@ -52,6 +49,8 @@ class Trajectory:
         positions: joint angles [rad], shape (N, J); the first is the open hand, the last the touch.
         velocity_limits: of the joints [rad/s], shape (J,).
         pregrasp: number of the way-point from which all contacts are reached at once; None when there is none.
+        after: where the solution has next steps: what comes after the touch, the squeeze and the steps.
+        speed: fraction of the velocity limits that was used [-]. acceleration: largest of every joint [rad/s²].
     """
 
     hand: str
@@ -61,11 +60,19 @@ class Trajectory:
     positions: FloatArray
     velocity_limits: FloatArray
     pregrasp: int | None = None
+    after: tuple[Phase, ...] = ()
+    speed: float = 1.0
+    acceleration: float = ACCELERATION
 
     @property
     def duration(self) -> float:
         """Time from the open hand to the touch [s]."""
         return float(self.times[-1])
+
+    @property
+    def pace(self) -> tuple[FloatArray, FloatArray]:
+        """Largest velocity [rad/s] and acceleration [rad/s²] that was planned with, of every joint, shape (J,) each."""
+        return _pace(self.velocity_limits, self.speed, self.acceleration)
 
     def at(self, time: float) -> FloatArray:
         """Return the angles at a time [s], shape (J,); before the start the first, after the end the last."""
@@ -85,10 +92,15 @@ class Trajectory:
             "object": self.object,
             "joints": list(self.joints),
             "velocity_limits": self.velocity_limits.tolist(),
+            "speed": self.speed,
+            "acceleration": self.acceleration,
             "pregrasp": pregrasp,
             "points": [
-                {"time": float(t), "phase": phase, "positions": q.tolist()}
-                for t, phase, q in zip(self.times, phases, self.positions, strict=True)
+                *(
+                    {"time": float(t), "phase": phase, "positions": q.tolist()}
+                    for t, phase, q in zip(self.times, phases, self.positions, strict=True)
+                ),
+                *points_after(self.after, self.duration),
             ],
         }
 
@@ -119,7 +131,7 @@ def plan_trajectory(
     acceleration: float = ACCELERATION,
     clearance: float = CLEARANCE,
 ) -> Trajectory:
-    """Time a path to the touch, so that all fingers touch at the same moment, slowly.
+    """Time a path to the touch, so that all fingers touch at the same moment, slowly; then to the next steps.
 
     With the object, the hand goes to a pregrasp off it, and from there straight to all contacts at once, at 10 mm/s.
     The way to the pregrasp is a straight line in joint space where the exact depth shows that to be clear, else every
@@ -137,8 +149,9 @@ def plan_trajectory(
         clearance: of the pregrasp [m]; less where the way from there is not clear.
 
     Raises:
-        CommandError: the solution is of another hand, lacks a joint, has more than one round; or `speed`,
-            `acceleration` or `clearance` is out of range.
+        CommandError: the solution is of another hand, lacks a joint, has more than one round, or a next step outside a
+            joint's limits; or `speed`, `acceleration` or `clearance` is out of range.
+        UnknownNameError: a next step of a joint that the hand does not have.
     """
     if solution.rounds != 1:
         raise CommandError(
@@ -151,19 +164,41 @@ def plan_trajectory(
         if not (np.isfinite(value) and value > 0.0):
             raise CommandError(f"{key}: expected a finite number above 0, got {value!r}.")
     limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
-    pace = limits * speed, np.full(len(limits), float(acceleration))
+    pace = _pace(limits, speed, acceleration)
+    after = plan_after_touch(solution, hand, pace)
+    times, positions, pregrasp = _to_touch(solution, hand, obj, pace, clearance)
+    names = solution.hand, solution.object, hand.joint_names
+    return Trajectory(*names, times, positions, limits, pregrasp, after, float(speed), float(acceleration))
+
+
+def _pace(limits: FloatArray, speed: float, acceleration: float) -> tuple[FloatArray, FloatArray]:
+    return limits * speed, np.full(len(limits), float(acceleration))
+
+
+def _to_touch(
+    solution: GraspSolution,
+    hand: Hand,
+    obj: GraspObject | None,
+    pace: tuple[FloatArray, FloatArray],
+    clearance: float,
+) -> tuple[FloatArray, FloatArray, int | None]:
+    """Return times and postures from the open hand to the touch, and the number of the pregrasp."""
     end = posture(solution.joint_angles, hand, "joint_angles")
-    if obj is not None:
-        for share in _CLEARANCES:
-            found = _landed(solution, hand, obj, pace, share * clearance)
-            if found is not None:
-                return _made(solution, hand, found, limits, pregrasp=len(found[0][0]) - 1)
-    return _made(solution, hand, [_way(solution, hand, end, pace, straight=False)], limits)
+    for share in _CLEARANCES if obj is not None else ():
+        assert obj is not None
+        found = _landed(solution, hand, obj, pace, share * clearance)
+        if found is not None:
+            (before, way), (later, path) = found
+            pregrasp = len(before) - 1
+            times = np.concatenate([before[:-1], before[-1] + later])
+            # Where nothing touches, there is nothing to stand off.
+            return times, np.vstack([way[:-1], path]), pregrasp if pregrasp < len(times) - 1 else None
+    return *_way(solution, hand, end, pace, straight=False), None
 
 
 def _landed(
     solution: GraspSolution, hand: Hand, obj: GraspObject, pace: tuple[FloatArray, FloatArray], clearance: float
-) -> list[_Part] | None:
+) -> tuple[_Part, _Part] | None:
     """Return the way to a pregrasp and the straight line from there to all contacts at once; None when not clear."""
     end = posture(solution.joint_angles, hand, "joint_angles")
     landing = plan_landing(solution, hand, clearance)
@@ -177,20 +212,8 @@ def _landed(
     for straight in (True, False):
         way = _way(solution, hand, landing, pace, straight=straight)
         if is_clear(solution, hand, obj, list(way[1]), source):
-            return [way, last]
+            return way, last
     return None
-
-
-def _made(
-    solution: GraspSolution, hand: Hand, parts: list[_Part], limits: FloatArray, pregrasp: int | None = None
-) -> Trajectory:
-    times, positions = parts[0]
-    for later, path in parts[1:]:
-        times = np.concatenate([times[:-1], times[-1] + later])
-        positions = np.vstack([positions[:-1], path])
-    if pregrasp is not None and pregrasp == len(times) - 1:
-        pregrasp = None  # nothing touches, so there is nothing to stand off
-    return Trajectory(solution.hand, solution.object, hand.joint_names, times, positions, limits, pregrasp)
 
 
 def _way(
@@ -214,7 +237,7 @@ def _way(
 def _joined(paths: list[TimedPath], end: FloatArray, joints: Sequence[Sequence[int]]) -> _Part:
     """Return times and postures of paths that are gone through at the same time, each by some of the joints."""
     duration = max((path.duration for path in paths), default=0.0)
-    grid = _distinct(np.concatenate([np.zeros(1), *(path.samples(duration) for path in paths)]))
+    grid = distinct(np.concatenate([np.zeros(1), *(path.samples(duration) for path in paths)]))
     positions = np.tile(paths[0].corners[0] if paths else end, (len(grid), 1))
     for own, path in zip(joints, paths, strict=True):
         moved = [j for j in own if np.ptp(path.corners[:, j]) > 0.0]
@@ -245,37 +268,8 @@ def _closed_at_once(solution: GraspSolution) -> bool:
 def _path_at_once(solution: GraspSolution, hand: Hand, start: FloatArray, end: FloatArray) -> list[FloatArray]:
     """Return the path on which all joints move, each at its speed and until its end, as stages."""
     speed = np.array([solution.speeds.get(name, 1.0) for name in hand.joint_names])
-    path = _closing_path(hand, range(len(start)), start, end, speed, AT_ONCE_STEPS)
+    path = closing_path(hand, range(len(start)), start, end, speed, AT_ONCE_STEPS)
     return [path, _eased(path[-1], end)] if np.abs(end - path[-1]).max(initial=0.0) > STILL else [path]
-
-
-def _closing_path(
-    hand: Hand, joints: Sequence[int], start: FloatArray, end: FloatArray, speed: FloatArray, steps: int
-) -> FloatArray:
-    """Return way-points on which joints move at their speeds, each until its end, shape (n, J); the others rest.
-
-    Followers are where their couplings have them, between their own start and end: one at its limit waits, and one
-    that breaks away goes on with the actuator while its leader is held, or is held while its leader goes on. Every
-    place at which a joint starts or stops is a way-point; between two of them the path is a straight line.
-    """
-    away = end - start
-    closing = np.array([j.direction for j in hand.joints], dtype=np.float64)
-    rate = np.where(np.abs(away) > STILL, np.sign(away), closing) * speed
-    free = start.copy()
-    for c in hand.couplings:
-        rate[c.follower] = c.ratio * rate[c.leader]
-        free[c.follower] = c.ratio * start[c.leader] + c.offset
-    moves = np.isin(np.arange(len(start)), joints) & (away != 0.0) & (rate != 0.0)
-    events = np.array([start - free, end - free])[:, moves] / rate[moves]
-    last = float(events.max(initial=0.0))
-    if last <= 0.0:
-        return start[None].copy()
-    s = np.linspace(0.0, 1.0, steps + 1)
-    places = _distinct(np.concatenate([np.clip(events.ravel(), 0.0, last), last * s * s * (3.0 - 2.0 * s)]))
-    between = np.clip(free + places[:, None] * rate, np.minimum(start, end), np.maximum(start, end))
-    path: FloatArray = np.where(moves, between, start)
-    path[0], path[-1] = start, np.where(moves, end, start)
-    return path
 
 
 def _stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatArray) -> Iterator[FloatArray]:
@@ -287,7 +281,7 @@ def _stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatAr
         if leader in followers:
             continue
         group = [leader, *(j for j in _followers(hand, leader) if j in joints)]
-        path = _closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
+        path = closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
         yield path
         q = path[-1].copy()
     target = q.copy()
@@ -318,17 +312,11 @@ def _eased(start: FloatArray, end: FloatArray) -> FloatArray:
     return path
 
 
-def _distinct(values: FloatArray) -> FloatArray:
-    """Return values in order, from 0 on; of those that differ by rounding alone, the first."""
-    ordered = np.unique(values)
-    distinct: FloatArray = ordered[np.diff(ordered, prepend=-np.inf) > ROUNDING * ordered[-1]]
-    return distinct
-
-
 class _PointForm(msgspec.Struct):
     time: float
     phase: str
     positions: list[float]
+    step: int | None = None
 
 
 class _Form(msgspec.Struct):
@@ -337,6 +325,8 @@ class _Form(msgspec.Struct):
     joints: list[str]
     velocity_limits: list[float]
     points: list[_PointForm]
+    speed: float = 1.0
+    acceleration: float = ACCELERATION
 
 
 def _read(data: Any, source: str) -> Trajectory:
@@ -359,12 +349,21 @@ def _read(data: Any, source: str) -> Trajectory:
             raise FileError(source, f"points[{i}].positions: expected {count} angles, got {len(point.positions)}.")
         if i and point.time <= form.points[i - 1].time:
             raise FileError(source, f"points[{i}].time: expected more than {form.points[i - 1].time} s.")
+    times = np.array([p.time for p in form.points])
+    positions = np.array([p.positions for p in form.points]).reshape(len(form.points), count)
+    phases = [(p.phase, p.step) for p in form.points]
+    last = next((i for i, (phase, _) in enumerate(phases) if phase in AFTER_TOUCH), len(phases)) - 1
+    if last < 0:
+        raise FileError(source, f"points[0].phase: expected one up to the touch, got '{phases[0][0]}'.")
     return Trajectory(
         hand=form.hand,
         object=form.object,
         joints=tuple(form.joints),
-        times=np.array([p.time for p in form.points]),
-        positions=np.array([p.positions for p in form.points]).reshape(len(form.points), count),
+        times=times[: last + 1],
+        positions=positions[: last + 1],
         velocity_limits=np.array(form.velocity_limits),
-        pregrasp=next((i for i, point in enumerate(form.points) if point.phase == "pregrasp"), None),
+        pregrasp=next((i for i, (phase, _) in enumerate(phases) if phase == "pregrasp"), None),
+        after=phases_after(phases[last:], times[last:], positions[last:]),
+        speed=form.speed,
+        acceleration=form.acceleration,
     )

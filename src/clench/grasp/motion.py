@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -61,10 +61,10 @@ def alternatives(hand: Hand, finger: Finger, q: FloatArray, command: GraspComman
     return postures
 
 
-def next_postures(hand: Hand, command: GraspCommand) -> tuple[FloatArray, ...]:
+def next_postures(hand: Hand, steps: Sequence[Mapping[str, float]]) -> tuple[FloatArray, ...]:
     """Return the postures of the next steps of the work, NaN for joints that a step leaves alone, shape (J,) each."""
     postures = []
-    for step in command.next_steps:
+    for step in steps:
         q = np.full(len(hand.joints), np.nan)
         for name, angle in step.items():
             q[hand.joint_index(name)] = angle

@@ -47,7 +47,8 @@ class GraspCommand:
         collision_source: geometry of the hand; None is the hand's default.
         opposition_grid: offsets [rad] added to the thumb's first posture joint as alternatives.
         criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.
-        next_steps: postures [rad] by joint name that the hand goes to after the grasp, for the criteria about them.
+        next_steps: postures [rad] by joint name that the hand goes to after the grasp, one after another; joints that a
+            step does not name stay. For the criteria about them, and carried out.
         task_wrenches: what acts on the object in its task, `force` [N] and `torque` [Nm] in the world about the centre
             of mass, for the criterion about it; each is held alone.
         seed: recorded with the result; nothing random depends on it.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from numbers import Integral, Real
 from pathlib import Path
@@ -114,8 +114,7 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     _numbers(command.yaw_grid, "yaw_grid", "offsets in rad")
     _numbers(command.open_variants, "open_variants", "offsets in rad")
     _numbers(command.opposition_grid, "opposition_grid", "offsets in rad")
-    for i, step in enumerate(_steps(command.next_steps, "next_steps")):
-        _check_step(hand, step, f"next_steps[{i}]")
+    check_steps(hand, command.next_steps)
     if command.task_wrenches:
         _wrenches(command.task_wrenches, "task_wrenches")
     if command.collision_source is not None:
@@ -280,13 +279,19 @@ def _choice(value: Any, choices: type[Choice], key: str) -> Choice:
     return choices(value)
 
 
-def _check_step(hand: Hand, step: Mapping[str, float], key: str) -> None:
-    """Check that a hand has the joints of a step, and can take its angles; followers obey their leaders anyway."""
+def check_steps(hand: Hand, steps: Sequence[Mapping[str, float]]) -> None:
+    """Check that a hand has the joints of next steps, and can take their angles; followers obey their leaders anyway.
+
+    Raises:
+        UnknownNameError: a joint that the hand does not have.
+        CommandError: an angle outside the joint's limits, or a malformed value; the message names the key.
+    """
     followers = {coupling.follower for coupling in hand.couplings}
-    for name, angle in step.items():
-        joint = hand.joint_index(name)
-        if joint not in followers:
-            check_angle(hand, joint, angle, f"{key}.{name}")
+    for i, step in enumerate(_steps(steps, "next_steps")):
+        for name, angle in step.items():
+            joint = hand.joint_index(name)
+            if joint not in followers:
+                check_angle(hand, joint, angle, f"next_steps[{i}].{name}")
 
 
 def _steps(value: Any, key: str) -> tuple[dict[str, float], ...]:

@@ -111,6 +111,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         timing=dict(timing),
         speeds=dict(command.speeds),
         rounds=command.rounds,
+        next_steps=tuple({name: float(angle) for name, angle in step.items()} for step in command.next_steps),
         joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
     )
 

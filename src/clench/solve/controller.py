@@ -199,7 +199,7 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         problem.packed,
         problem.T_palm_object,
         problem.source,
-        next_postures(hand, problem.command),
+        next_postures(hand, problem.command.next_steps),
         weights if calibration.joints else None,
         problem.obj,
         problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),

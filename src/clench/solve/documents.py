@@ -101,6 +101,7 @@ class _SolutionForm(msgspec.Struct):
     choice: dict[str, Any] | None = None
     speeds: _Map = {}
     rounds: int = 1
+    next_steps: list[_Map] = []
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -125,6 +126,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "joint_limits": {name: [float(low), float(high)] for name, (low, high) in s.joint_limits.items()},
         "speeds": _numbers(s.speeds),
         "rounds": int(s.rounds),
+        "next_steps": [_numbers(step) for step in s.next_steps],
         "certified": bool(s.certified),
         "collision_source": str(s.collision_source),
         "object_collision_source": str(s.object_collision_source),
@@ -193,6 +195,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         timing=angles(form.timing, "timing"),
         speeds=angles(form.speeds, "speeds"),
         rounds=form.rounds,
+        next_steps=tuple(angles(step, f"next_steps[{i}]") for i, step in enumerate(form.next_steps)),
         joint_limits={
             name: _convert(v, tuple[float, float], source, f"joint_limits.{name}")
             for name, v in form.joint_limits.items()

@@ -155,6 +155,7 @@ class GraspSolution:
         max_penetration: over the whole width and all links [m], None when not computed.
         speeds: how fast free joints closed relative to each other in an order where all move at once; 1 if not named.
         rounds: how often the joints were gone through, 0 for until rest.
+        next_steps: postures [rad] by joint name that the hand goes to after the grasp, as commanded.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
 
@@ -187,6 +188,7 @@ class GraspSolution:
     joint_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     speeds: Mapping[str, float] = field(default_factory=dict)
     rounds: int = 1
+    next_steps: tuple[Mapping[str, float], ...] = ()
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""

@@ -149,11 +149,13 @@ def _of_best(trials: Sequence[Trial]) -> dict[str, Value]:
         return values
     spreads = [t.report.touch_spread for t in trials if t.report.touch_spread is not None]
     measures = [t.measures for t in trials]
+    closed = [t.report.closed for t in trials if t.report.closed is not None]
+    squeezed = [t.report.squeezed for t in trials if t.report.squeezed is not None]
     return values | {
         "simultaneous": sum(t.simultaneous for t in trials),
-        **_numbers("closing_motion", [t.report.closed.distance * 1e3 for t in trials], "mm"),
-        **_numbers("closing_turn", [np.rad2deg(t.report.closed.angle) for t in trials], "deg"),
-        **_numbers("squeeze_motion", [t.report.squeezed.distance * 1e3 for t in trials], "mm"),
+        **_numbers("closing_motion", [motion.distance * 1e3 for motion in closed], "mm"),
+        **_numbers("closing_turn", [np.rad2deg(motion.angle) for motion in closed], "deg"),
+        **_numbers("squeeze_motion", [motion.distance * 1e3 for motion in squeezed], "mm"),
         **_numbers("touch_spread", [spread * 1e3 for spread in spreads], "ms"),
         "penetration_max_um": max(s.penetration for s in measures) * 1e6,
         "self_penetration_max_um": max(s.self_penetration for s in measures) * 1e6,

@@ -67,7 +67,7 @@ class Trial:
         limits = self.report.settings.max_distance, self.report.settings.max_angle
         if self.report.held:
             return "held"
-        if not self.report.pulls:
+        if self.report.closed is None or self.report.squeezed is None:
             return "hand_in_the_table" if "table" in self.report.reason else "unstable"
         if not self.report.closed.within(*limits):
             return "pushed_away_while_closing"

@@ -22,6 +22,7 @@ def execute(
     scale: float = 1.0,
     speed: float = 1.0,
     force: bool = False,
+    no_next_steps: bool = False,
     hold: bool = False,
     lift: bool = False,
     mass: float | None = None,
@@ -55,6 +56,7 @@ def execute(
         scale: that was used to load the object.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, too.
+        no_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
         hold: simulated: close on the free object, squeeze it as planned, pull it in six directions.
         lift: simulated: close on the object where it stands on a table, squeeze it as planned, lift it.
         mass: hold, lift: of the object, kg (0.1).
@@ -66,7 +68,7 @@ def execute(
         joint_map: ros2, orca: TOML file with the controller's joint names, units, offsets and limits.
         config: orca: the hand's config.yaml.
         video: simulated: file for a moving picture (.gif, or .mp4 with clench[video]).
-        stills: simulated: folder for pictures of the start, the touch, the squeeze and the end (PNG).
+        stills: simulated: folder for pictures of the start, the touch, the squeeze, the end and next steps (PNG).
         squeeze: ros2, orca: share of the squeeze plan's angle offsets that is told beyond the touch (1).
         timeout: seconds to look for the controller.
         to: signal: file:PATH, tcp:HOST:PORT, unix:PATH or topic:NAME.
@@ -100,7 +102,7 @@ def execute(
     )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
-        report = clench.execute(the_solution, moved, speed=speed, force=force)
+        report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not no_next_steps)
     if film is not None:
         film.finish()
     if log is not None and report.history is None:

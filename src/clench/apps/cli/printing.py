@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from clench.execution.hold import HoldReport
-    from clench.execution.report import ExecutionReport
+    from clench.execution.report import ExecutionReport, NextStepReached
     from clench.models.hand.report import HandReport
     from clench.solve.pareto import HandSets
     from clench.solve.pose_error import PoseErrorReport
@@ -135,7 +135,7 @@ def print_report(report: ExecutionReport) -> None:
     console = _console()
     good, bad = ("reached", "not reached") if report.joints else ("done", "failed")
     if report.hold is not None:
-        good, bad = "held", "dropped"
+        good, bad = "held", "not reached" if report.hold.held else "dropped" if report.hold.pulls else "not tested"
     verdict = f"[bold green]{good}[/bold green]" if report.success else f"[bold red]{bad}[/bold red]"
     console.print(f"{verdict}: {_plain(report.reason)}")
     if report.joints:
@@ -154,6 +154,8 @@ def print_report(report: ExecutionReport) -> None:
         console.print(f"first touch: {_plain(times)}")
     if report.hold is not None:
         _print_hold(console, report.hold)
+    if report.next_steps:
+        _print_steps(console, report.next_steps)
     _sentences(console, "note", report.notes)
 
 
@@ -166,6 +168,8 @@ def _print_hold(console: Console, hold: HoldReport) -> None:
         f"dropped from {_millimetres(asked.max_distance)} mm or {np.rad2deg(asked.max_angle):.3g}° on"
     )
     console.print(f"plan: {_plain(hold.plan)}")
+    if hold.closed is None or hold.squeezed is None:
+        return
     table = _table("free object", "after", "held", "moved [mm]", "turned [deg]")
     for step, motion in (("closing", hold.closed), ("squeeze alone", hold.squeezed)):
         table.add_row(step, "", _millimetres(motion.distance), f"{np.rad2deg(motion.angle):.2f}")
@@ -175,6 +179,18 @@ def _print_hold(console: Console, hold: HoldReport) -> None:
     console.print(table)
     if hold.touch_spread is not None:
         console.print(f"fingers touched the free object within {hold.touch_spread * 1e3:.0f} ms")
+
+
+def _print_steps(console: Console, steps: Sequence[NextStepReached]) -> None:
+    known = {None: "", True: "yes", False: "no"}
+    table = _table("next steps", "step", "reached", "largest error [deg]", "touching", "held", "object moved [mm]")
+    for number, step in enumerate(steps, start=1):
+        error = max((abs(joint.error) for joint in step.joints.values()), default=0.0)
+        touching = "" if step.touching is None else ", ".join(step.touching) or "none"
+        moved = "" if step.motion is None else _millimetres(step.motion.distance)
+        row = (str(number), known[step.reached], f"{np.rad2deg(error):.3f}", touching, known[step.held], moved)
+        table.add_row(*map(_plain, row))
+    console.print(table)
 
 
 def print_choice(solution: GraspSolution) -> None:

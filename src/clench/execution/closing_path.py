@@ -1,0 +1,52 @@
+"""Paths in joint space on which joints move at given speeds and couplings are obeyed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+
+#: Places of a path that differ by less than this share of its length are one [-].
+ROUNDING: Final = 1e-12
+#: Joints that move less than this stand still [rad].
+STILL: Final = 1e-9
+
+
+def closing_path(
+    hand: Hand, joints: Sequence[int], start: FloatArray, end: FloatArray, speed: FloatArray, steps: int
+) -> FloatArray:
+    """Return way-points on which joints move at their speeds, each until its end, shape (n, J); the others rest.
+
+    Followers are where their couplings have them, between their own start and end: one at its limit waits, and one
+    that breaks away goes on with the actuator while its leader is held, or is held while its leader goes on. Every
+    place at which a joint starts or stops is a way-point; between two of them the path is a straight line.
+    """
+    away = end - start
+    closing = np.array([j.direction for j in hand.joints], dtype=np.float64)
+    rate = np.where(np.abs(away) > STILL, np.sign(away), closing) * speed
+    free = start.copy()
+    for c in hand.couplings:
+        rate[c.follower] = c.ratio * rate[c.leader]
+        free[c.follower] = c.ratio * start[c.leader] + c.offset
+    moves = np.isin(np.arange(len(start)), joints) & (away != 0.0) & (rate != 0.0)
+    events = np.array([start - free, end - free])[:, moves] / rate[moves]
+    last = float(events.max(initial=0.0))
+    if last <= 0.0:
+        return start[None].copy()
+    s = np.linspace(0.0, 1.0, steps + 1)
+    places = distinct(np.concatenate([np.clip(events.ravel(), 0.0, last), last * s * s * (3.0 - 2.0 * s)]))
+    between = np.clip(free + places[:, None] * rate, np.minimum(start, end), np.maximum(start, end))
+    path: FloatArray = np.where(moves, between, start)
+    path[0], path[-1] = start, np.where(moves, end, start)
+    return path
+
+
+def distinct(values: FloatArray) -> FloatArray:
+    """Return values in order, from 0 on; of those that differ by rounding alone, the first."""
+    ordered = np.unique(values)
+    distinct: FloatArray = ordered[np.diff(ordered, prepend=-np.inf) > ROUNDING * ordered[-1]]
+    return distinct

@@ -1,0 +1,123 @@
+"""The next steps of a driven hand: planned and checked before anything moves, followed after the squeeze."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.solve.solution import GraspSolution
+
+from .command_check import CommandCheck, slowed_down
+from .driver import HandDriver, JointPath, RefusedCommandError
+from .following import CLOSEST, PERIOD, Followed, Follower, TimedPlan
+from .joint_map import MappedJoint
+from .next_steps import Phase, moved_joints, plan_next_steps
+from .report import JointReached, NextStepReached, step_sentence
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenStep:
+    """Hold a next step as a controller is told it.
+
+    Args:
+        number: its index. targets: of the joints that it moves and the controller knows [rad]. plan: the way there.
+    """
+
+    number: int
+    targets: Mapping[str, float]
+    plan: TimedPlan
+
+
+def plan_driven_steps(
+    solution: GraspSolution,
+    hand: Hand,
+    told: FloatArray,
+    pace: tuple[FloatArray, FloatArray],
+    mapped: Mapping[str, MappedJoint],
+    check: CommandCheck,
+) -> tuple[DrivenStep, ...]:
+    """Plan the way to every next step, and check it as it would be sent.
+
+    Args:
+        solution: with `next_steps`. hand: the model.
+        told: where the joints are told to be before the first step [rad], shape (J,).
+        pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
+        mapped: the joints as the controller says them. check: what every command must pass.
+
+    Raises:
+        RefusedCommandError: a step that may not be sent; the message says which, and why.
+    """
+    steps = []
+    for phase in plan_next_steps(solution, hand, told, pace):
+        plan = _timed(phase, hand, mapped, check)
+        assert phase.step is not None
+        whole = JointPath(plan.joints, plan.times[-1:], plan.positions[-1:], PERIOD)
+        try:
+            check.command(whole, plan.at(0.0))  # first, so that a refusal names the angle that the step asks for
+            check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
+        except RefusedCommandError as error:
+            raise RefusedCommandError(f"Next step {phase.step + 1}: {error}") from None
+        names = [hand.joint_names[j] for j in moved_joints(hand, solution.next_steps[phase.step])]
+        targets = {name: float(phase.positions[-1, hand.joint_index(name)]) for name in names if name in mapped}
+        steps.append(DrivenStep(phase.step, targets, plan))
+    return tuple(steps)
+
+
+def go_to_steps(
+    steps: Sequence[DrivenStep],
+    driver: HandDriver,
+    mapped: Mapping[str, MappedJoint],
+    check: CommandCheck,
+    stopping: threading.Event,
+    settling: float,
+    tolerance: float,
+) -> list[tuple[NextStepReached, Followed]]:
+    """Follow the steps one after another, up to the first that is not reached.
+
+    Args:
+        steps: planned. driver: connected. mapped: the joints as the controller says them.
+        check: what every command and state must pass. stopping: set to stop from elsewhere.
+        settling: how long the hand may take to arrive [s]. tolerance: what counts as reached [rad].
+    """
+    found: list[tuple[NextStepReached, Followed]] = []
+    for step in steps:
+        # Joints that go on pressing on the object stay behind.
+        arrived = {
+            joint.name: 0.2 * tolerance * abs(joint.scale) if name in step.targets else np.inf
+            for name, joint in mapped.items()
+        }
+        followed = Follower(driver, check, stopping, settling, arrived).follow(step.plan)
+        found.append((_reached(step, followed, mapped, tolerance), followed))
+        if not found[-1][0].reached:
+            break
+    return found
+
+
+def _reached(
+    step: DrivenStep, followed: Followed, mapped: Mapping[str, MappedJoint], tolerance: float
+) -> NextStepReached:
+    last = followed.measured[-1] if followed.measured else {}
+    joints = {
+        name: JointReached(target, mapped[name].to_angle(last[mapped[name].name]))
+        for name, target in step.targets.items()
+        if mapped[name].name in last
+    }
+    if followed.trouble is not None:
+        return NextStepReached(joints, False, f"On the way to next step {step.number + 1}: {followed.ending()}")
+    return NextStepReached(joints, *step_sentence(step.number, joints, tolerance))
+
+
+def _timed(phase: Phase, hand: Hand, mapped: Mapping[str, MappedJoint], check: CommandCheck) -> TimedPlan:
+    """Return a phase in the controller's names and units, no faster than it may be."""
+    joints = tuple(joint.name for joint in mapped.values())
+    columns = [[joint.to_controller(q) for q in phase.positions[:, hand.joint_index(n)]] for n, joint in mapped.items()]
+    positions = np.array(columns, dtype=np.float64).T
+    if not phase.duration > 0.0:  # nothing moves
+        return TimedPlan(joints, np.array([0.0, PERIOD]), np.repeat(positions[:1], 2, axis=0))
+    speeds = np.array([check.limits[name].velocity for name in joints])
+    return TimedPlan(joints, slowed_down(phase.times, positions, speeds), positions).thinned()
