@@ -127,7 +127,7 @@ def test_the_stop_watches_are_taken_off() -> None:
     import clench.kernels.closing as closing
 
     kernel = closing.close_items
-    with solving._listening():
+    with solving.listening():
         assert closing.close_items is not kernel
     assert closing.close_items is kernel
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from clench.base.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.solve.batch_progress import shown
 from clench.solve.grasp_batch import GraspBatch
 from clench.solve.solution import GraspSolution
 
@@ -68,7 +69,7 @@ def bench_batch(
         for name, command in kinds.items():
             for threads in sorted({1, cores}):
                 _time(report, f"{name}_{threads}_threads", hand, obj, poses, command, threads, passes)
-        _stream(report, hand, obj, poses, kinds["planes"], stream)
+        stream_memory(report, hand, obj, poses, kinds["planes"], stream)
     return report
 
 
@@ -118,13 +119,15 @@ def _time(
     report.values[f"{key}_processor_ms"] = float(np.median(processor)) / len(poses) * 1e3
 
 
-def _stream(
+def stream_memory(
     report: BenchReport, hand: Hand, obj: GraspObject, poses: Sequence[Pose], command: GraspCommand, count: int
 ) -> None:
     """Add how much memory a stream takes in its first half, and how much more in its second."""
     endless = itertools.islice(itertools.cycle(poses), count)
     seen: list[int] = []
-    _, seconds = timed(lambda: seen.extend(_memories(clench.solve_stream(hand, obj, endless, command, chunk=CHUNK))))
+    with shown(count, None) as advance:
+        stream = clench.solve_stream(hand, obj, endless, command, chunk=CHUNK)
+        _, seconds = timed(lambda: seen.extend(_memories(stream, advance)))
     report.values |= {"stream_poses": count, "stream_per_s": count / seconds}
     if not seen:
         return
@@ -135,9 +138,10 @@ def _stream(
         report.errors.append(f"a stream of {count} poses grew by {growth:.1f} MB in its second half.")
 
 
-def _memories(batches: Iterator[GraspBatch]) -> Iterator[int]:
+def _memories(batches: Iterator[GraspBatch], advance: Callable[[int], None]) -> Iterator[int]:
     """Yield the memory of this process after every batch [B]; nothing where the system does not tell."""
-    for _ in batches:
+    for batch in batches:
+        advance(len(batch.status))
         now = _resident()
         if now is not None:
             yield now

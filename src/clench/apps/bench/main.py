@@ -135,6 +135,45 @@ def peers(
     return _print(bench_peers(hand, object, scale, asked, plot, table), json)
 
 
+def scaling(
+    *,
+    hand: str = "robonaut2",
+    object: str = "ellipsoid:a=0.03,b=0.035,c=0.05",
+    scale: float = 1.0,
+    poses: int = 10,
+    passes: int = 3,
+    triangles: int = 1_300_000,
+    batch: int = 1024,
+    stream: int = 2000,
+    seed: int = 0,
+    plot: Path | None = None,
+    table: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Time a solve against triangles, planes, fingers, threads and poses at once; memory of a fine mesh and a stream.
+
+    Args:
+        hand: built-in name, or path to a .urdf or .xml file.
+        object: built-in name, path to a mesh, or a shape; its triangles are parted into four again and again.
+        scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        poses: how many approach poses are solved at every place.
+        passes: how often each is timed; the quickest counts.
+        triangles: of the finest mesh, at most.
+        batch: poses at once, at most.
+        stream: how many poses are streamed.
+        seed: of the approach poses.
+        plot: file (PNG) for a picture of every axis.
+        table: file for a table of every axis (Markdown).
+        json: print one JSON document on standard output.
+    """
+    from .scaling import ScalingBench, bench_scaling
+
+    _at_least(1, poses=poses, passes=passes, triangles=triangles, batch=batch, stream=stream)
+    _writable(plot, table)
+    asked = ScalingBench(poses, passes, triangles, batch, stream, seed, show_progress=not json)
+    return _print(bench_scaling(hand, object, scale, asked, plot, table), json)
+
+
 def choose(
     *,
     hand: str = "patent15",
@@ -240,6 +279,7 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "steadiness": steadiness,
     "hold": hold,
     "peers": peers,
+    "scaling": scaling,
 }
 
 

@@ -148,7 +148,7 @@ def _time_solves(
 def _time_kernels(
     report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
 ) -> None:
-    with _listening() as spent:
+    with listening() as spent:
         for command in [command for _ in range(passes) for command in commands]:
             clench.solve(hand, obj, command)
     for part, times in spent.items():
@@ -156,7 +156,7 @@ def _time_kernels(
 
 
 @contextmanager
-def _listening() -> Iterator[dict[str, list[float]]]:
+def listening() -> Iterator[dict[str, list[float]]]:
     """Put a stop watch around every kernel that stage `close` calls; the lists fill while the context lasts."""
     import importlib
 
