@@ -13,6 +13,7 @@ from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
 
 from .report import ExecutionReport
+from .step_check import step_overlap
 from .trajectory import Trajectory, plan_trajectory
 
 
@@ -40,13 +41,14 @@ def execute(
 ) -> ExecutionReport:
     """Carry out a solution: open, close along the computed path, all fingers arriving together; go to its next steps.
 
-    A solution that is not valid is not carried out; the report says why.
+    A solution that is not valid, or whose next steps drive links into each other, is not carried out; the report says
+    why.
 
     Args:
         solution: what to carry out.
         actuator: what moves the hand, e.g. `SimulatedHand`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry it out although it is not valid.
+        force: carry it out all the same.
         next_steps: carry out its next steps, too, after the touch and the squeeze.
 
     Raises:
@@ -64,6 +66,10 @@ def execute(
         found = solution.violations()
         why = found[0] if found else f"its status is '{solution.status.value}'"
         return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {why.rstrip('.')}.")
+    if not force:
+        driven = step_overlap(actuator.hand, trajectory.after, CollisionSource(solution.collision_source))
+        if driven is not None:
+            return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {driven}")
     return actuator.carry_out(solution, trajectory)
 
 

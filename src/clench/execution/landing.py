@@ -150,19 +150,23 @@ def is_clear(
 
     packed = pack_object(obj)
     T = invert(solution.hand_pose.matrix) @ solution.object_pose.matrix
-    for q in _looks(hand, path):
+    for q in looks(hand, path):
         for found in hand_depths(hand, q, packed, T, source):
             if found.depth > max(ALLOWED_PENETRATION, hand.links[found.link].pad_indentation):
                 return False
     return True
 
 
-def _looks(hand: Hand, path: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return postures of a path between which no link moves far, both ends included."""
+def looks(hand: Hand, path: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return postures of a path between which no link moves far, both ends included.
+
+    Args:
+        hand: the hand. path: way-points between which joints move on straight lines [rad], each shape (J,).
+    """
     from clench.grasp.depths import link_meshes
 
     reach = {mesh.link: mesh.radius + float(np.linalg.norm(mesh.center)) for mesh in link_meshes(hand)}
-    looks = [path[0]]
+    found = [path[0]]
     for a, b in pairwise(path):
         Ta, Tb = hand.link_poses(a), hand.link_poses(b)
         moved = max(
@@ -173,5 +177,5 @@ def _looks(hand: Hand, path: Sequence[FloatArray]) -> list[FloatArray]:
             default=0.0,
         )
         count = max(1, min(_MOST_LOOKS, int(np.ceil(moved / _LOOK))))
-        looks += [a + (k / count) * (b - a) for k in range(1, count + 1)]
-    return looks
+        found += [a + (k / count) * (b - a) for k in range(1, count + 1)]
+    return found

@@ -39,14 +39,18 @@ def open_overlaps(hand: Hand, source: CollisionSource) -> list[tuple[int, int, f
     for a, b in itertools.combinations(link_meshes(hand, source), 2):
         if (a.link, b.link) in adjacent:
             continue
-        depth = _depth(a, b, poses)
+        depth = overlap_depth(a, b, poses)
         if depth > ALLOWED_PENETRATION:
             found.append((a.link, b.link, depth))
     return found
 
 
-def _depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
-    """Return how deep two links overlap [m], 0 when they do not."""
+def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
+    """Return how deep two links overlap [m], 0 when they do not.
+
+    Args:
+        a, b: the links. poses: of all links in the palm frame, shape (L, 4, 4).
+    """
     from clench.kernels.depth import CROSSINGS, penetration
     from clench.kernels.tree import STACK_SIZE
 

@@ -55,7 +55,7 @@ def execute(
         palm: palm link that was used to load the hand.
         scale: that was used to load the object.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry out a solution that has violations, too.
+        force: carry out a solution that has violations, or next steps that drive links into each other, too.
         no_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
         hold: simulated: close on the free object, squeeze it as planned, pull it in six directions.
         lift: simulated: close on the object where it stands on a table, squeeze it as planned, lift it.
