@@ -126,7 +126,7 @@ def test_it_prints_times_gaps_and_a_picture(capsys: pytest.CaptureFixture[str], 
         assert document[f"ball_{name}_least_ms"] <= document[f"ball_{name}_median_ms"]
     assert picture.read_bytes().startswith(b"\x89PNG")
     lines = table.read_text(encoding="utf-8").splitlines()
-    assert len(lines) == 2 + 6
+    assert len(lines) == 2 + 8
     assert len({line.count("|") for line in lines}) == 1
 
 

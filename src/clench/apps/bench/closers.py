@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Final, NamedTuple
 
@@ -15,6 +15,7 @@ from clench.grasp.scene import PackedObject, pack_object
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.solve.grasp_batch import GraspBatch
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
@@ -95,6 +96,11 @@ class PeerCase:
     def solve(self, full_width: bool, k: int) -> GraspSolution:
         """Return our own solve."""
         return clench.solve(self.hand, self.obj, self.command(k, full_width))
+
+    def solve_all(self, full_width: bool) -> GraspBatch:
+        """Return our own solves of all poses at once, on one thread."""
+        command = replace(self.command(0, full_width), hand_pose=Pose.identity())
+        return clench.solve_batch(self.hand, self.obj, self.poses, command, threads=1, progress=False)
 
     def step(self, rule: Rule, k: int) -> Closing:
         """Return a closing in steps."""

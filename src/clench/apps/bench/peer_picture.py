@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.apps.figures.style import CHOSEN, CONTACT, FAINT, INK, JOINT_COLORS, new_figure, save_figure
+from clench.apps.figures.style import CHOSEN, CONTACT, FAINT, INK, JOINT_COLORS, PAPER, new_figure, save_figure
 
 from .peer_sweep import FACTORS, Misses, Swept
 from .report import Value
@@ -22,6 +22,8 @@ _LABELS: Final = {
     "openrave_like": "OpenRAVE-like steps",
     "clench_planes": "clench, planes only",
     "clench_certified": "clench, certified",
+    "clench_planes_batch": "clench, planes only, in a batch",
+    "clench_certified_batch": "clench, certified, in a batch",
     "mujoco": "MuJoCo, until at rest",
 }
 _COLORS: Final = {
@@ -30,6 +32,8 @@ _COLORS: Final = {
     "openrave_like": JOINT_COLORS[2],
     "clench_planes": CONTACT,
     "clench_certified": CHOSEN,
+    "clench_planes_batch": CONTACT,
+    "clench_certified_batch": CHOSEN,
     "mujoco": INK,
 }
 
@@ -55,7 +59,8 @@ def _draw_cost(axes: Any, swept: Swept) -> None:
         look = {"color": _COLORS[name], "label": label}
         if len(x) == 1:
             star = name != "mujoco"
-            axes.plot(x, y, "*" if star else "s", markersize=17 if star else 8, **look)
+            face = PAPER if name.endswith("_batch") else _COLORS[name]
+            axes.plot(x, y, "*" if star else "s", markersize=17 if star else 8, markerfacecolor=face, **look)
             continue
         axes.plot(x, y, "-o", markersize=4, **look)
         _ring(axes, x, y, name)
@@ -75,8 +80,12 @@ def _draw_misses(axes: Any, misses: Misses) -> None:
         shares = 100.0 * np.array(misses.shares[rule.name])
         axes.plot(steps, shares, "-o", markersize=4, color=_COLORS[rule.name])
         _ring(axes, steps, shares, rule.name)
-    axes.axhline(0.0, color=_COLORS["clench_certified"], linewidth=2)
-    axes.text(0.02, 0.05, "clench, certified: has no step", color=CHOSEN, fontsize=9, transform=axes.transAxes)
+    for name, label in (("clench_certified", "clench, certified"), ("clench_planes", "clench, planes only")):
+        share = 100.0 * int(misses.values[f"{name}_missed"]) / max(int(misses.values[f"{name}_touches"]), 1)
+        axes.axhline(
+            share, color=_COLORS[name], linewidth=1.5, linestyle="--", label=f"{label}: {share:.0f} %, no step"
+        )
+    axes.legend(fontsize=9, frameon=False, loc="upper left")
     axes.set(xscale="log", xlabel="step of a joint [rad]", ylabel="touches stepped through [%]")
     axes.set_title("1 mm fingers on a 0.1 mm blade", fontsize=11, color=INK)
     axes.grid(True, which="major", color="#e8e8e8", linewidth=0.8)
@@ -88,10 +97,10 @@ def _ring(axes: Any, x: Any, y: Any, name: str) -> None:
 
 
 def peer_table(values: Mapping[str, Value], objects: Sequence[str]) -> str:
-    """Return what was measured per object as a table (Markdown)."""
+    """Return what was measured per object as a table (Markdown); ratios are by the clock, and by processor time."""
     heads = (
         "object", "closing", "ms", "CPU ms", "queries", "µs/query", "fcl µs/query", "gap left, mm: median / 90 % / max",
-        "overlap max, mm", "times ours, planes", "times ours, certified",
+        "overlap, max mm", "theirs / planes", "theirs / certified",
     )  # fmt: skip
     lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
     for key in objects:
@@ -103,11 +112,14 @@ def peer_table(values: Mapping[str, Value], objects: Sequence[str]) -> str:
 def _row(values: Mapping[str, Value], key: str, label: str) -> Iterator[str]:
     def number(name: str) -> str:
         value = values.get(f"{key}_{name}")
-        return "" if value is None else f"{value:.2g}" if isinstance(value, float) and value < 100 else f"{value:.0f}"
+        if not isinstance(value, float):
+            return "" if value is None else str(value)
+        return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
 
     yield label
     for name in ("median_ms", "processor_ms", "queries", "query_us", "fcl_query_us"):
         yield number(name)
-    yield " / ".join(number(f"residual_{part}_mm") for part in ("median", "p90", "max"))
-    for name in ("penetration_max_mm", "over_clench_planes", "over_clench_certified"):
-        yield number(name)
+    yield " / ".join(filter(None, (number(f"residual_{part}_mm") for part in ("median", "p90", "max"))))
+    yield number("penetration_max_mm")
+    for ours in ("clench_planes", "clench_certified"):
+        yield " / ".join(filter(None, (number(f"over_{ours}"), number(f"over_{ours}_processor"))))

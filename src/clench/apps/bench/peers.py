@@ -14,8 +14,6 @@ from typing import Final
 import numpy as np
 
 import clench
-from clench.base.pose import Pose
-from clench.models.command import GraspCommand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solve.batch_progress import shown
 
@@ -113,7 +111,7 @@ def _compare(report: BenchReport, key: str, case: PeerCase, asked: PeerBench, ad
         report.values[f"{key}_{name}_processor_ms"] = float(np.median(processor[name])) * 1e3
     for rule in RULES:
         _report_queries(report, f"{key}_{rule.name}", case, rule.number)
-    _report_ratios(report, key, wall)
+    _report_ratios(report, key, wall, processor)
 
 
 def _report_ends(report: BenchReport, key: str, case: PeerCase, ends: Sequence[Ended]) -> None:
@@ -140,7 +138,7 @@ def _time_in_turn(
     wall: dict[str, list[float]] = defaultdict(list)
     processor: dict[str, list[float]] = defaultdict(list)
     count = len(case.poses)
-    batches = [(f"{name}_batch", _batch_of(case, full)) for name, full in OURS.items()]
+    batches = [(f"{name}_batch", partial(case.solve_all, full)) for name, full in OURS.items()]
     for _, solve in batches:
         solve()
     for _ in range(passes):
@@ -156,11 +154,6 @@ def _time_in_turn(
             processor[name].append((time.process_time() - before) / count)
         advance(1)
     return wall, processor
-
-
-def _batch_of(case: PeerCase, full_width: bool) -> Callable[[], object]:
-    command = GraspCommand(hand_pose=Pose.identity(), planes=case.planes, full_width=full_width, measure=False)
-    return lambda: clench.solve_batch(case.hand, case.obj, case.poses, command, threads=1, progress=False)
 
 
 def _report_queries(report: BenchReport, key: str, case: PeerCase, rule: int) -> None:
@@ -183,7 +176,9 @@ def _report_queries(report: BenchReport, key: str, case: PeerCase, rule: int) ->
     }
 
 
-def _report_ratios(report: BenchReport, key: str, wall: Mapping[str, list[float]]) -> None:
+def _report_ratios(
+    report: BenchReport, key: str, wall: Mapping[str, list[float]], processor: Mapping[str, list[float]]
+) -> None:
     """Add how many times longer peers take than we do: the median over passes, in each of which all take turns.
 
     A stepper counts with the least of what it took and what python-fcl takes for its collision queries alone, without
@@ -191,10 +186,11 @@ def _report_ratios(report: BenchReport, key: str, wall: Mapping[str, list[float]
     """
     for peer in [rule.name for rule in RULES] + ([SIMULATED] if SIMULATED in wall else []):
         bare = float(report.values.get(f"{key}_{peer}_fcl_bare_ms", np.inf)) * 1e-3
-        least = np.minimum(wall[peer], bare)
-        report.values[f"{key}_{peer}_least_ms"] = float(np.median(least)) * 1e3
-        for ours in (name for name in wall if name.removesuffix("_batch") in OURS):
-            report.values[f"{key}_{peer}_over_{ours}"] = float(np.median(least / np.array(wall[ours])))
+        for clock, times in (("", wall), ("_processor", processor)):
+            least = np.minimum(times[peer], bare)
+            report.values[f"{key}_{peer}_least{clock}_ms"] = float(np.median(least)) * 1e3
+            for ours in (name for name in times if name.removesuffix("_batch") in OURS):
+                report.values[f"{key}_{peer}_over_{ours}{clock}"] = float(np.median(least / np.array(times[ours])))
 
 
 def _report_sweep(report: BenchReport, swept: Swept) -> None:
