@@ -10,7 +10,7 @@ import sys
 import time
 import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +181,25 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
     for column in range(2):
         near = np.abs(measured[:, column, None] - samples[None, :, 1 + column]).min(axis=1)
         assert near.max() < 0.03
+
+
+@pytest.mark.parametrize("theirs", RCLPY_FIRST)
+def test_squeeze_and_next_steps_are_received_followed_and_reported(world: World, theirs: str) -> None:
+    squeeze = {"feasible": True, "text": "Holds.", "offsets": {"thumb": 0.05, "index": 0.03}}
+    world.solution = replace(world.solution, squeeze=squeeze, next_steps=({"thumb": 0.05},))
+    node = world.node(theirs)
+    report = world.report(world.drive("cyclonedds" if installed("cyclonedds") else "rclpy", 0.5))
+    log = world.log(node)
+    assert report["success"], report["reason"]
+    assert log["refused"] == []
+    samples = np.array(log["samples"])[:, 1:]
+    thumb, index = targets(world.solution)
+    assert samples[:, 0].max() == pytest.approx(thumb + 0.05, abs=0.01)
+    np.testing.assert_allclose(samples[-1], [0.05, index + 0.03], atol=1e-6)
+    (step,) = report["next_steps"]
+    assert step["reached"]
+    assert step["joints"]["thumb"]["reached"] == pytest.approx(0.05, abs=0.01)
+    np.testing.assert_allclose(report["history"]["measured"][-1], samples[-1], atol=0.02)
 
 
 @pytest.mark.parametrize("theirs", RCLPY_FIRST)
