@@ -59,7 +59,8 @@ def _draw(place: Any, axis: Axis) -> None:
     place.grid(True, which="major", color="#e8e8e8", linewidth=0.8)
     place.spines[["top", "right"]].set_visible(False)
     low, high = place.get_ylim()
-    place.set_ylim(low, high * (high / low) ** 0.6)
+    room = 0.03 + 0.065 * len(place.get_lines())
+    place.set_ylim(low, low * (high / low) ** (1.0 / (1.0 - room)))
     place.legend(fontsize=7.5, frameon=False, loc="upper left")
 
 
