@@ -30,6 +30,8 @@ from .solving import listening
 
 PLANES: Final = (1, 2, 3, 5, 9, 17, 33)
 BATCHES: Final = (1, 4, 16, 64, 256, 1024)
+#: Poses that threads share, at most.
+AT_ONCE: Final = 64
 #: Triangles of the coarsest mesh, about.
 COARSEST: Final = 1000
 #: What counts as the same angle for other triangles of the same surface [rad].
@@ -93,8 +95,9 @@ def bench_scaling(
     work = len(meshes) + len(PLANES) + len(hand.fingers) + _cores() + len(batches)
     with shown(work, None if asked.show_progress else False) as advance:
         bench = _Bench(hand, obj, poses, asked.passes, report, partial(advance, 1))
-        axes = [bench.triangles(meshes), bench.planes(), bench.fingers(), bench.threads()]
-        axes.append(bench.batch(batches, asked.seed))
+        many = clench.approach_poses(hand, obj, max(batches), asked.seed)
+        axes = [bench.triangles(meshes), bench.planes(), bench.fingers(), bench.threads(many)]
+        axes.append(bench.batch(many, batches))
     report.values["answers_right"] = not report.errors
     if report.errors:
         return report
@@ -182,14 +185,13 @@ class _Bench:
             self.advance()
         return axis
 
-    def threads(self) -> Axis:
-        """Solve all poses at once with more and more threads, to the bit as with one."""
-        return self._batches("threads", [(n, self.poses, n) for n in range(1, _cores() + 1)])
+    def threads(self, many: Sequence[Pose]) -> Axis:
+        """Solve poses at once with more and more threads, to the bit as alone."""
+        return self._batches("threads", [(n, many[:AT_ONCE], n) for n in range(1, _cores() + 1)])
 
-    def batch(self, counts: Sequence[int], seed: int) -> Axis:
-        """Solve more and more poses at once on one core, to the bit as fewer."""
-        poses = clench.approach_poses(self.hand, self.obj, max(counts), seed)
-        return self._batches("batch", [(count, poses[:count], 1) for count in counts])
+    def batch(self, many: Sequence[Pose], counts: Sequence[int]) -> Axis:
+        """Solve more and more poses at once on one core, to the bit as alone."""
+        return self._batches("batch", [(count, many[:count], 1) for count in counts])
 
     def _batches(self, name: str, rows: Sequence[tuple[int, Sequence[Pose], int]]) -> Axis:
         axis = Axis(name)
