@@ -143,6 +143,9 @@ def test_bad_options_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
         main(["peers", "--poses", "0"])
     with pytest.raises(FileError, match="no folder"):
         main([*SMALL, "--plot", str(tmp_path / "missing" / "a.png")])
+    for option in ("--plot", "--table"):
+        with pytest.raises(FileError, match="it is a folder"):
+            main([*SMALL, option, str(tmp_path)])
     monkeypatch.setitem(sys.modules, "fcl", None)
     with pytest.raises(CommandError, match=r"pip install 'clench\[bench\]'"):
         main(SMALL)

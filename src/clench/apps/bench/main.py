@@ -293,6 +293,8 @@ def _writable(*files: Path | None) -> None:
     for file in files:
         if file is not None and not file.parent.is_dir():
             raise FileError(file, f"cannot be written (no folder '{file.parent}').")
+        if file is not None and file.is_dir():
+            raise FileError(file, "cannot be written (it is a folder).")
 
 
 def _print(report: BenchReport, json: bool) -> int:

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 import clench
+from clench.base.json_files import write_atomically
 from clench.models.objects.grasp_object import GraspObject
 from clench.solve.batch_progress import shown
 
@@ -88,7 +89,7 @@ def bench_peers(
         draw_peers(swept, misses, plot)
         report.values["plot"] = str(plot)
     if table is not None:
-        table.write_text(peer_table(report.values, list(cases)), encoding="utf-8")
+        write_atomically(table, peer_table(report.values, list(cases)).encode())
         report.values["table"] = str(table)
     return report
 

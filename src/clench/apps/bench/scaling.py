@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 import clench
+from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.scene import pack_object
 from clench.models.command import GraspCommand
@@ -110,7 +111,7 @@ def bench_scaling(
     if plot is not None:
         report.values["plot"] = str(draw_scaling(axes, plot))
     if table is not None:
-        table.write_text(scaling_table(axes), encoding="utf-8")
+        write_atomically(table, scaling_table(axes).encode())
         report.values["table"] = str(table)
     return report
 
