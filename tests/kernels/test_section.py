@@ -161,15 +161,39 @@ def test_reach_leaves_out_exactly_what_is_farther(reach):
     np.testing.assert_array_equal(near_sources, sources[expected])
 
 
+def cut_rows(tree, offsets, capacity):
+    """Cut by some of several planes; return what `cut` does, and what it wrote."""
+    segments, sources = np.full((len(offsets), capacity, 6), np.nan), np.full((len(offsets), capacity), -1)
+    counts = np.full((len(offsets), 3), 7)
+    T = np.eye(4)[:3].copy()
+    wanted = cut(tree, T, np.array(offsets), 1, len(offsets), np.inf, segments, sources, counts, 1, capacity)
+    return wanted, segments, sources, counts
+
+
 def test_small_buffers_say_how_much_is_needed():
     mesh = ball(3)
     tree = build_tree(mesh.vertices, mesh.triangles)
-    segments, sources = np.full((10, 6), np.nan), np.full(10, -1, dtype=np.int32)
-    needed = cut(tree, np.eye(4)[:3].copy(), 0.1, np.inf, segments, sources)
-    assert needed < -10
-    exact = np.empty((-needed, 6))
-    assert cut(tree, np.eye(4)[:3].copy(), 0.1, np.inf, exact, np.empty(-needed, dtype=np.int32)) == -needed
-    np.testing.assert_array_equal(segments, exact[:10])
+    wanted, segments, _, counts = cut_rows(tree, [9.0, 0.1, 0.9], 10)
+    assert wanted > 10
+    assert counts[0, 0] == 0
+    again, everything, _, enough = cut_rows(tree, [9.0, 0.1, 0.9], wanted)
+    assert again == 0
+    assert enough[0, 0] == wanted
+    np.testing.assert_array_equal(segments[0], everything[0, :10])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**31), st.lists(st.floats(-0.06, 0.06), min_size=1, max_size=6))
+def test_planes_cut_at_once_give_what_each_gives_alone(seed, offsets):
+    mesh = star(seed, 0.05)
+    tree = build_tree(mesh.vertices, mesh.triangles)
+    wanted, segments, sources, counts = cut_rows(tree, [0.0, *offsets], 512)
+    assert wanted == 0
+    for row, offset in enumerate(offsets):
+        alone, triangles = cut_mesh(tree, IDENTITY, offset)
+        np.testing.assert_array_equal(segments[row, : counts[row, 0]], alone)
+        np.testing.assert_array_equal(tree.original[sources[row, : counts[row, 0]]], triangles)
+    assert np.isnan(segments[-1]).all()
 
 
 def test_no_triangles_and_triangles_without_area_give_nothing():

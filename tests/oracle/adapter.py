@@ -3,6 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
+from clench.grasp.outlines import RoundedOutline
+from clench.grasp.packing import enclosing
 from clench.kernels.closing import close_items
 from clench.kernels.exact import planes_only
 from clench.kernels.family_section import make_sections
@@ -53,10 +55,7 @@ def pack_finger(finger: PlanarFinger) -> HandArrays:
     for g in range(groups):
         stop[finger.leader(g)] = length[g]
     sides = [side_rows(o) for o in finger.outlines]
-    disks = []
-    for o in finger.outlines:
-        center = o.vertices.mean(axis=0)
-        disks.append([*center, np.linalg.norm(o.vertices - center, axis=1).max() * (1 + 1e-12) + o.radius])
+    stadiums = [enclosing(RoundedOutline(o.vertices, s, o.radius)) for o, s in zip(finger.outlines, sides, strict=True)]
     chain = ChainArrays(
         joint_family=_ints(np.zeros(joints)),
         joint_group=_ints(finger.group),
@@ -73,7 +72,7 @@ def pack_finger(finger: PlanarFinger) -> HandArrays:
         link=_ints(range(len(finger.outlines))),
         radius=np.array([o.radius for o in finger.outlines], dtype=np.float64),
         both=_ints(np.zeros(len(finger.outlines))),
-        disk=np.array(disks, dtype=np.float64),
+        stadium=np.array(stadiums).reshape(-1, 5),
         vertex_first=_ints(np.cumsum([0, *(len(o.vertices) for o in finger.outlines)])),
         vertex=np.ascontiguousarray(np.vstack([o.vertices for o in finger.outlines]), dtype=np.float64),
         side_first=_ints(np.cumsum([0, *(len(s) for s in sides)])),

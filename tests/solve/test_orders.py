@@ -56,6 +56,15 @@ def test_speeds_set_the_path():
     assert q[2] == pytest.approx(0.125 * q[0], rel=1e-12)
 
 
+@pytest.mark.parametrize(("short", "touches"), [(1e-10, True), (2e-8, False)])
+@pytest.mark.parametrize("speed", [1.0, 100.0])
+def test_a_limit_just_short_of_a_contact_is_no_touch_however_fast(short, touches, speed):
+    angle = angle_to_bar(0.03, 0.02)
+    hand = HandBuilder().finger("index", [along_x(RADIUS, 0.05)], [0.05], upper=angle - short).hand()
+    solution = solve(hand, bar(0.03, 0.02), order="together", speeds={"index_0": speed})
+    assert bool(solution.contacts) == touches
+
+
 def test_only_the_tip_counts():
     hand = three_links(upper=1.2)
     missed = solve(hand, bar(0.03, 0.02), order="fingertip")

@@ -14,6 +14,7 @@ from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
 from .depths import link_mesh_arrays, link_meshes, mesh_mask, object_mesh
+from .linkage import placed_links
 from .scene import PackedObject
 
 
@@ -35,7 +36,7 @@ def contained_link(
 
     meshes = link_mesh_arrays(hand, source)
     T = np.ascontiguousarray(np.asarray(T_palm_object, dtype=np.float64)[:3])
-    poses = np.ascontiguousarray(hand.link_poses(q)[:, :3])
+    poses = placed_links(hand, q)
     found = int(find_contained(meshes, mesh_mask(meshes, links), poses, object_mesh(packed), T))
     return None if found < 0 else found
 
@@ -68,7 +69,7 @@ def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked
 
     meshes = link_meshes(hand, source)
     links = np.array([mesh.link for mesh in meshes], dtype=np.int64)
-    poses = hand.link_poses(q)[links]
+    poses = placed_links(hand, q)[links]
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.points) for mesh in meshes])
     centers = np.einsum("mij,mj->mi", poses[:, :3, :3], np.reshape([m.center for m in meshes], (-1, 3)))
     centers += poses[:, :3, 3]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -10,11 +9,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
+from .linkage import placed_links
 from .parts import part_points
 from .scene import PackedObject, shape_mesh
 
@@ -90,7 +91,7 @@ def hand_depths(
     wanted = np.ones(len(meshes.link), dtype=np.int64) if links is None else mesh_mask(meshes, links)
     T = np.ascontiguousarray(np.asarray(T_palm_object, dtype=np.float64)[:3])
     deepest = np.empty((len(meshes.link), 4))
-    measure_depths(meshes, wanted, np.ascontiguousarray(hand.link_poses(q)[:, :3]), object_mesh(packed), T, deepest)
+    measure_depths(meshes, wanted, placed_links(hand, q), object_mesh(packed), T, deepest)
     found = []
     for link, (depth, *place) in zip(meshes.link[wanted != 0].tolist(), deepest[wanted != 0].tolist(), strict=True):
         overlaps = depth > _TOUCHING * packed.radius
@@ -112,8 +113,7 @@ def object_mesh(packed: PackedObject) -> ObjectMesh:
 
 def link_mesh_arrays(hand: Hand, source: CollisionSource | None = None) -> LinkMeshArrays:
     """Return the meshes of all links of the hand that have a shape in one piece; made once per hand and source."""
-    link_meshes(hand, source)
-    return _kept[id(hand), hand.default_source if source is None else CollisionSource(source)][2]
+    return _meshes(hand, hand.default_source if source is None else CollisionSource(source))[1]
 
 
 def travel_to_touch(
@@ -192,21 +192,14 @@ def clear_distance(
 
 def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[LinkMesh, ...]:
     """Return the meshes of all links of the hand that have a shape; made once per hand and source."""
-    chosen = hand.default_source if source is None else CollisionSource(source)
-    key = (id(hand), chosen)
-    kept = _kept.get(key)
-    if kept is not None and kept[0] is hand:
-        return kept[1]
-    meshes = tuple(_link_mesh(n, hand.links[n].shapes.get(chosen, ()), chosen) for n in hand.solid_links)
-    meshes = tuple(mesh for mesh in meshes if len(mesh.tree.triangles))
-    _kept[key] = (hand, meshes, _joined(meshes))
-    while len(_kept) > _KEPT_HANDS:
-        _kept.popitem(last=False)
-    return meshes
+    return _meshes(hand, hand.default_source if source is None else CollisionSource(source))[0]
 
 
-#: Meshes by identity of the hand; each entry holds its hand, so that the identity stays its own.
-_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, tuple[LinkMesh, ...], LinkMeshArrays]] = OrderedDict()
+@kept_by_identity(_KEPT_HANDS)
+def _meshes(hand: Hand, source: CollisionSource) -> tuple[tuple[LinkMesh, ...], LinkMeshArrays]:
+    made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
+    meshes = tuple(mesh for mesh in made if len(mesh.tree.triangles))
+    return meshes, _joined(meshes)
 
 
 def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:

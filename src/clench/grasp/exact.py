@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.base.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Hand
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
 
 _KEPT_HANDS: Final = 16
-_kept: OrderedDict[tuple[int, CollisionSource], tuple[Hand, HandBodies]] = OrderedDict()
+_KEPT_PLANS: Final = 256
 
 
 class HandBodies(NamedTuple):
@@ -38,24 +38,18 @@ class HandBodies(NamedTuple):
     across: np.ndarray
 
 
+@kept_by_identity(_KEPT_HANDS)
 def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
     """Return a hand's links as bodies, and which of them may not overlap; made once per hand and source."""
     from clench.kernels.bodies import join_elements, pack_bodies
 
-    kept = _kept.get((id(hand), source))
-    if kept is not None and kept[0] is hand:
-        return kept[1]
     solid = set(hand.solid_links)
     parts = [
         join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
         for i, link in enumerate(hand.links)
     ]
     across = _across(hand)
-    bodies = HandBodies(pack_bodies(parts), _within(hand, across), across)
-    _kept[id(hand), source] = (hand, bodies)
-    while len(_kept) > _KEPT_HANDS:
-        _kept.popitem(last=False)
-    return bodies
+    return HandBodies(pack_bodies(parts), _within(hand, across), across)
 
 
 def boxes_meet(bodies: HandBodies, poses: FloatArray) -> np.ndarray:
@@ -147,6 +141,7 @@ def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -
     )
 
 
+@kept_by_identity(_KEPT_PLANS)
 def tilt_deviation(hand: Hand, plan: FingerPlan) -> float:
     """Return how far links of a finger may get from where they are swept [m]: 0 but for coupled joints out of parallel.
 

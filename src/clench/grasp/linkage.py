@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 
@@ -17,20 +17,6 @@ if TYPE_CHECKING:
     from clench.kernels.frames import FrameArrays
 
 _KEPT_HANDS: Final = 16
-#: Frames by identity of the hand; each entry holds its hand, so that the identity stays its own.
-_kept: OrderedDict[int, tuple[Hand, FrameArrays]] = OrderedDict()
-
-
-def hand_frames(hand: Hand) -> FrameArrays:
-    """Return the kinematics of a hand without any entry; made once per hand."""
-    kept = _kept.get(id(hand))
-    if kept is not None and kept[0] is hand:
-        return kept[1]
-    frames = _frames(hand)
-    _kept[id(hand)] = (hand, frames)
-    while len(_kept) > _KEPT_HANDS:
-        _kept.popitem(last=False)
-    return frames
 
 
 def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
@@ -51,7 +37,9 @@ def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
     return poses
 
 
-def _frames(hand: Hand) -> FrameArrays:
+@kept_by_identity(_KEPT_HANDS)
+def hand_frames(hand: Hand) -> FrameArrays:
+    """Return the kinematics of a hand without any entry; made once per hand."""
     from clench.kernels.frames import FrameArrays
 
     joints, couplings = hand.joints, hand.couplings

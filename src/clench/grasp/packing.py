@@ -9,6 +9,7 @@ import numpy as np
 
 from clench.base.pose import FloatArray, invert
 
+from .outlines import RoundedOutline
 from .plan import FingerPlan
 
 if TYPE_CHECKING:
@@ -92,13 +93,13 @@ def _outlines(plans: Sequence[FingerPlan]) -> OutlineArrays:
                 link.append(item.link)
                 outlines.append(item.outline)
         joint_first += len(plan.joints)
-    disks = [_enclosing(o.vertices, o.radius) for o in outlines]
+    stadiums = [enclosing(o) for o in outlines]
     return OutlineArrays(
         joint=np.array(joint, dtype=np.int64),
         link=np.array(link, dtype=np.int64),
         radius=np.array([o.radius for o in outlines], dtype=np.float64),
         both=np.array([o.both for o in outlines], dtype=np.int64),
-        disk=np.array(disks).reshape(-1, 3),
+        stadium=np.array(stadiums).reshape(-1, 5),
         vertex_first=_firsts([len(o.vertices) for o in outlines]),
         vertex=np.concatenate([o.vertices for o in outlines]) if outlines else np.empty((0, 2)),
         side_first=_firsts([len(o.sides) for o in outlines]),
@@ -106,7 +107,20 @@ def _outlines(plans: Sequence[FingerPlan]) -> OutlineArrays:
     )
 
 
-def _enclosing(vertices: FloatArray, radius: float) -> tuple[float, float, float]:
-    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    reach = float(np.linalg.norm(vertices - middle, axis=1).max())
-    return float(middle[0]), float(middle[1]), reach * (1.0 + 1e-12) + radius
+def enclosing(outline: RoundedOutline) -> FloatArray:
+    """Return a stadium that an outline lies in: its two ends and its radius, (5,); the narrowest along a side."""
+    vertices, radius = outline.vertices, outline.radius
+    if len(vertices) == 1 or not len(outline.sides):
+        middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+        return np.array([*middle, *middle, _widened(np.linalg.norm(vertices - middle, axis=1).max(), radius)])
+    across = outline.sides[:, :2] @ vertices.T
+    narrow = np.argmin(np.ptp(across, axis=1))
+    n, d = outline.sides[narrow, :2], across[narrow]
+    along = np.array([-n[1], n[0]])
+    t, middle = vertices @ along, 0.5 * (d.max() + d.min()) * n
+    return np.array([*(middle + t.min() * along), *(middle + t.max() * along), _widened(0.5 * np.ptp(d), radius)])
+
+
+def _widened(reach: float, radius: float) -> float:
+    """Add an outline's radius to how far its vertices get, and what rounding may take away."""
+    return float(reach + radius) * (1.0 + 1e-9)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
@@ -28,6 +29,7 @@ TESSELLATION_FRACTION: Final = 2e-3
 TESSELLATION_DEVIATION: Final = 2e-5
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
+_KEPT_HANDS: Final = 16
 ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
 #: Number of each kind of round shape in `RoundShapes.kind`.
 ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
@@ -135,6 +137,7 @@ def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
     return Elements(mesh.vertices, np.asarray(mesh.triangles, dtype=np.int32), np.zeros(len(mesh.triangles)))
 
 
+@kept_by_identity(_KEPT_HANDS)
 def hash_hand(hand: Hand, source: CollisionSource) -> str:
     """Return a SHA-256 over the hand's kinematics and its shapes of one collision source, hexadecimal."""
     digest = hashlib.sha256()

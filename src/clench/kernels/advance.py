@@ -9,9 +9,6 @@ import numpy as np
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .compiling import inner_allocating_kernel, inner_kernel
-from .conics import sweep_region
-from .corners import sharp_blocks
-from .coupled_pairs import sweep_disk, sweep_segment
 from .layout import (
     KIND_EDGE,
     KIND_TIP,
@@ -23,7 +20,8 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .turning_pairs import sooner, turn_disk, turn_segment
+from .outline_sweep import farthest, first_near, put_stadium, sweep_ellipses, sweep_outline, turn_outline
+from .turning_pairs import sooner
 
 #: Several joints at once move on by at most this before gaps are looked at anew [travel].
 STRIDE = 0.06
@@ -39,10 +37,14 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
         np.zeros(joints),
         np.empty((outlines.vertex.shape[0], 3)),
         np.empty((outlines.side.shape[0], 5)),
-        np.empty((outlines.joint.shape[0], 3)),
+        np.empty((outlines.joint.shape[0], 6)),
         np.empty((rows, 3)),
         np.empty((rows * (rows + 1), 3)),
         np.empty(8),
+        np.zeros(joints),
+        np.zeros(joints),
+        np.zeros(joints, dtype=np.int64),
+        np.zeros((2, 3, 4)),
         np.zeros(13, dtype=np.int64),
     )
 
@@ -83,10 +85,7 @@ def put_outline(
         if mirror < 0.0:
             mz, ta, tb = -mz, -tb, -ta
         work.side[i, 0], work.side[i, 1], work.side[i, 2], work.side[i, 3], work.side[i, 4] = mx, mz, g, ta, tb
-    x, z = outlines.disk[o, 0], outlines.disk[o, 1]
-    work.disk[o, 0] = c * x - s * z + dx
-    work.disk[o, 1] = (s * x + c * z + dz) * mirror
-    work.disk[o, 2] = outlines.disk[o, 2]
+    put_stadium(outlines.stadium, o, c, s, dx, dz, mirror, work.stadium)
     radius = outlines.radius[o]
     return Outline(o, v0, v1, s0, s1, radius, outlines.both[o] != 0, KIND_TIP if radius > 0.0 else KIND_EDGE)
 
@@ -113,144 +112,6 @@ def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work)
 
 
 @inner_kernel
-def misses(
-    cx: float, cz: float, d: float, ex: float, ez: float, wide: bool, mx: float, mz: float, reach: float
-) -> bool:
-    """Say whether a circle that turns from `c` to `e` at distance `d` stays farther than `reach` from the point `m`.
-
-    `wide`: it turns by more than half a turn, so that only the distance from the pivot tells.
-    """
-    r = math.sqrt(mx * mx + mz * mz)
-    if abs(d - r) > reach:
-        return True
-    if wide or (cx * mz - cz * mx >= 0.0 and mx * ez - mz * ex >= 0.0):
-        return False
-    square = reach * reach
-    return (mx - cx) ** 2 + (mz - cz) ** 2 > square and (mx - ex) ** 2 + (mz - ez) ** 2 > square
-
-
-@inner_kernel
-def deferred_blocks(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    closed: bool,
-    touch: float,
-    count: int,
-    work: Work,
-) -> bool:
-    """Decide on sharp pairs that touch at the start; if they block, make the last of them the winner."""
-    work.best[6] = 0
-    if not sharp_blocks(
-        outline,
-        sections.segments[row],
-        sections.counts[row, 0],
-        px,
-        pz,
-        mirror,
-        closed,
-        touch,
-        work.vertex,
-        work.side,
-        work.chain,
-        work.terms,
-        count,
-    ):
-        return False
-    for k in range(6):
-        work.best[k] = work.best[7 + k]
-    return True
-
-
-@inner_kernel
-def turn_outline(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    closed: bool,
-    px: float,
-    pz: float,
-    mirror: float,
-    rate: float,
-    touch: float,
-    best: float,
-    work: Work,
-) -> float:
-    """Return the first contact of an outline behind one active joint with a plane's section, before `best`."""
-    segments, disks = sections.segments, sections.disks
-    vertex, side, pair = work.vertex, work.side, work.best
-    cx, cz, reach = work.disk[outline.number, 0], work.disk[outline.number, 1], work.disk[outline.number, 2] + touch
-    d = math.sqrt(cx * cx + cz * cz)
-    before, ex, ez, wide = -1.0, 0.0, 0.0, False
-    for i in range(sections.counts[row, 0]):
-        if best != before:
-            before, turn = best, best * rate
-            c, s = math.cos(turn), math.sin(turn)
-            ex, ez, wide = c * cx - s * cz, s * cx + c * cz, turn >= 3.0
-        ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
-        bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
-        half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        if not misses(cx, cz, d, ex, ez, wide, 0.5 * (ax + bx), 0.5 * (az + bz), reach + half):
-            nx, nz = segments[row, i, 4], segments[row, i, 5] * mirror
-            best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, vertex, side, pair)
-            if best == 0.0:
-                return best
-    if pair[6] and deferred_blocks(outline, sections, row, px, pz, mirror, closed, touch, 1, work):
-        return 0.0
-    for i in range(sections.counts[row, 1]):
-        qx, qz = disks[row, i, 0] - px, (disks[row, i, 1] - pz) * mirror
-        best = turn_disk(outline, i, qx, qz, disks[row, i, 2], touch, rate, best, vertex, side, pair)
-    return best
-
-
-@inner_kernel
-def sweep_outline(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    closed: bool,
-    px: float,
-    pz: float,
-    count: int,
-    speed: float,
-    touch: float,
-    best: float,
-    work: Work,
-) -> float:
-    """Return the first contact of an outline behind several active joints with a plane's section, before `best`."""
-    segments, disks = sections.segments, sections.disks
-    vertex, side, chain, terms, pair = work.vertex, work.side, work.chain, work.terms, work.best
-    # The outline's enclosing circle, relative to the first pivot, and how far it gets.
-    x, z = work.disk[outline.number, 0], work.disk[outline.number, 1]
-    for k in range(count - 1):
-        x += chain[k, 1]
-        z += chain[k, 2]
-    reach = work.disk[outline.number, 2] + touch + speed * best
-    for i in range(sections.counts[row, 0]):
-        ax, az = segments[row, i, 0] - px, segments[row, i, 1] - pz
-        bx, bz = segments[row, i, 2] - px, segments[row, i, 3] - pz
-        near = reach + 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        if (0.5 * (ax + bx) - x) ** 2 + (0.5 * (az + bz) - z) ** 2 <= near * near:
-            nx, nz = segments[row, i, 4], segments[row, i, 5]
-            best = sweep_segment(
-                outline, i, ax, az, bx, bz, nx, nz, closed, touch, count, speed, best, vertex, side, chain, terms, pair
-            )
-            if best == 0.0:
-                return best
-    if pair[6] and deferred_blocks(outline, sections, row, px, pz, 1.0, closed, touch, count, work):
-        return 0.0
-    for i in range(sections.counts[row, 1]):
-        qx, qz = disks[row, i, 0] - px, disks[row, i, 1] - pz
-        best = sweep_disk(
-            outline, i, qx, qz, disks[row, i, 2], touch, count, speed, best, vertex, side, chain, terms, pair
-        )
-    return best
-
-
-@inner_kernel
 def advance_outline(
     chain: ChainArrays,
     outlines: OutlineArrays,
@@ -269,8 +130,8 @@ def advance_outline(
     """Return the first contact of one outline with a plane's section before `best`, else `best`.
 
     Behind one active joint an outline turns about that joint's pivot (mirrored when it turns clockwise). Behind
-    several, its features are relative to the last of them, and the motion is cut into short strides: at the start of
-    a stride a feature's gap costs no trigonometry, and most are too wide for the stride.
+    several, its features are relative to the last of them. What is certainly free is passed at once, the rest is cut
+    into short strides: at the start of a stride a feature's gap costs no trigonometry, and most are too wide for it.
     """
     joint, place = outlines.joint[o], work.place
     count, last, rate, speed = fill_chain(joint, first, rates, place, work)
@@ -285,44 +146,23 @@ def advance_outline(
         return sweep_ellipses(outline, sections, row, px, pz, mirror, 1, touch, best, work)
     begun = 0.0
     while begun < best:
-        stride = min(STRIDE, best - begun)
         for j in range(turns.shape[0]):
             work.turns[j] = turns[j] + rates[j] * begun
         place_joints(chain, family, work.turns, work.moved)
         count, last, rate, speed = fill_chain(joint, first, rates, work.moved, work)
         outline = put_outline(outlines, o, joint, work.moved, work.moved[last, 0], work.moved[last, 1], 1.0, work)
-        speed += abs(rate) * (math.hypot(work.disk[o, 0], work.disk[o, 1]) + work.disk[o, 2])
-        found = sweep_outline(outline, sections, row, closed, px, pz, count, speed, touch, stride, work)
+        x, z = work.moved[last, 0], work.moved[last, 1]
+        speed += abs(rate) * farthest(work.stadium, o)
+        lead, nearest = first_near(outline, sections, row, x, z, speed, touch, work)
+        if lead > STRIDE:
+            begun += lead
+            continue
+        stride = min(STRIDE, best - begun)
+        found = sweep_outline(outline, sections, row, closed, px, pz, x, z, nearest, count, speed, touch, stride, work)
         found = sweep_ellipses(outline, sections, row, px, pz, 1.0, count, touch, found, work)
         if found < stride:
             return sooner(begun + found, best)
         begun += stride
-    return best
-
-
-@inner_kernel
-def sweep_ellipses(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    count: int,
-    touch: float,
-    best: float,
-    work: Work,
-) -> float:
-    """Return the first contact of a moving outline with the ellipses of a plane's section, before `best`."""
-    for i in range(sections.counts[row, 2]):
-        for k in range(8):
-            work.ellipse[k] = sections.ellipses[row, i, k]
-        work.ellipse[0] -= px
-        work.ellipse[1] = (work.ellipse[1] - pz) * mirror
-        work.ellipse[3] *= mirror
-        best = sweep_region(
-            outline, i, work.ellipse, touch, count, best, work.vertex, work.side, work.chain, work.terms, work.best
-        )
     return best
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import advance, make_work
-from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
+from .compiling import allocating_kernel, inner_kernel
 from .exact import ExactArrays, describe_pair, last_mover, pose_movers, settle_pair, sweep_stage
 from .family_pose import compose_inverse, copy_pose, pose_family
 from .family_section import cut_planes
@@ -45,8 +43,6 @@ def close_group(
     start: int,
     items: ItemArrays,
     i: int,
-    rates: Floats,
-    locked: Ints,
     work: Work,
     sweep: SweepWork,
     answer: ClosingArrays,
@@ -58,12 +54,12 @@ def close_group(
 
     Args:
         sections, base: whose row `plane - base` belongs to `plane`. family: of the joints. group: or `ALL`.
-        start: the entry's first family. rates: scratch space, (J,). locked: joints that stand still, (J,); written.
+        start: the entry's first family. work: whose `locked` says which joints stand still; written.
 
     Returns:
         False where a link overlaps the object already.
     """
-    chain, entry, turns = hand.chain, items.entry[i], answer.turn[i]
+    chain, entry, turns, rates, locked = hand.chain, items.entry[i], answer.turn[i], work.rates, work.locked
     joints = entry_joints(hand, entry)
     low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
     along = 0.0
@@ -73,7 +69,10 @@ def close_group(
         if end <= 0.0:
             return True
         # A little further, so that a touch just at the end is one; no point moves by more than the touch tolerance.
-        reach = end + TOUCH_FRACTION
+        fastest = 0.0
+        for j in range(joints[0], joints[1]):
+            fastest += abs(rates[j])
+        reach = end + TOUCH_FRACTION / max(fastest, 1.0)
         moved, plane = advance(hand, family, sections, base, low, high, closed, turns, rates, reach, work)
         moved = min(moved, end)
         met = -1
@@ -143,7 +142,7 @@ def group_family(hand: HandArrays, group: int) -> int:
     return -1
 
 
-@inner_allocating_kernel
+@inner_kernel
 def enter_family(
     hand: HandArrays,
     family: int,
@@ -158,9 +157,9 @@ def enter_family(
     answer: ClosingArrays,
 ) -> None:
     """Place a family at an item's present posture and, unless it is the entry's first, cut the object by its planes."""
-    pose_family(hand, family, family == start, answer.turn[i], work.place, answer.pose[i])
+    pose_family(hand, family, family == start, answer.turn[i], work, answer.pose[i])
     if family > start:
-        T = np.empty((3, 4))
+        T = work.pose[0]
         compose_inverse(answer.pose[i, family], T_palm_object, T)
         low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
         wanted = cut_planes(hand, family, low, high, tree, rounds, T, own, hand.family_plane[start])
@@ -241,7 +240,7 @@ def write_contact(
     describe_pair(exact, T_palm_object, met, group, family, sweep, hit, point)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def close_item(
     hand: HandArrays,
     exact: ExactArrays,
@@ -262,14 +261,14 @@ def close_item(
     """Close one item: its groups from the palm outwards, up to `times` over, or all at once."""
     entry = items.entry[i]
     start = hand.entry_family[entry]
-    joints = hand.chain.rate.shape[0]
-    rates, locked = np.zeros(joints), np.zeros(joints, dtype=np.int64)
     if exact.wanted[i]:
         for link in range(sweep.poses.shape[0]):
             copy_pose(exact.link_pose[entry, link], sweep.poses[link])
     sweep.skipped[0] = 0
     for _ in range(times):
-        family, before = start - 1, answer.turn[i].copy()
+        family = start - 1
+        for j in range(work.before.shape[0]):
+            work.before[j] = answer.turn[i, j]
         for group in range(hand.entry_group[entry], hand.entry_group[entry + 1]):
             wanted = group_family(hand, group)
             while family < wanted:
@@ -278,7 +277,8 @@ def close_item(
             sections, base = shared, 0
             if family > start:
                 sections, base = own, hand.family_plane[start]
-            locked[:] = 0
+            for j in range(work.locked.shape[0]):
+                work.locked[j] = 0
             free = close_group(
                 hand,
                 exact,
@@ -291,8 +291,6 @@ def close_item(
                 start,
                 items,
                 i,
-                rates,
-                locked,
                 work,
                 sweep,
                 answer,
@@ -301,7 +299,10 @@ def close_item(
                 return
             if together:
                 break
-        if np.all(answer.turn[i] == before):
+        moved = False
+        for j in range(work.before.shape[0]):
+            moved = moved or answer.turn[i, j] != work.before[j]
+        if not moved:
             break
     answer.skipped[i] = sweep.skipped[0]
     settle(hand, exact, T_palm_object, start, shared, own, items, i, work, sweep, answer)

@@ -24,39 +24,43 @@ def move_core(core: Floats, corners: int, chain: Floats, count: int, s: float, o
 
 
 @inner_kernel
-def base_motion(chain: Floats, count: int, nx: float, nz: float, s: float) -> tuple[float, float, float, float]:
-    """Return speed and acceleration of the last pivot along n at `s`, and bounds on both."""
-    slope, curvature, lever, bound = 0.0, 0.0, 0.0, 0.0
+def base_motion(
+    chain: Floats, count: int, nx: float, nz: float, s: float
+) -> tuple[float, float, float, float, float, float]:
+    """Return the last pivot at `s`, its speed and acceleration along n, and bounds on both (of the speed: whatever n).
+
+    Along the axis nothing moves, so only the part of n across it counts.
+    """
+    px, pz, slope, curvature, lever, bound = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(count - 1):
         rate = chain[i, 0]
         c, d = math.cos(rate * s), math.sin(rate * s)
         x, z = c * chain[i, 1] - d * chain[i, 2], d * chain[i, 1] + c * chain[i, 2]
+        px += x
+        pz += z
         slope += rate * (nz * x - nx * z)
         curvature -= rate * rate * (nx * x + nz * z)
         arm = math.sqrt(x * x + z * z)
         lever += abs(rate) * arm
         bound += rate * rate * arm
-    return slope, curvature, lever, bound
+    return px, pz, slope, curvature, lever, math.sqrt(nx * nx + nz * nz) * bound
 
 
 @inner_kernel
 def corner_motion(
     core: Floats, k: int, chain: Floats, count: int, nx: float, nz: float, s: float
 ) -> tuple[float, float, float, float]:
-    """Return speed and acceleration of a corner along n at `s`, and bounds (of the speed: whatever n).
-
-    Along the axis nothing moves, so only the part of n across it counts.
-    """
+    """Return speed and acceleration of a corner along n at `s`, and bounds (of the speed: whatever n)."""
     rate = chain[count - 1, 0]
     c, d = math.cos(rate * s), math.sin(rate * s)
     x, z = c * core[k, 0] - d * core[k, 2], d * core[k, 0] + c * core[k, 2]
-    slope, curvature, lever, bound = base_motion(chain, count, nx, nz, s)
+    _, _, slope, curvature, lever, bound = base_motion(chain, count, nx, nz, s)
     arm = math.sqrt(x * x + z * z)
     return (
         slope + rate * (nz * x - nx * z),
         curvature - rate * rate * (nx * x + nz * z),
         lever + abs(rate) * arm,
-        math.hypot(nx, nz) * (bound + rate * rate * arm),
+        bound + math.sqrt(nx * nx + nz * nz) * rate * rate * arm,
     )
 
 

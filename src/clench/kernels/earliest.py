@@ -109,7 +109,7 @@ def stays_above(
     s = 0.0
     for _ in range(STEPS):
         move_core(core, corners, chain, count, s, placed)
-        step = step_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best - s)
+        step = step_to_plane(placed, corners, chain, count, nx, ny, nz, offset, s, best - s)
         if step <= 0.0:
             return False
         if step >= best - s:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .advance import place_joints
-from .compiling import inner_allocating_kernel, inner_kernel
-from .layout import Floats, HandArrays
+from .compiling import inner_kernel
+from .layout import Floats, HandArrays, Work
 
 
 @inner_kernel
@@ -53,29 +51,28 @@ def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
             out[r, c] = total
 
 
-@inner_allocating_kernel
-def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, place: Floats, poses: Floats) -> None:
+@inner_kernel
+def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, work: Work, poses: Floats) -> None:
     """Write `T_palm_family` of a family from that of the family before and the turns of its joints.
 
     Args:
         hand: the fingers. family: its index. first: it is its entry's first family, which nothing moves.
-        turns: of every joint [rad]. place: scratch space, (J, 3). poses: (F, 3, 4), read and written.
+        turns: of every joint [rad]. work: scratch space. poses: (F, 3, 4), read and written.
     """
     if first:
         for r in range(3):
             for k in range(4):
                 poses[family, r, k] = hand.family_pose[family, r, k]
         return
+    place, step, before = work.place, work.pose[0], work.pose[1]
     place_joints(hand.chain, family - 1, turns, place)
     last = 0
     for j in range(turns.shape[0]):
         if hand.chain.joint_family[j] == family - 1:
             last = j
     c, s = math.cos(place[last, 2]), math.sin(place[last, 2])
-    step = np.zeros((3, 4))
-    step[0, 0], step[0, 2], step[0, 3] = c, -s, place[last, 0]
-    step[1, 1] = 1.0
-    step[2, 0], step[2, 2], step[2, 3] = s, c, place[last, 1]
-    before = np.empty((3, 4))
+    step[0, 0], step[0, 1], step[0, 2], step[0, 3] = c, 0.0, -s, place[last, 0]
+    step[1, 0], step[1, 1], step[1, 2], step[1, 3] = 0.0, 1.0, 0.0, 0.0
+    step[2, 0], step[2, 1], step[2, 2], step[2, 3] = s, 0.0, c, place[last, 1]
     compose(poses[family - 1], step, before)
     compose(before, hand.family_pose[family], poses[family])

@@ -67,21 +67,24 @@ def cut_planes(
     Returns:
         0, or the capacity that the arena should have had.
     """
-    wanted = 0
-    spare = 4 * rounds.kind.shape[0]
-    capacity = sections.segments.shape[1] - spare
+    capacity = sections.segments.shape[1] - 4 * rounds.kind.shape[0]
+    wanted = cut(
+        tree,
+        T,
+        hand.plane_offset,
+        low,
+        high,
+        hand.family_reach[family],
+        sections.segments,
+        sections.sources,
+        sections.counts,
+        base,
+        capacity,
+    )
     for plane in range(low, high):
-        row = plane - base
-        offset = hand.plane_offset[plane]
-        found = cut(
-            tree, T, offset, hand.family_reach[family], sections.segments[row, :capacity], sections.sources[row]
-        )
-        if found < 0:
-            wanted = max(wanted, -found)
-            found = 0
-        sections.counts[row, 0], sections.counts[row, 1], sections.counts[row, 2] = found, 0, 0
-        cut_rounds(rounds, T, offset, row, sections)
-    return wanted
+        sections.counts[plane - base, 1], sections.counts[plane - base, 2] = 0, 0
+        cut_rounds(rounds, T, hand.plane_offset[plane], plane - base, sections)
+    return int(wanted)
 
 
 @allocating_kernel

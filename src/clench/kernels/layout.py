@@ -46,7 +46,8 @@ class OutlineArrays(NamedTuple):
     Args:
         joint: joint that moves it, (O,). link: (O,). radius: [m], (O,).
         both: 1 where the sides' winding is not known, (O,).
-        disk: circle about it relative to its joint's pivot, (O, 3): x, z, radius with that of the outline.
+        stadium: what it lies in, relative to its joint's pivot, (O, 5): all points within a radius, the fifth column,
+            of the line between two ends, (x, z) each [m].
         vertex_first: first vertex of each outline, (O + 1,). vertex: relative to the joint's pivot [m], (V, 2).
         side_first: first side of each outline, (O + 1,).
         side: rows (n_x, n_z, g, t_a, t_b) relative to the joint's pivot, (S, 5): outward unit normal, offset, and the
@@ -57,7 +58,7 @@ class OutlineArrays(NamedTuple):
     link: Ints
     radius: Floats
     both: Ints
-    disk: Floats
+    stadium: Floats
     vertex_first: Ints
     vertex: Floats
     side_first: Ints
@@ -112,9 +113,10 @@ class Work(NamedTuple):
     Args:
         place: joints at the start of the segment, rows (x, z, turn), (J, 3). moved, turns: joints at a later place,
             (J, 3), and their turns, (J,).
-        vertex, side, disk: the moving outlines' features about their turning centre, as in `OutlineArrays`; the third
-            column of `vertex` is the distance from that centre.
+        vertex, side: the moving outlines' features about their turning centre, as in `OutlineArrays`; the third column
+            of `vertex` is the distance from that centre. stadium: likewise; see `put_stadium`, (O, 6).
         chain: rows (Ω, e_x, e_z), (J + 1, 3). terms: sums of `coupled`, (N, 3). ellipse: one, relative, (8,).
+        rates, before, locked: of the joints, (J,). pose: two poses, (2, 3, 4).
         best: the winner: kind, outline, feature, object feature, which end or orientation, 0 segment, 1 disk
             or 2 ellipse; whether sharp pairs touch at the start; the last of these in the same six columns, (13,).
     """
@@ -124,10 +126,14 @@ class Work(NamedTuple):
     turns: Floats
     vertex: Floats
     side: Floats
-    disk: Floats
+    stadium: Floats
     chain: Floats
     terms: Floats
     ellipse: Floats
+    rates: Floats
+    before: Floats
+    locked: Ints
+    pose: Floats
     best: Ints
 
 

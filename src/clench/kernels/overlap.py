@@ -14,6 +14,7 @@ from .distance import is_inside
 from .family_pose import compose_inverse, pose_family
 from .layout import Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
 from .outline_gap import core_distance, point_segment, round_distance, side_ends
+from .outline_sweep import stadium_gap
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID
 from .tree import MeshTree
 
@@ -71,14 +72,12 @@ def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: floa
 def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> bool:
     """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
     margin = 4.0 * touch
-    x, z, reach = work.disk[outline.number, 0], work.disk[outline.number, 1], work.disk[outline.number, 2]
     segments = sections.segments
     for i in range(sections.counts[row, 0]):
         ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
         half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        if (0.5 * (ax + bx) - x) ** 2 + (0.5 * (az + bz) - z) ** 2 <= (reach + half) ** 2 and segment_overlaps(
-            outline, ax, az, bx, bz, margin, work
-        ):
+        gap = stadium_gap(work.stadium, outline.number, 0.5 * (ax + bx), 0.5 * (az + bz))
+        if gap <= half and segment_overlaps(outline, ax, az, bx, bz, margin, work):
             return True
     if sections.counts[row, 1] == 0 and sections.counts[row, 2] == 0:
         return False
@@ -157,7 +156,7 @@ def find_overlaps(
         overlaps[entry] = -1
         family = hand.entry_family[entry]
         touch = TOUCH_FRACTION * hand.family_length[family]
-        pose_family(hand, family, True, turns, work.place, poses)
+        pose_family(hand, family, True, turns, work, poses)
         place_joints(hand.chain, family, turns, work.place)
         compose_inverse(poses[family], T_palm_object, T)
         for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):

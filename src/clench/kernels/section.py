@@ -44,21 +44,32 @@ def cut_mesh(
     """
     tree = mesh if isinstance(mesh, MeshTree) else build_tree(mesh.vertices, mesh.triangles)
     T = np.ascontiguousarray(np.asarray(T_family_object, dtype=np.float64)[:3])
-    capacity = 256
-    while True:
-        segments = np.empty((capacity, 6))
-        sources = np.empty(capacity, dtype=np.int32)
-        count = cut(tree, T, float(offset), float(reach), segments, sources)
-        if count >= 0:
-            return segments[:count].copy(), tree.original[sources[:count]]
-        capacity = -count
+    offsets, counts, wanted = np.array([offset], dtype=np.float64), np.zeros((1, 3), dtype=np.int64), 256
+    while wanted:
+        capacity = wanted
+        segments, sources = np.empty((1, capacity, 6)), np.empty((1, capacity), dtype=np.int64)
+        wanted = cut(tree, T, offsets, 0, 1, float(reach), segments, sources, counts, 0, capacity)
+    found = counts[0, 0]
+    return segments[0, :found].copy(), tree.original[sources[0, :found]]
 
 
 @kernel
-def cut(tree: MeshTree, T: Floats, offset: float, reach: float, segments: Floats, sources: Ints) -> int:
-    """Cut a mesh by the plane `y_family = offset`; write one segment per triangle that crosses it.
+def cut(
+    tree: MeshTree,
+    T: Floats,
+    offsets: Floats,
+    low: int,
+    high: int,
+    reach: float,
+    segments: Floats,
+    sources: Any,
+    counts: Any,
+    base: int,
+    capacity: int,
+) -> int:
+    """Cut a mesh by parallel planes `y_family = offset`; write one segment per plane and triangle that crosses it.
 
-    The sign of each vertex against the plane decides (a above, o on, b below; any order of the three):
+    The sign of each vertex against a plane decides (a above, o on, b below; any order of the three):
 
     =========  =======================================  ==================================================
     signs      segment                                  why
@@ -76,35 +87,37 @@ def cut(tree: MeshTree, T: Floats, offset: float, reach: float, segments: Floats
     =========  =======================================  ==================================================
 
     The crossing of an edge is symmetric in its end points, so both of its triangles give the same bits.
-    Triangles without area give nothing.
+    Triangles without area give nothing. The tree is walked once for all planes.
 
     Args:
         tree: the mesh in the object's frame.
         T: `T_family_object`, shape (3, 4).
-        offset: of the plane [m].
+        offsets: of all planes [m], (P,). low, high: the range of those that cut.
         reach: segments farther than this from the family's origin, in the plane, are left out [m].
-        segments: written rows `[ax, az, bx, bz, nx, nz]`, normal unit and outward, shape (>= S, 6).
-        sources: written with each segment's triangle in tree order, shape (>= S,).
+        segments: row `plane - base` gets rows `[ax, az, bx, bz, nx, nz]`, normal unit and outward, shape (P, C, 6).
+        sources: written with each segment's triangle in tree order, shape (P, C).
+        counts: whose first column gets the number of segments; 0 where there were too many, shape (P, >= 1).
+        capacity: how many segments a row may get, at most C.
 
     Returns:
-        the number of segments S; or -S when the buffers are too small for all of them.
+        0, or the capacity that would have sufficed.
     """
-    # Fields and entries are taken out once: reading them inside the loop costs more than the geometry.
-    vertices, triangles, normals, low, high = tree.vertices, tree.triangles, tree.normals, tree.low, tree.high
-    first, count, skip = tree.first, tree.count, tree.skip
+    # Fields and entries are taken out once, and no array is handed on in the loop: either costs more than the geometry.
+    vertices, triangles, normals = tree.vertices, tree.triangles, tree.normals
+    first, count, skip, least, most = tree.first, tree.count, tree.skip, tree.low, tree.high
     x_row = (T[0, 0], T[0, 1], T[0, 2], T[0, 3])
-    y_row = (T[1, 0], T[1, 1], T[1, 2], T[1, 3] - offset)
+    y_row = (T[1, 0], T[1, 1], T[1, 2], T[1, 3])
     z_row = (T[2, 0], T[2, 1], T[2, 2], T[2, 3])
-    nodes = low.shape[0]
-    scale = max(abs(T[1, 3]), abs(offset))
-    for k in range(3 if nodes else 0):
-        scale = max(scale, abs(low[0, k]), abs(high[0, k]))
-    on = _ON_PLANE * scale
-    found, node = 0, 0
+    scale = _start_counts(tree, abs(T[1, 3]), offsets, low, high, counts, base)
+    on, node, nodes = _ON_PLANE * scale, 0, least.shape[0]
     while node < nodes:
-        lx, ly, lz = low[node, 0], low[node, 1], low[node, 2]
-        hx, hy, hz = 0.5 * (high[node, 0] - lx), 0.5 * (high[node, 1] - ly), 0.5 * (high[node, 2] - lz)
-        if _misses(lx + hx, ly + hy, lz + hz, hx, hy, hz, x_row, y_row, z_row, reach, 2.0 * on):
+        lx, ly, lz = least[node, 0], least[node, 1], least[node, 2]
+        hx, hy, hz = 0.5 * (most[node, 0] - lx), 0.5 * (most[node, 1] - ly), 0.5 * (most[node, 2] - lz)
+        center = (lx + hx, ly + hy, lz + hz)
+        y, near, crossed = _map(y_row, center), _span(y_row, hx, hy, hz) + 2.0 * on, False
+        for plane in range(low, high):
+            crossed = crossed or abs(y - offsets[plane]) <= near
+        if not crossed or _out_of_reach(center, hx, hy, hz, x_row, z_row, reach, 2.0 * on):
             node = skip[node]
             continue
         for t in range(first[node], first[node] + count[node]):
@@ -112,59 +125,83 @@ def cut(tree: MeshTree, T: Floats, offset: float, reach: float, segments: Floats
             a = (vertices[i, 0], vertices[i, 1], vertices[i, 2])
             b = (vertices[j, 0], vertices[j, 1], vertices[j, 2])
             c = (vertices[k, 0], vertices[k, 1], vertices[k, 2])
-            ends, ax, az, bx, bz = _segment(a, b, c, x_row, y_row, z_row, on)
-            if ends == 2 and _within(ax, az, bx, bz, reach):
-                m = (normals[t, 0], normals[t, 1], normals[t, 2], 0.0)
-                nx, nz = _normal(ax, az, bx, bz, _dot(x_row, m), _dot(z_row, m), _SHORT * scale)
-                if nx != 0.0 or nz != 0.0:
-                    if found < segments.shape[0]:
-                        segments[found, 0], segments[found, 1] = ax, az
-                        segments[found, 2], segments[found, 3] = bx, bz
-                        segments[found, 4], segments[found, 5] = nx, nz
-                        sources[found] = t
-                    found += 1
+            ya, yb, yc = _map(y_row, a), _map(y_row, b), _map(y_row, c)
+            below, above = min(ya, yb, yc) - on, max(ya, yb, yc) + on
+            for plane in range(low, high):
+                offset = offsets[plane]
+                if below > offset or above < offset:
+                    continue
+                p, q, r = (
+                    (_map(x_row, a), _map(z_row, a)),
+                    (_map(x_row, b), _map(z_row, b)),
+                    (_map(x_row, c), _map(z_row, c)),
+                )
+                ends, ax, az, bx, bz = _segment(p, q, r, ya - offset, yb - offset, yc - offset, on)
+                if ends == 2 and _within(ax, az, bx, bz, reach):
+                    m = (normals[t, 0], normals[t, 1], normals[t, 2], 0.0)
+                    nx, nz = _normal(ax, az, bx, bz, _dot(x_row, m), _dot(z_row, m), _SHORT * scale)
+                    if nx != 0.0 or nz != 0.0:
+                        row = plane - base
+                        found = counts[row, 0]
+                        counts[row, 0] = found + 1
+                        if found < capacity:
+                            segments[row, found, 0], segments[row, found, 1] = ax, az
+                            segments[row, found, 2], segments[row, found, 3] = bx, bz
+                            segments[row, found, 4], segments[row, found, 5] = nx, nz
+                            sources[row, found] = t
         node += 1
-    return found if found <= segments.shape[0] else -found
+    return int(_end_counts(low - base, high - base, counts, capacity))
 
 
 @inner_kernel
-def _misses(
-    cx: float,
-    cy: float,
-    cz: float,
-    hx: float,
-    hy: float,
-    hz: float,
-    x_row: Row,
-    y_row: Row,
-    z_row: Row,
-    reach: float,
-    slack: float,
+def _start_counts(tree: MeshTree, scale: float, offsets: Floats, low: int, high: int, counts: Any, base: int) -> float:
+    """Set the counts of planes to 0; return the largest coordinate, at least `scale` [m]."""
+    for plane in range(low, high):
+        scale = max(scale, abs(offsets[plane]))
+        counts[plane - base, 0] = 0
+    for k in range(3 if tree.low.shape[0] else 0):
+        scale = max(scale, abs(tree.low[0, k]), abs(tree.high[0, k]))
+    return scale
+
+
+@inner_kernel
+def _end_counts(first: int, last: int, counts: Any, capacity: int) -> int:
+    """Return the largest count where it is above the capacity, else 0; rows that got too many have none."""
+    wanted = 0
+    for row in range(first, last):
+        if counts[row, 0] > capacity:
+            wanted = max(wanted, counts[row, 0])
+            counts[row, 0] = 0
+    return wanted
+
+
+@inner_kernel
+def _span(row: Row, hx: float, hy: float, hz: float) -> float:
+    """Return how far a box with some half extents gets from its centre in a direction."""
+    return abs(row[0]) * hx + abs(row[1]) * hy + abs(row[2]) * hz
+
+
+@inner_kernel
+def _out_of_reach(
+    center: Point, hx: float, hy: float, hz: float, x_row: Row, z_row: Row, reach: float, slack: float
 ) -> bool:
-    """Say whether a box, given by centre and half extents, lies off the plane or out of reach."""
-    y = y_row[0] * cx + y_row[1] * cy + y_row[2] * cz + y_row[3]
-    if abs(y) > abs(y_row[0]) * hx + abs(y_row[1]) * hy + abs(y_row[2]) * hz + slack:
-        return True
+    """Say whether a box stays farther than `reach` from the family's origin, in the plane."""
     if reach == np.inf:
         return False
-    x = abs(x_row[0] * cx + x_row[1] * cy + x_row[2] * cz + x_row[3])
-    z = abs(z_row[0] * cx + z_row[1] * cy + z_row[2] * cz + z_row[3])
-    x = max(x - abs(x_row[0]) * hx - abs(x_row[1]) * hy - abs(x_row[2]) * hz - slack, 0.0)
-    z = max(z - abs(z_row[0]) * hx - abs(z_row[1]) * hy - abs(z_row[2]) * hz - slack, 0.0)
+    x = max(abs(_map(x_row, center)) - _span(x_row, hx, hy, hz) - slack, 0.0)
+    z = max(abs(_map(z_row, center)) - _span(z_row, hx, hy, hz) - slack, 0.0)
     return x * x + z * z > reach * reach
 
 
 @inner_kernel
 def _segment(
-    a: Point, b: Point, c: Point, x_row: Row, y_row: Row, z_row: Row, on: float
+    p: Flat, q: Flat, r: Flat, da: float, db: float, dc: float, on: float
 ) -> tuple[int, float, float, float, float]:
-    """Return the number of end points on the plane (2: a segment) and the two (x, z)."""
-    da, db, dc = _map(y_row, a), _map(y_row, b), _map(y_row, c)
-    if (da > on and db > on and dc > on) or (da < -on and db < -on and dc < -on):
-        return 0, 0.0, 0.0, 0.0, 0.0
-    p = (_map(x_row, a), _map(z_row, a))
-    q = (_map(x_row, b), _map(z_row, b))
-    r = (_map(x_row, c), _map(z_row, c))
+    """Return the number of end points on the plane (2: a segment) and the two (x, z).
+
+    Args:
+        p, q, r: the vertices in the plane. da, db, dc: their distances from it. on: up to which they lie on it.
+    """
     if abs(da) > on and abs(db) > on and abs(dc) > on:
         # No vertex on the plane, the common case: two edges cross, those of the vertex that is alone on its side.
         if (da > 0.0) == (db > 0.0):

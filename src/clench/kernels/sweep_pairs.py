@@ -13,7 +13,7 @@ import math
 
 from .closest import crosses, separation
 from .compiling import inner_kernel, kernel
-from .core_motion import corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
+from .core_motion import base_motion, corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
 from .leaving import BLOCKED, FLAT, OVERLAP, move_on
@@ -28,7 +28,6 @@ CLOSE = 1.5
 
 @inner_kernel
 def step_to_plane(
-    core: Floats,
     placed: Floats,
     corners: int,
     chain: Floats,
@@ -43,22 +42,26 @@ def step_to_plane(
     """Return how far the motion goes from `s` before a corner comes down to the plane `n·p = offset`, at most `best`.
 
     Args:
-        core, placed: the moving core relative to the last pivot, and where it is at `s`.
+        placed: the moving core as it is at `s`.
     """
-    rate = chain[count - 1, 0]
-    step = best
+    rate, step, across = chain[count - 1, 0], best, math.sqrt(nx * nx + nz * nz)
+    # Where the last pivot is and how it moves is the same for all corners; where they are is known.
+    px, pz, base_slope, _, _, base_bound = base_motion(chain, count, nx, nz, s)
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
-        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, nz, s)
         if gap <= 0.0:
             return 0.0
+        x, z = placed[k, 0] - px, placed[k, 2] - pz
+        along, over = nx * x + nz * z, nz * x - nx * z
         if count == 1:
             limit = step * abs(rate)
-            turn = turn_to_plane(gap, slope / abs(rate), curvature / (rate * rate), limit)
+            turn = turn_to_plane(gap, over if rate > 0.0 else -over, -along, limit)
             if turn < limit:
                 step = turn / abs(rate)
-        elif bound > 0.0:
-            step = min(step, safe_step(gap, slope, bound))
+        else:
+            bound = base_bound + across * rate * rate * math.sqrt(x * x + z * z)
+            if bound > 0.0:
+                step = min(step, safe_step(gap, base_slope + rate * over, bound))
     return step
 
 
@@ -156,7 +159,7 @@ def sweep_pair(
             if level < 0.0:
                 level = 0.5 * min(gap, touch)
             offset = plane_offset(fixed, kb, nx, ny, nz) + w + level
-            step = step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
+            step = step_to_plane(placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
             if step <= 0.0:
                 return s
             if turn >= PLAIN:

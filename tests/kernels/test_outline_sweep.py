@@ -1,0 +1,55 @@
+"""The stadium around an outline, wherever it is put; and what it says about what can be met first."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from clench.grasp.outlines import RoundedOutline
+from clench.grasp.packing import enclosing
+from clench.kernels import outline_sweep
+from kernels.kernel_entries import entry
+
+put_stadium, stadium_gap, farthest = (
+    entry(f) for f in (outline_sweep.put_stadium, outline_sweep.stadium_gap, outline_sweep.farthest)
+)
+
+number = st.floats(-0.05, 0.05)
+corners = st.lists(st.tuples(number, number), min_size=1, max_size=8)
+
+
+def outline(points, radius):
+    """Return an outline with a side from each point to the next."""
+    vertices = np.array(points)
+    runs = np.roll(vertices, -1, axis=0) - vertices
+    lengths = np.linalg.norm(runs, axis=1)
+    along = runs[lengths > 1e-9] / lengths[lengths > 1e-9, None]
+    sides = np.zeros((len(along), 5))
+    sides[:, 0], sides[:, 1] = along[:, 1], -along[:, 0]
+    return RoundedOutline(vertices, sides, radius)
+
+
+@settings(max_examples=200, deadline=None)
+@given(corners, st.floats(0.0, 0.01), st.floats(-7.0, 7.0), number, number, st.sampled_from([1.0, -1.0]))
+def test_a_placed_outline_lies_in_its_placed_stadium(points, radius, angle, dx, dz, mirror):
+    shape = outline(points, radius)
+    placed = np.empty((1, 6))
+    c, s = np.cos(angle), np.sin(angle)
+    put_stadium(enclosing(shape)[None], 0, c, s, dx, dz, mirror, placed)
+    moved = shape.vertices @ np.array([[c, s], [-s, c]]) + [dx, dz]
+    moved[:, 1] *= mirror
+    gaps = np.array([stadium_gap(placed, 0, x, z) for x, z in moved])
+    assert gaps.max() <= -radius + 1e-15
+    assert np.linalg.norm(moved, axis=1).max() + radius <= farthest(placed, 0) + 1e-15
+
+
+@settings(max_examples=100, deadline=None)
+@given(number, number, number, number, st.floats(1e-4, 0.01), number, number)
+def test_the_gap_of_a_stadium_is_that_of_its_middle_line(ax, az, bx, bz, radius, x, z):
+    placed = np.empty((1, 6))
+    put_stadium(np.array([[ax, az, bx, bz, radius]]), 0, 1.0, 0.0, 0.0, 0.0, 1.0, placed)
+    t = np.linspace(0.0, 1.0, 4001)
+    line = np.column_stack([ax + t * (bx - ax), az + t * (bz - az)])
+    nearest = np.linalg.norm(line - [x, z], axis=1).min() - radius
+    step = np.hypot(bx - ax, bz - az) / 4000
+    assert stadium_gap(placed, 0, x, z) <= nearest + 1e-12
+    assert stadium_gap(placed, 0, x, z) >= nearest - step
