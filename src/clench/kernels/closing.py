@@ -265,6 +265,9 @@ def close_item(
         for link in range(sweep.poses.shape[0]):
             copy_pose(exact.link_pose[entry, link], sweep.poses[link])
     sweep.skipped[0] = 0
+    # Those of other entries' joints are never written: they would go on with what the item before left there.
+    for j in range(work.rates.shape[0]):
+        work.rates[j] = 0.0
     for _ in range(times):
         family = start - 1
         for j in range(work.before.shape[0]):
