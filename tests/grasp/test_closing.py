@@ -57,17 +57,21 @@ def test_each_plane_closes_as_it_would_alone():
 
 
 @pytest.mark.parametrize("roles", [[CLOSING, CLOSING], [CLOSING, POSTURE, CLOSING]])
-def test_a_section_that_outgrows_its_arena_is_cut_anew(monkeypatch, roles):
-    """With room for one segment per plane, the answer is the same as with plenty."""
+def test_a_section_that_outgrows_its_arena_is_cut_anew(roles):
+    """With room for one segment per plane, the answer is the same as with plenty, which the next solve has at once."""
     import trimesh
 
     hand = chain(roles, upper=2.5)
     mesh = trimesh.creation.icosphere(subdivisions=4, radius=0.02)
     obj = GraspObject.from_meshes([(mesh.vertices, mesh.faces)], pose=Pose([0.04, 0.001, 0.04]))
     found = plans(hand, q=[0.0, 0.3, 0.0][: len(roles)] if len(roles) == 3 else None)
-    _, plenty = close(found, obj)
-    monkeypatch.setattr(closing, "CAPACITY", 1)
+    arena = closing.arena_of(pack_object(obj).tree)
+    arena.capacity = 1
     _, tight = close(found, obj)
+    assert arena.capacity > 1
+    arena.capacity = 4096
+    _, plenty = close(found, obj)
+    assert arena.capacity == 4096
     np.testing.assert_array_equal(tight.answer.travel, plenty.answer.travel)
     np.testing.assert_array_equal(tight.answer.point[..., :8], plenty.answer.point[..., :8])
     assert plenty.answer.contacts.sum() > 4

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clench.base.pose import FloatArray
 
 from .batching import PackedProblem
-from .closing import CAPACITY, KernelObject, kernel_threads, nothing_to_close
+from .closing import KernelObject, arena_of, kernel_threads, nothing_to_close
 
 if TYPE_CHECKING:
     from clench.kernels.batch_layout import Solved
@@ -101,7 +101,7 @@ class _Range:
         """
         p = self._problem
         overlaps = np.empty((len(poses), self._blocked.shape[1]), dtype=np.int64)
-        waiting, capacity = np.arange(len(poses)), CAPACITY
+        waiting, arena = np.arange(len(poses)), arena_of(p.target.tree)
         while len(waiting):
             rows = poses[waiting]
             everyone = len(rows) == self._count
@@ -110,12 +110,14 @@ class _Range:
             links = p.exact.link_pose[None] if placed is None else placed[waiting]
             exact = p.exact if placed is None else p.exact._replace(checked=p.bodies.across)
             length = np.repeat(p.hand.chain.group_length[None], len(links), axis=0)
-            self._run(exact, p.target, rows, links, length, asked[waiting], capacity, found, answers)
+            self._run(exact, p.target, rows, links, length, asked[waiting], arena.capacity, found, answers)
             for column, values in () if everyone else zip(self._answers, answers, strict=True):
                 column[rows] = values
             overlaps[waiting] = found
             wanted = (answers.overflow * asked[waiting]).max(axis=1, initial=0)
-            capacity, waiting = 2 * int(wanted.max(initial=0)), waiting[wanted > 0]
+            waiting = waiting[wanted > 0]
+            if len(waiting):
+                arena.grow(int(wanted.max()))
         return overlaps
 
     def _run(
@@ -193,7 +195,7 @@ class _Range:
         exact = p.exact._replace(object=none.bodies, checked=p.bodies.across - p.bodies.within)
         answers = _empty_answers(p, len(poses))
         overlaps = np.empty((len(poses), self._blocked.shape[1]), dtype=np.int64)
-        self._run(exact, none, poses, placed, length, asked, CAPACITY, overlaps, answers)
+        self._run(exact, none, poses, placed, length, asked, 0, overlaps, answers)
         meets: NDArray[np.bool_] = (asked != 0) & ((answers.contacts > 0) | (answers.skipped > 0))
         return meets
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
     from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
     from clench.kernels.tree import MeshTree
 
-#: Segments per plane that the arena holds before it has to grow.
+#: Segments per plane that an arena holds before it has to grow, and for how many objects it is known what suffices.
 CAPACITY = 512
+_KEPT_OBJECTS = 16
 
 
 @dataclass(eq=False)
@@ -120,15 +122,32 @@ def close_hand(
 
     T = np.ascontiguousarray(T_palm_object[:3])
     obj = object_for_closing(packed)
-    capacity = CAPACITY
-    shared = make_sections(len(plan.arrays.plane_offset), capacity, len(obj.rounds.kind))
+    arena = arena_of(obj.tree)
+    shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
     while wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared):
-        capacity = 2 * wanted
-        shared = make_sections(len(plan.arrays.plane_offset), capacity, len(obj.rounds.kind))
+        arena.grow(wanted)
+        shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
     overlaps = np.empty(len(plan.plans), dtype=np.int64)
     find_overlaps(plan.arrays, obj.tree, obj.rounds, obj.closed, T, shared, overlaps)
-    answer = _close_plan(plan, exact, obj, T, shared, capacity, rounds)
+    answer = _close_plan(plan, exact, obj, T, shared, rounds)
     return ClosedHand(answer, overlaps, shared, T_palm_object)
+
+
+@dataclass(eq=False)
+class Arena:
+    """Hold how many segments per plane have been enough for an object so far."""
+
+    capacity: int
+
+    def grow(self, wanted: int) -> None:
+        """Make room for twice of what was wanted, so that the next pose hardly needs more."""
+        self.capacity = max(self.capacity, 2 * wanted)
+
+
+@kept_by_identity(_KEPT_OBJECTS)
+def arena_of(tree: MeshTree) -> Arena:
+    """Return the arena's size for the triangles of an object; no answer depends on it."""
+    return Arena(CAPACITY)
 
 
 class KernelObject(NamedTuple):
@@ -161,21 +180,20 @@ def _close_plan(
     obj: KernelObject,
     T: FloatArray,
     shared: SectionArrays,
-    capacity: int,
     rounds: int,
 ) -> ClosingArrays:
     """Close the items of a plan, with arenas for later families that grow until they are large enough."""
-    ranges = _entry_ranges(plan)
+    ranges, arena = _entry_ranges(plan), arena_of(obj.tree)
     exact = exact._replace(object=obj.bodies)
     while True:
         answer = empty_answer(plan)
-        close = partial(_close_range, plan, exact, obj, T, shared, capacity, rounds, answer)
+        close = partial(_close_range, plan, exact, obj, T, shared, arena.capacity, rounds, answer)
         # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
         deque(kernel_threads(core_count()).map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
         wanted = int(answer.overflow.max(initial=0))
         if not wanted:
             return answer
-        capacity = 2 * wanted
+        arena.grow(wanted)
 
 
 def core_count() -> int:
@@ -257,7 +275,7 @@ def close_item_again(
         shared = make_sections(len(plan.arrays.plane_offset), 0, 0)
     else:
         obj = object_for_closing(packed)
-    answer = _close_plan(only_item(plan, item), exact, obj, T, shared, CAPACITY, rounds)
+    answer = _close_plan(only_item(plan, item), exact, obj, T, shared, rounds)
     return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
 
 
