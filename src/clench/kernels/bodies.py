@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .tree import build_tree
+from .tree import MeshTree, build_tree
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -78,7 +78,7 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         tree = build_tree(body.vertices, body.elements)
         radius = body.radius[tree.original]
         ball = _balls(tree.vertices[tree.triangles], radius)
-        node = _node_balls(tree.low, tree.high, tree.first, tree.count, tree.right, radius)
+        node = _node_balls(tree, radius)
         inner = tree.count == 0
         rows.append(
             (
@@ -141,13 +141,13 @@ def _balls(points: Floats, radius: Floats) -> Floats:
     return np.column_stack([center, reach * (1.0 + 1e-12) + radius])
 
 
-def _node_balls(low: Floats, high: Floats, first: Ints, count: Ints, right: Ints, radius: Floats) -> Floats:
+def _node_balls(tree: MeshTree, radius: Floats) -> Floats:
     """Return the ball around the box of each node, grown by the largest radius of its elements."""
-    grown = np.zeros(len(low))
-    for i in range(len(low) - 1, -1, -1):
-        if count[i]:
-            grown[i] = radius[first[i] : first[i] + count[i]].max()
-        else:
-            grown[i] = max(grown[i + 1], grown[right[i]])
-    reach = 0.5 * np.linalg.norm(high - low, axis=1) * (1.0 + 1e-12) + grown
-    return np.column_stack([0.5 * (low + high), reach])
+    # The elements of a node are those from its first leaf to its last one.
+    leaves = np.flatnonzero(tree.count)
+    begin = tree.first[leaves[np.searchsorted(leaves, np.arange(len(tree.low)))]]
+    last = leaves[np.searchsorted(leaves, tree.skip) - 1]
+    spans = np.column_stack([begin, tree.first[last] + tree.count[last]])
+    grown = np.maximum.reduceat(np.append(radius, 0.0), spans.ravel())[::2]
+    reach = 0.5 * np.linalg.norm(tree.high - tree.low, axis=1) * (1.0 + 1e-12) + grown
+    return np.column_stack([0.5 * (tree.low + tree.high), reach])
