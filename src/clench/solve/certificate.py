@@ -127,8 +127,12 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
     found = _overlapping(problem, final, exact)
     if not found:
         return None
-    text = f"{found[0]} overlaps {found[1] if len(found) > 1 else 'the object'} at the end."
-    return _refused(CertificateCode.OVERLAP_AT_END, text, found)
+    code, when = CertificateCode.OVERLAP_AT_END, "at the end"
+    if _overlapping(problem, opened, exact) == found:
+        code, when = CertificateCode.SELF_COLLISION_AT_START, "before anything moves"
+        if len(found) == 1:
+            code = CertificateCode.BLOCKED_AT_START
+    return _refused(code, f"{found[0]} overlaps {found[1] if len(found) > 1 else 'the object'} {when}.", found)
 
 
 def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[str]:
