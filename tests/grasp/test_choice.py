@@ -1,6 +1,7 @@
 """The choice: what may not be taken comes last, then what touches, then the weighted scores."""
 
 import itertools
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +48,15 @@ def test_one_that_touches_goes_before_one_that_does_not():
     assert chosen([moved(0.0, touches=gone), moved(1.0)]) == 1
     wall = (touch(graspable=False),)
     assert chosen([moved(0.0, touches=wall), moved(1.0)]) == 1
+
+
+def test_where_only_fingertips_count_one_that_touches_with_another_link_first_comes_after_one_that_does_not():
+    tip = HAND.fingers[0].tip_link
+    first = candidate((0.1, 0.1), touches=(touch(link=1), touch(link=tip)))
+    second = candidate((0.9, 0.9), touches=(touch(link=tip), touch(link=1)))
+    assert tip != 1
+    assert chosen([first, second]) == 0
+    assert choose([[first, second]], CALIBRATION, replace(SETTING, tip_only=True)).chosen == [1]
 
 
 def test_one_that_passes_through_nothing_goes_before_one_that_does():

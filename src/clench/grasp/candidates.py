@@ -93,6 +93,11 @@ class FingerCandidate:
         """Place of the plane along y of the first family [m]; None for the full width."""
         return None if self.plane is None else float(self.plan.families[0].offsets[self.plane])
 
+    @property
+    def missed(self) -> bool:
+        """Whether another link than the fingertip touches first."""
+        return bool(self.touches) and self.touches[0].link != self.plan.finger.tip_link
+
     def on_the_way(self, hand: Hand, travel: FloatArray) -> FloatArray:
         """Return the angles of all joints when the groups have travelled so far, each joint until it was held [rad].
 

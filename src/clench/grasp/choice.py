@@ -99,7 +99,7 @@ def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration
     of_finger = [name for name, c in criteria.items() if is_of_finger(c)]
     for group in groups:
         score_sets(group, of_finger, setting)
-    fingers = [_compare(group, of_finger, calibration) for group in groups]
+    fingers = [_compare(group, of_finger, calibration, setting.tip_only) for group in groups]
     of_hand = [name for name, c in criteria.items() if is_of_hand(c)]
     judge = _HandJudge(groups, fingers, of_hand, calibration, setting)
     known = {name for group in groups for c in group for name in c.scores}
@@ -124,10 +124,12 @@ def choose(groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration
     )
 
 
-def _compare(group: Sequence[FingerCandidate], names: Sequence[str], calibration: Calibration) -> FingerChoice:
+def _compare(
+    group: Sequence[FingerCandidate], names: Sequence[str], calibration: Calibration, tip_only: bool
+) -> FingerChoice:
     """Rank the sets of one finger by what they fulfil, then by their weighted scores."""
     said = [name for name in names if any(name in c.scores for c in group)]
-    tiers = tuple(_tier(c, said, calibration) for c in group)
+    tiers = tuple(_tier(c, said, calibration, tip_only) for c in group)
     worth = {name: calibration.worth(name, 1.0) for name in said}
     totals = tuple(sum(w * c.scores[n] for n, w in worth.items() if n in c.scores) for c in group)
     same = _same_as_whole(group)
@@ -154,12 +156,12 @@ def _same_as_whole(group: Sequence[FingerCandidate]) -> list[int]:
     return result
 
 
-def _tier(c: FingerCandidate, said: Sequence[str], calibration: Calibration) -> tuple[bool, ...]:
+def _tier(c: FingerCandidate, said: Sequence[str], calibration: Calibration, tip_only: bool) -> tuple[bool, ...]:
     """Say what a set fulfils of `TIERS`."""
     return (
         c.feasible is not False,
         c.clear,
-        bool(c.holding),
+        bool(c.holding) and not (tip_only and c.missed),
         all(calibration.allows(name, c.scores.get(name)) for name in said),
         all(name in c.scores for name in said),
     )

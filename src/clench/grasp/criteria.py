@@ -33,6 +33,7 @@ class Setting:
         task: what acts on the object in its task: force [N] and torque about the centre of mass [Nm] in the palm frame,
             shape (N, 6).
         in_stages: fingers close proximal first, once, so that what stopped a joint can be found again.
+        tip_only: only the first touch of a fingertip counts.
         kept: what a criterion wants to keep from one set to the next; emptied with every solve.
     """
 
@@ -47,6 +48,7 @@ class Setting:
     gravity: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
     in_stages: bool = True
     task: FloatArray = field(default_factory=lambda: np.empty((0, 6)))
+    tip_only: bool = False
     kept: dict[Any, Any] = field(default_factory=dict)
 
 

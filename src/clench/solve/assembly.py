@@ -188,7 +188,7 @@ def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, 
     hand, name = problem.hand, c.plan.finger.name
     if c.overlap is not None:
         return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} before {name} moves."
-    if problem.command.order == ClosingOrder.FINGERTIP and c.touches and c.touches[0].link != c.plan.finger.tip_link:
+    if problem.command.order == ClosingOrder.FINGERTIP and c.missed:
         first, tip = hand.links[c.touches[0].link].name, hand.links[c.plan.finger.tip_link].name
         return FingerStatus.MISSED, f"{first} touches {_body_name(c.touches[0], problem)} before the tip {tip} does."
     if c.holding:

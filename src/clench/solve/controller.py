@@ -205,6 +205,7 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
         not problem.together and problem.command.rounds == 1,
         task_wrenches(problem.command, problem.T_world_palm),
+        problem.command.order == ClosingOrder.FINGERTIP,
     )
 
 
