@@ -14,7 +14,7 @@ from clench.base.pose import FloatArray
 from clench.base.tolerances import PASSED_GAP
 from clench.models.hand.hand import Hand
 
-from .closing import ClosedHand, HandPlan, close_item_again, only_item
+from .closing import ClosedHand, HandPlan, close_items_again, only_items
 from .depths import LinkDepth
 from .mechanics.contacts import without_repeats
 from .plan import FingerPlan
@@ -169,10 +169,10 @@ def closed_anew(
     candidate: FingerCandidate,
     rounds: int,
 ) -> FingerCandidate:
-    """Return a set closed again, with what stands in its way now; the arguments are those of `close_item_again`."""
-    again = close_item_again(plan, exact, packed, closed, candidate.item, rounds)
+    """Return a set closed again, with what stands in its way now; the arguments are those of `close_items_again`."""
+    again = close_items_again(plan, exact, packed, closed, [candidate.item], rounds)
     nowhere = [None] * len(plan.plans)
-    (found,) = read_candidates(hand, only_item(plan, candidate.item), packed, again, nowhere)
+    (found,) = read_candidates(hand, only_items(plan, [candidate.item]), packed, again, nowhere)
     return replace(found, item=candidate.item)
 
 

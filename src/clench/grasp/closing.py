@@ -188,8 +188,10 @@ def _close_plan(
     while True:
         answer = empty_answer(plan)
         close = partial(_close_range, plan, exact, obj, T, shared, arena.capacity, rounds, answer)
-        # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
-        deque(kernel_threads(core_count()).map(close, ranges) if len(ranges) > 1 else map(close, ranges), maxlen=0)
+        # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads. Where
+        # there is nothing to touch but the hand, waking them takes longer than the work.
+        alone = len(ranges) == 1 or obj is nothing_to_close()
+        deque(map(close, ranges) if alone else kernel_threads(core_count()).map(close, ranges), maxlen=0)
         wanted = int(answer.overflow.max(initial=0))
         if not wanted:
             return answer
@@ -253,19 +255,24 @@ def _close_range(
     )
 
 
-def only_item(plan: HandPlan, item: int) -> HandPlan:
-    """Return a plan with one of its items alone."""
-    return replace(plan, items=_only(plan.items, slice(item, item + 1)), whole=(plan.whole[item],))
+def only_items(plan: HandPlan, items: Sequence[int]) -> HandPlan:
+    """Return a plan with some of its items alone."""
+    return replace(plan, items=_only(plan.items, items), whole=tuple(plan.whole[i] for i in items))
 
 
-def close_item_again(
-    plan: HandPlan, exact: ExactArrays, packed: PackedObject | None, closed: ClosedHand, item: int, rounds: int
+def close_items_again(
+    plan: HandPlan,
+    exact: ExactArrays,
+    packed: PackedObject | None,
+    closed: ClosedHand,
+    items: Sequence[int],
+    rounds: int,
 ) -> ClosedHand:
-    """Close one item again, with other links in its way than before.
+    """Close items again, with other links in their way than before.
 
     Args:
-        plan: of the hand. exact: for the item alone. packed: the object, or None to leave it out.
-        closed: as the whole hand was closed before. item: its number. rounds: as for `close_hand`.
+        plan: of the hand. exact: for these items alone. packed: the object, or None to leave it out.
+        closed: as the whole hand was closed before. items: their numbers. rounds: as for `close_hand`.
     """
     from clench.kernels.family_section import make_sections
 
@@ -275,7 +282,7 @@ def close_item_again(
         shared = make_sections(len(plan.arrays.plane_offset), 0, 0)
     else:
         obj = object_for_closing(packed)
-    answer = _close_plan(only_item(plan, item), exact, obj, T, shared, rounds)
+    answer = _close_plan(only_items(plan, items), exact, obj, T, shared, rounds)
     return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
 
 
@@ -298,5 +305,5 @@ def empty_answer(plan: HandPlan) -> ClosingArrays:
     )
 
 
-def _only(items: ItemArrays, part: slice) -> ItemArrays:
+def _only(items: ItemArrays, part: slice | Sequence[int]) -> ItemArrays:
     return items._replace(entry=items.entry[part], low=items.low[part], high=items.high[part], until=items.until[part])

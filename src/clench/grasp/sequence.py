@@ -12,7 +12,7 @@ from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 
 from .candidates import FingerCandidate, closed_anew
-from .closing import ClosedHand, HandPlan, close_item_again
+from .closing import ClosedHand, HandPlan, close_items_again
 from .exact import HandBodies
 from .linkage import placed_links
 from .scene import PackedObject
@@ -42,37 +42,59 @@ def close_in_sequence(
         chosen: one set per finger, in closing order. start: posture before closing [rad], shape (J,).
         rounds: how often all degrees of freedom are gone through. bodies: see `hand_bodies`.
     """
-    others = bodies.across - bodies.within
-    q = start.copy()
-    result = []
-    for candidate in chosen:
-        if candidate.plane is None and candidate.overlap is None and len(hand.fingers) > 1:
-            entry = int(plan.items.entry[candidate.item])
-            posture = q.copy()
-            own = list(candidate.plan.finger.joints)
-            posture[own] = candidate.plan.posture[own]
-            placed = exact.link_pose.copy()
-            placed[entry] = placed_links(hand, posture)
-            among = exact._replace(link_pose=placed, wanted=np.ones(1, dtype=np.int64))
-            if _meets_another(plan, among._replace(checked=others), closed, candidate, entry, rounds):
-                among = among._replace(checked=bodies.across)
-                candidate = closed_anew(hand, plan, among, closed, packed, candidate, rounds)
+    if len(hand.fingers) == 1:
+        return list(chosen)
+    result, first = list(chosen), 0
+    while True:
+        waiting, placed = _placed(hand, plan, exact, result, start, first)
+        among = exact._replace(link_pose=placed, checked=bodies.across - bodies.within)
+        meets = _meeting(plan, among, closed, [result[k] for k in waiting], rounds)
+        k = next((k for k, met in zip(waiting, meets, strict=True) if met), None)
+        if k is None:
+            return result
+        among = among._replace(checked=bodies.across, wanted=np.ones(1, dtype=np.int64))
+        result[k] = closed_anew(hand, plan, among, closed, packed, result[k], rounds)
+        first = k + 1
+
+
+def _placed(
+    hand: Hand,
+    plan: HandPlan,
+    exact: ExactArrays,
+    sets: Sequence[FingerCandidate],
+    start: FloatArray,
+    first: int,
+) -> tuple[list[int], FloatArray]:
+    """Return which fingers may have to close anew, from the `first` on, and where links are when each begins to close.
+
+    Returns:
+        indices of the sets; poses of the links for every entry, shape (E, L, 3, 4).
+    """
+    waiting, placed, q = [], exact.link_pose.copy(), start.copy()
+    for k, candidate in enumerate(sets):
         own = list(candidate.plan.finger.joints)
+        if k >= first and candidate.plane is None and candidate.overlap is None:
+            waiting.append(k)
+            posture = q.copy()
+            posture[own] = candidate.plan.posture[own]
+            placed[plan.items.entry[candidate.item]] = placed_links(hand, posture)
         q[own] = candidate.q[own]
-        result.append(candidate)
-    return result
+    return waiting, placed
 
 
-def _meets_another(
-    plan: HandPlan, exact: ExactArrays, closed: ClosedHand, candidate: FingerCandidate, entry: int, rounds: int
-) -> bool:
-    """Say whether a finger meets another one's links on the path to a set; the object plays no part."""
-    if rounds > 1 or any(candidate.plan.breaks):
-        return True
-    first, last = plan.arrays.entry_group[entry : entry + 2]
+def _meeting(
+    plan: HandPlan, exact: ExactArrays, closed: ClosedHand, sets: Sequence[FingerCandidate], rounds: int
+) -> list[bool]:
+    """Say which fingers meet another one's links on the path to their sets; the object plays no part."""
+    if rounds > 1 or not sets:
+        return [True] * len(sets)
     length = np.zeros(len(plan.arrays.chain.group_length))
-    length[first:last] = candidate.travel
-    chain = plan.arrays.chain._replace(group_length=length)
-    bounded = replace(plan, arrays=plan.arrays._replace(chain=chain))
-    answer = close_item_again(bounded, exact, None, closed, candidate.item, rounds).answer
-    return bool(answer.contacts[0] or answer.skipped[0])
+    for candidate in sets:
+        entry = int(plan.items.entry[candidate.item])
+        first, last = plan.arrays.entry_group[entry : entry + 2]
+        length[first:last] = candidate.travel
+    bounded = replace(plan, arrays=plan.arrays._replace(chain=plan.arrays.chain._replace(group_length=length)))
+    exact = exact._replace(wanted=np.ones(len(sets), dtype=np.int64))
+    answer = close_items_again(bounded, exact, None, closed, [c.item for c in sets], rounds).answer
+    met = (answer.contacts > 0) | (answer.skipped > 0)
+    return [bool(m) or any(c.plan.breaks) for m, c in zip(met.tolist(), sets, strict=True)]
