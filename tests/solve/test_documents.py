@@ -157,6 +157,12 @@ def edited(path: str, value: Any) -> dict[str, Any]:
         ("next_steps", {"index_tip": 0.1}, r"next_steps: expected 'array', got 'object'"),
         ("next_steps", [{}, 0.1], r"next_steps\[1\]: expected 'object', got 'float'"),
         ("next_steps", [{"index_tip": "far"}], r"next_steps\[0\]\.index_tip: expected 'float', got 'str'"),
+        ("collision_source", "thick", r"collision_source: invalid enum value 'thick'"),
+        ("object_collision_source", "thick", r"object_collision_source: invalid enum value 'thick'"),
+        ("squeeze", {"offsets": "none"}, r"squeeze\.offsets: expected 'object', got 'str'"),
+        ("squeeze", {"offsets": {"index_tip": "a"}}, r"squeeze\.offsets\.index_tip: expected 'float', got 'str'"),
+        ("squeeze", {"tensions": [1.0, "a"]}, r"squeeze\.tensions\[1\]: expected 'float', got 'str'"),
+        ("squeeze", {"feasible": "yes"}, r"squeeze\.feasible: expected 'bool', got 'str'"),
     ],
 )
 def test_malformed_documents_name_file_and_key(path: str, value: Any, message: str, tmp_path: Path) -> None:

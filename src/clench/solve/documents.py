@@ -15,6 +15,7 @@ import numpy as np
 from clench.base.errors import ClenchError, FileError
 from clench.base.json_files import encode_document, non_finite_path, read_json, write_json
 from clench.base.pose import Pose
+from clench.models.shapes import CollisionSource
 
 from .solution import (
     Candidate,
@@ -71,6 +72,13 @@ class _FingerForm(msgspec.Struct):
     cause: dict[str, Any] | None = None
 
 
+class _SqueezeForm(msgspec.Struct):
+    feasible: bool = False
+    text: str = ""
+    offsets: _Map = {}
+    tensions: list[float] | None = None
+
+
 class _SolutionForm(msgspec.Struct):
     clench_version: str
     hand: str
@@ -84,7 +92,7 @@ class _SolutionForm(msgspec.Struct):
     decomposition: _Map
     joint_angles: _Map
     certified: bool
-    collision_source: str
+    collision_source: CollisionSource
     max_penetration: float | None
     fingers: _Map
     contacts: list[Any]
@@ -95,7 +103,7 @@ class _SolutionForm(msgspec.Struct):
     hand_model: str = ""
     object_model: str = ""
     open_angles: _Map = {}
-    object_collision_source: str = "raw"
+    object_collision_source: CollisionSource = CollisionSource.RAW
     joint_limits: _Map = {}
     certificate: dict[str, Any] | None = None
     choice: dict[str, Any] | None = None
@@ -163,6 +171,8 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
     for key in ("code", "text"):
         if key not in form.reason:
             raise FileError(source, f"reason.{key}: missing.")
+    if form.squeeze is not None:  # is kept as it is, but what hands are told of it has to be of the right form
+        angles(_convert(form.squeeze, _SqueezeForm, source, "squeeze").offsets, "squeeze.offsets")
     return GraspSolution(
         clench_version=form.clench_version,
         hand=form.hand,
@@ -182,8 +192,8 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         joint_angles=angles(form.joint_angles, "joint_angles"),
         open_angles=angles(form.open_angles, "open_angles"),
         certified=form.certified,
-        collision_source=form.collision_source,
-        object_collision_source=form.object_collision_source,
+        collision_source=form.collision_source.value,
+        object_collision_source=form.object_collision_source.value,
         max_penetration=form.max_penetration,
         fingers={name: _read_finger(name, v, source) for name, v in form.fingers.items()},
         contacts=_read_contacts(form.contacts, source, "contacts"),
