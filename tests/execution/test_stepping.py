@@ -53,6 +53,15 @@ def test_a_thumb_that_opens_lets_go_and_the_finger_stays(
     assert document[1] == second.to_dict()
 
 
+def test_a_step_that_moves_nothing_says_so(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:
+    """Followers go with their leaders, so an angle that a step gives to one is no angle that anything reached."""
+    report = stepped(pinch, pincer, ball, {"index_tip": 0.1}, {})
+    assert report.success
+    for number, step in enumerate(report.next_steps, start=1):
+        assert (step.reached, dict(step.joints), step.touching) == (True, {}, ("thumb", "index"))
+        assert step.reason == f"Next step {number} moves nothing: it names no joint, or followers only."
+
+
 def test_a_step_into_the_object_is_not_reached_and_ends_it(
     pincer: Hand, pinch: GraspSolution, ball: GraspObject
 ) -> None:

@@ -92,8 +92,10 @@ def step_sentence(step: int, joints: Mapping[str, JointReached], tolerance: floa
     Args:
         step: its index. joints: those that it moves. tolerance: largest difference that counts as reached [rad].
     """
-    worst = max(joints, key=lambda name: abs(joints[name].error), default=None)
-    error = 0.0 if worst is None else abs(joints[worst].error)
+    if not joints:
+        return True, f"Next step {step + 1} moves nothing: it names no joint, or followers only."
+    worst = max(joints, key=lambda name: abs(joints[name].error))
+    error = abs(joints[worst].error)
     if error <= tolerance:  # written so that NaN fails
         return True, f"Next step {step + 1} was reached: every joint of it is within {error:.2g} rad."
     return False, (

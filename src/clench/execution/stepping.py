@@ -130,7 +130,7 @@ class Stepper:
         if not found.touching:
             why = "no finger touches it"
         elif motion.distance >= hold.max_distance:
-            why = f"the step moved it by {motion.distance * 1e3:.2g} mm"
+            why = f"the step moved it by {motion.distance * 1e3:.3g} mm"
         else:
             pulls = pull_each_way(scene, data, hold, after)
             lost = [name for name, pulled in pulls.items() if not pulled.held]
