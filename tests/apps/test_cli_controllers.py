@@ -69,13 +69,15 @@ def test_choices_are_the_values_of_the_enumerations() -> None:
         (["--actuator", "ros2", "--joint-map", "absent.toml"], "absent.toml: no such file."),
         (["--actuator", "ros2", "--timeout", "0"], "--timeout: expected seconds above 0, got 0."),
         (["--actuator", "orca-mock", "--config", "absent.yaml"], "absent.yaml: no such file."),
-        (["--actuator", "orca-mock", "--hold"], "--hold means nothing to --actuator orca-mock."),
+        (["--actuator", "orca-mock", "--hold"], "--hold or --lift means nothing to --actuator orca-mock."),
+        (["--actuator", "ros2", "--stills", "x"], "--video or --stills means nothing to --actuator ros2."),
         (["--mass", "0.2"], "--mass means nothing without --hold or --lift."),
         (["--hold", "--mass", "-1"], "hold: mass: expected a finite number of at least 0.001 kg, got -1.0."),
         (["--hold", "--friction", "nan"], "hold: friction: expected a finite number above 0, got nan;"),
         (["--object", "mug"], "geometry_hash: the solution was computed for another geometry of object 'mug'"),
         (["--log", "absent/x.mcap"], "absent/x.mcap: cannot be written (no folder 'absent')."),
         (["--out", "absent/x.json"], "absent/x.json: cannot be written (no folder 'absent')."),
+        (["--out", "."], ".: cannot be written (it is a folder)."),
     ],
 )
 def test_bad_input_moves_nothing(

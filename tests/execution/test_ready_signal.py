@@ -132,5 +132,7 @@ def test_where_it_cannot_go(pincer: Hand, tmp_path: Path, to: str) -> None:
 def test_what_cannot_be_written(pincer: Hand, pinch: GraspSolution, tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"absent/r\.db"):
         execute(pinch, ReadySignal(pincer, tmp_path / "absent" / "r.db", f"file:{tmp_path / 'ready.json'}"))
-    with pytest.raises(FileError, match=r"absent/ready\.json: cannot be written"):
-        execute(pinch, ReadySignal(pincer, tmp_path / "r.db", f"file:{tmp_path / 'absent' / 'ready.json'}"))
+    for to, why in ((tmp_path / "absent" / "ready.json", "no folder"), (tmp_path, "it is a folder")):
+        with pytest.raises(FileError, match=rf"{to}: cannot be written \({why}"):
+            ReadySignal(pincer, tmp_path / "r.db", f"file:{to}")
+    assert not (tmp_path / "r.db").exists()  # nothing is recorded that cannot be signalled

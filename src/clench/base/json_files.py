@@ -62,6 +62,19 @@ def write_json(path: str | Path, document: dict[str, Any], name: str) -> None:
     write_atomically(path, msgspec.json.format(encode_document(document, name), indent=2) + b"\n")
 
 
+def check_writable(path: str | Path) -> None:
+    """Refuse, before work is done whose result it shall hold, a file that is a folder or whose folder is missing.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise FileError(path, f"cannot be written (no folder '{target.parent}').")
+    if target.is_dir():
+        raise FileError(path, "cannot be written (it is a folder).")
+
+
 def write_atomically(path: str | Path, content: bytes) -> None:
     """Write a file through a temporary one beside it, so that readers see the old or the new, never a part.
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from clench.base.errors import ClenchError, FileError
-from clench.base.json_files import write_atomically
+from clench.base.json_files import check_writable, write_atomically
 
 from .scene import Scene
 
@@ -53,15 +53,15 @@ class Film:
         """Refuse what cannot be written.
 
         Raises:
-            FileError: another kind of file than GIF or MP4, or a folder that does not exist.
+            FileError: another kind of file than GIF or MP4, one that is a folder, or in none.
             ClenchError: MP4 without the library that writes it.
         """
         if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
             raise FileError(self.video, "cannot be written: expected a file name that ends with .gif or .mp4.")
         if self._is_mp4() and importlib.util.find_spec("imageio_ffmpeg") is None:
             raise ClenchError("MP4 needs imageio-ffmpeg: pip install 'clench[video]', or choose a .gif file.")
-        if self.video is not None and not self.video.parent.is_dir():
-            raise FileError(self.video, f"cannot be written (no folder '{self.video.parent}').")
+        if self.video is not None:
+            check_writable(self.video)
         if self.stills is not None and self.stills.exists() and not self.stills.is_dir():
             raise FileError(self.stills, "cannot be written: it is no folder.")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from clench.base.errors import CommandError
-from clench.base.json_files import write_json
+from clench.base.json_files import check_writable, write_json
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solve.record import Record
@@ -46,7 +46,7 @@ class ReadySignal:
         timeout: how long a receiver is looked for [s].
 
     Raises:
-        CommandError: `to` is malformed.
+        CommandError: `to` is malformed. FileError: its file is a folder, or in none.
     """
 
     name = "signal"
@@ -106,6 +106,8 @@ def _channel(to: str) -> _Channel:
         raise CommandError(f"to: expected {_KINDS}, got '{to}'.")
     if kind == "tcp":
         _address(where)
+    elif kind == "file":
+        check_writable(where)
     elif kind == "topic":
         from .drivers.ros2 import topic_name
 

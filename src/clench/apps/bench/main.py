@@ -9,7 +9,8 @@ from typing import Literal
 
 from clench.apps.cli.parsing import parse_call
 from clench.apps.cli.results import print_json
-from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.base.errors import CommandError, UnknownNameError
+from clench.base.json_files import check_writable
 
 from .report import BenchReport
 
@@ -291,10 +292,8 @@ def _at_least(least: int, **counts: int) -> None:
 
 def _writable(*files: Path | None) -> None:
     for file in files:
-        if file is not None and not file.parent.is_dir():
-            raise FileError(file, f"cannot be written (no folder '{file.parent}').")
-        if file is not None and file.is_dir():
-            raise FileError(file, "cannot be written (it is a folder).")
+        if file is not None:
+            check_writable(file)
 
 
 def _print(report: BenchReport, json: bool) -> int:

@@ -49,6 +49,8 @@ _TAKEN: dict[str, tuple[str, ...]] = {
     "orca-mock": ("joint_map", "config", "squeeze"),
     "signal": ("to", "record"),
 }
+#: How options are given that have another name here.
+_SAID = {"hold": "hold or --lift", "film": "video or --stills"}
 
 
 def make_actuator(
@@ -63,7 +65,8 @@ def make_actuator(
 
     for option in sorted({option for taken in _TAKEN.values() for option in taken} - set(_TAKEN[name])):
         if getattr(options, option) is not None:
-            raise CommandError(f"--{option.replace('_', '-')} means nothing to --actuator {name}.")
+            given = _SAID.get(option, option.replace("_", "-"))
+            raise CommandError(f"--{given} means nothing to --actuator {name}.")
     if not options.timeout > 0.0:
         raise CommandError(f"--timeout: expected seconds above 0, got {options.timeout:g}.")
     if name == "simulated":

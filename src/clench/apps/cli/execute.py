@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from clench.base.errors import FileError
+from clench.base.json_files import check_writable
 
 from .actuators import ActuatorName, ActuatorOptions, DriveName, Interface, make_actuator, make_film, make_hold
 from .interrupts import stopped_by_signals
@@ -86,8 +87,8 @@ def execute(
     from .results import exit_code, print_json
 
     for file in (out, log):
-        if file is not None and not file.parent.is_dir():
-            raise FileError(file, f"cannot be written (no folder '{file.parent}').")
+        if file is not None:
+            check_writable(file)
     film = make_film(video, stills)
     tested = make_hold(hold, lift, mass, friction)
     the_solution = clench.GraspSolution.load(solution)
