@@ -210,11 +210,38 @@ def test_solve_prints_a_table(
 
 
 def test_solve_without_command_draws_an_approach_pose(solver: FakeSolver) -> None:
+    solver.answer = make_solution(status=SolutionStatus.GRASP)
     main([*SOLVE, "--seed", "5", "--planes", "3", "--order", "proximal-first", "--scale", "0.001", "--palm", "p"])
     (command,) = solver.commands
     assert command == GraspCommand(hand_pose=clench.Pose([0, 0, 0]), seed=5, planes=3)
     assert solver.loaded[0] == ("pincer", {"hand_file": None, "palm": "p", "collision_source": None})
     assert solver.loaded[1] == ("ball", {"scale": 0.001})
+
+
+@pytest.mark.parametrize(
+    ("statuses", "taken"),
+    [
+        (("no_contact", "partial", "grasp"), 2),
+        (("blocked", "partial", "partial"), 1),
+        (("no_contact", "blocked", "no_contact"), 0),
+    ],
+)
+def test_solve_without_command_takes_the_first_pose_that_gives_a_grasp(
+    solver: FakeSolver,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    statuses: tuple[str, ...],
+    taken: int,
+) -> None:
+    def solve(hand: object, obj: object, command: GraspCommand) -> GraspSolution:
+        status = SolutionStatus(statuses[round(command.hand_pose.position[2] / 0.1)])
+        return replace(make_solution(status=status), hand_pose=command.hand_pose)
+
+    monkeypatch.setitem(vars(clench), "solve", solve)
+    main([*SOLVE, "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert document["status"] == statuses[taken]
+    assert clench.GraspSolution.from_dict(document).hand_pose.position[2] == pytest.approx(0.1 * taken)
 
 
 def test_solve_says_when_there_is_no_approach_pose(
@@ -374,7 +401,7 @@ def test_execute(
     calls = executed(success)
     arguments = ["execute", str(tmp_path / "s.json"), "--speed", "0.5", "--force", "--out", str(tmp_path / "r.json")]
     assert main([*arguments, "--json"]) == code
-    assert calls == [(make_solution(), "hand", {"speed": 0.5, "force": True})]
+    assert calls == [(make_solution(), "hand", {"speed": 0.5, "force": True, "next_steps": True})]
     document = json.loads(capsys.readouterr().out)
     assert document == json.loads((tmp_path / "r.json").read_text())
     assert document["success"] is success

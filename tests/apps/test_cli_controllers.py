@@ -166,7 +166,7 @@ def test_next_steps_are_carried_out_unless_told_otherwise(
     steps = json.loads(capsys.readouterr().out)["next_steps"]
     assert [list(step["joints"]) for step in steps] == [["index_proximal"], ["thumb_roll"]]
     assert steps[0]["joints"]["index_proximal"]["reached"] == pytest.approx(0.5, abs=1e-3)
-    assert main(["execute", file, "--no-next-steps", "--json"]) == 0
+    assert main(["execute", file, "--skip-next-steps", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["next_steps"] == []
 
 

@@ -16,15 +16,17 @@ from .exchange import export, import_
 from .execute import execute
 
 if TYPE_CHECKING:
-    from clench.base.pose import Pose
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
+    from clench.solve.solution import GraspSolution
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
 Source = Literal["engine", "raw", "visual"]
 Order = Literal["proximal-first", "together", "fingertip"]
 Status = Literal["grasp", "partial", "no_contact", "blocked"]
+#: Approach poses that are tried where no command says where the hand is.
+APPROACHES = 16
 
 
 def demo(
@@ -77,7 +79,8 @@ def solve(
     Args:
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        command: command file (JSON); without it the hand is placed at the first approach pose of --seed.
+        command: command file (JSON); without it the hand is placed at one of 16 approach poses of --seed, the first
+            that gives a grasp.
         hand_file: TOML file that overrides what was found in the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
@@ -85,7 +88,7 @@ def solve(
         planes: curl planes per finger.
         order: in which the joints close; several are solved one by one, and the best is kept.
         criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
-        seed: of the approach pose; recorded with the result.
+        seed: of the approach poses; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
         record: SQLite record to append the solution to.
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
@@ -112,19 +115,16 @@ def solve(
     mass = _checked_mass(mass, friction, criteria)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
-    if command is not None:
-        the_command = read_command(command, the_hand)
-    else:
-        the_command = clench.GraspCommand(hand_pose=first_approach(the_hand, the_object, seed), seed=seed)
+    commands = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
     if planes is not None:
-        the_command = replace(the_command, planes=planes)
+        commands = [replace(one, planes=planes) for one in commands]
     if order:
-        the_command = in_orders(the_command, order)
+        commands = [in_orders(one, order) for one in commands]
     if criteria is not None:
-        the_command = replace(the_command, criteria=criteria)
+        commands = [replace(one, criteria=criteria) for one in commands]
     announce()
     warm_up()
-    solution = clench.solve(the_hand, the_object, the_command)
+    the_command, solution = first_grasp(the_hand, the_object, commands)
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
     if json or forces or out is not None or record is not None:
@@ -285,18 +285,30 @@ COMMANDS: dict[str, Callable[..., int]] = {
 }
 
 
-def first_approach(hand: Hand, obj: GraspObject, seed: int) -> Pose:
-    """Return the first approach pose of a seed.
+def approaches(hand: Hand, obj: GraspObject, seed: int) -> list[GraspCommand]:
+    """Return a command for each of the first approach poses of a seed.
 
     Raises:
         CommandError: there is none.
     """
     import clench
 
-    poses = clench.approach_poses(hand, obj, 1, seed)
-    if not len(poses):
+    poses = clench.approach_poses(hand, obj, APPROACHES, seed)
+    if not poses:
         raise CommandError(f"No approach pose of hand '{hand.name}' on '{obj.name}' for seed {seed}; give --command.")
-    return poses[0]
+    return [clench.GraspCommand(hand_pose=pose, seed=seed) for pose in poses]
+
+
+def first_grasp(hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand]) -> tuple[GraspCommand, GraspSolution]:
+    """Return the first command that gives a grasp, and its solution; without any, the first that touches most."""
+    import clench
+
+    tried: list[tuple[GraspCommand, GraspSolution]] = []
+    for command in commands:
+        tried.append((command, clench.solve(hand, obj, command)))
+        if tried[-1][1].status == "grasp":
+            return tried[-1]
+    return max(tried, key=lambda one: one[1].status == "partial")
 
 
 def in_orders(command: GraspCommand, names: Sequence[Order]) -> GraspCommand:

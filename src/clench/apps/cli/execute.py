@@ -23,7 +23,7 @@ def execute(
     scale: float = 1.0,
     speed: float = 1.0,
     force: bool = False,
-    no_next_steps: bool = False,
+    skip_next_steps: bool = False,
     hold: bool = False,
     lift: bool = False,
     mass: float | None = None,
@@ -57,7 +57,7 @@ def execute(
         scale: that was used to load the object.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, or next steps that drive links into each other, too.
-        no_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
+        skip_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
         hold: simulated: close on the free object, squeeze it as planned, pull it in six directions.
         lift: simulated: close on the object where it stands on a table, squeeze it as planned, lift it.
         mass: hold, lift: of the object, kg (0.1).
@@ -103,7 +103,7 @@ def execute(
     )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
     with stopped_by_signals():
-        report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not no_next_steps)
+        report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not skip_next_steps)
     if film is not None:
         film.finish()
     if log is not None and report.history is None:
