@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 #: Segments per plane that an arena holds before it has to grow, and for how many objects it is known what suffices.
 CAPACITY = 512
 _KEPT_OBJECTS = 16
+#: Around objects of fewer triangles, waking threads takes longer than the work.
+THREADED = 1000
 
 
 @dataclass(eq=False)
@@ -188,9 +190,8 @@ def _close_plan(
     while True:
         answer = empty_answer(plan)
         close = partial(_close_range, plan, exact, obj, T, shared, arena.capacity, rounds, answer)
-        # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads. Where
-        # there is nothing to touch but the hand, waking them takes longer than the work.
-        alone = len(ranges) == 1 or obj is nothing_to_close()
+        # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
+        alone = len(ranges) == 1 or len(obj.tree.triangles) < THREADED
         deque(map(close, ranges) if alone else kernel_threads(core_count()).map(close, ranges), maxlen=0)
         wanted = int(answer.overflow.max(initial=0))
         if not wanted:
