@@ -128,6 +128,23 @@ def test_what_is_held_whichever_way_is_held_with_any_margin_asked_for(grip, marg
     assert "Holds 0.05 kg in every direction" in plan.text
 
 
+def test_one_contact_holds_nothing_in_every_direction(grip) -> None:
+    """No force of one contact balances a weight that points elsewhere; that must not drop out of the question."""
+    hand, ball, solution = grip
+    alone = replace(solution, contacts=tuple(c for c in solution.contacts if c.finger == "thumb"))
+    plan = clench.plan_squeeze(alone, hand, ball, mass=0.1, gravity=None)
+    assert not plan.feasible
+    assert plan.text == (
+        "No squeeze holds 0.1 kg in every direction of gravity: 12 of the disturbances cannot be resisted by any "
+        "forces of these contacts."
+    )
+    # Two point contacts leave the turning about their line: every weight that turns the ball about it.
+    two = [*alone.contacts[:1], next(c for c in solution.contacts if c.finger == "middle")]
+    off = solution.object_pose.position + np.array([0.01, 0.005, 0.0])
+    pinch = replace(solution, contacts=tuple(two))
+    assert not clench.plan_squeeze(pinch, hand, ball, mass=0.01, gravity=None, center_of_mass=off).feasible
+
+
 def test_torque_limited_epsilon_is_a_force(grip) -> None:
     hand, ball, solution = grip
     quality = clench.grasp_quality(solution, hand, ball, within_torques=True)

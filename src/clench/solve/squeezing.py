@@ -97,7 +97,8 @@ def plan_squeeze(
     Args:
         solution: the solution. hand, obj: what it was computed for.
         mass: of the object [kg].
-        gravity: direction in the world; None: any direction, and the mass is held when the margin reaches 1.
+        gravity: direction in the world; None: any direction, and the mass is held when the margin reaches 1 and no
+            disturbance is left out of it.
         disturbances: rows (force [N], torque [Nm]) in the world about the centre of mass, shape (N, 6); None: the
             weight as a pull along ±x, ±y, ±z of the palm, and as a torque at the length scale about the same axes
             (with `gravity=None`: the weight in any direction).
@@ -121,7 +122,8 @@ def plan_squeeze(
     # Any direction is held where the margin over the weight is 1: no less than that is looked for.
     enough = margin if gravity is not None or not margin > 0.0 else max(margin, 1.0)
     found = squeeze_forces(grasp.held, nominal, _disturbances(grasp, mass, gravity, disturbances), enough=enough)
-    held_any_way = gravity is not None or found.margin >= 1.0
+    # The margin leaves out what no forces resist; without a direction of gravity that is the weight itself.
+    held_any_way = gravity is not None or (found.margin >= 1.0 and not found.unresisted)
     feasible = found.plan is not None and held_any_way
     text = _sentence(found, mass, feasible, grasp, gravity is None)
     contacts, plan = grasp.held.contacts, found.plan
@@ -176,9 +178,10 @@ def _sentence(found: SqueezeForces, mass: float, feasible: bool, grasp: HeldSolu
     how = "in every direction of gravity" if any_way else "under gravity"
     if found.plan is None:
         return f"No squeeze holds {mass:.3g} kg {how}. {found.reason}"
+    left_out = f"{len(found.unresisted)} of the disturbances cannot be resisted by any forces of these contacts."
+    if not feasible and found.unresisted:
+        return f"No squeeze holds {mass:.3g} kg {how}: {left_out}"
     if not feasible:
         return f"No squeeze holds {mass:.3g} kg {how}: only {found.margin:.3g} times that mass."
     text = f"Holds {mass:.3g} kg {how}, with disturbances up to {found.margin:.3g} times the weight."
-    if found.unresisted:
-        text += f" {len(found.unresisted)} of the disturbances cannot be resisted by any forces of these contacts."
-    return text
+    return f"{text} {left_out}" if found.unresisted else text
