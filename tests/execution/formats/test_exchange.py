@@ -270,6 +270,14 @@ def test_a_posture_of_the_built_in_hand_is_closed_anew() -> None:
     assert command.object_pose == Pose([0, 0, 0.2])
 
 
+def test_a_pregrasp_that_lacks_a_joint_of_the_grasp_is_refused(placed: GraspSolution, tmp_path: Path) -> None:
+    lacking = replace(placed, pregrasp={"thumb": 0.1})
+    for ending in ("yaml", "npy", "json"):
+        with pytest.raises(CommandError, match=r"pregrasp\.index_yaw: missing; every joint of joint_angles is needed"):
+            export_grasps(tmp_path / f"g.{ending}", lacking)
+    assert not list(tmp_path.iterdir())
+
+
 def test_names_of_formats(placed: GraspSolution, tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"g\.txt: the ending names no format; expected \.yaml"):
         export_grasps(tmp_path / "g.txt", placed)

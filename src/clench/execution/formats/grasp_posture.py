@@ -55,8 +55,16 @@ def palm_in_object(solution: GraspSolution) -> Pose:
 
 
 def before_the_grasp(solution: GraspSolution) -> Mapping[str, float]:
-    """Return the angles of the pregrasp [rad], else of the open hand from which the fingers close."""
-    return solution.pregrasp or solution.open_angles
+    """Return the angles of the pregrasp [rad], else of the open hand from which the fingers close.
+
+    Raises:
+        CommandError: a joint of the grasp is missing there.
+    """
+    key, before = ("pregrasp", solution.pregrasp) if solution.pregrasp else ("open_angles", solution.open_angles)
+    missing = next((name for name in solution.joint_angles if name not in before), None)
+    if missing is not None:
+        raise CommandError(f"{key}.{missing}: missing; every joint of joint_angles is needed.")
+    return before
 
 
 def squeezed(solution: GraspSolution) -> Mapping[str, float]:
