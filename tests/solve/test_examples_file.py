@@ -193,6 +193,12 @@ def test_bad_input_is_one_sentence(arguments: list[str], message: str, capsys: p
     assert error.count("\n") == 1
 
 
+def test_a_fit_that_fails_names_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path, pairs=[{"better": scores(1.0), "worse": scores(2.0)}])
+    assert main(["calibrate", str(path)]) == 2
+    assert f"{path}: expected at least 4 pairs and outcomes, got 1." in capsys.readouterr().err
+
+
 def test_an_outcome_needs_a_solve(record: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["record", str(record), "--outcome", "held"]) == 2
     assert "give its --id" in capsys.readouterr().err

@@ -69,30 +69,30 @@ class Fit:
     outcomes: int
 
 
-def fit_weights(examples: Examples, penalty: float = PENALTY) -> Fit:
+def fit_weights(examples: Examples, penalty: float = PENALTY, *, source: str = "examples") -> Fit:
     """Return the weights that make the examples likeliest, and their accuracy on examples that were left out.
 
     Args:
-        examples: at least four. penalty: see `PENALTY`.
+        examples: at least four. penalty: see `PENALTY`. source: where they come from, for errors.
 
     Raises:
         CommandError: too few examples, outcomes that are all the same, no criterion that all have, or none that tells
             better from worse in its own direction.
     """
     if examples.count < FEWEST:
-        raise CommandError(f"examples: expected at least {FEWEST} pairs and outcomes, got {examples.count}.")
+        raise CommandError(f"{source}: expected at least {FEWEST} pairs and outcomes, got {examples.count}.")
     if not examples.names:
-        raise CommandError("examples: no criterion has a score on every side of every example.")
+        raise CommandError(f"{source}: no criterion has a score on every side of every example.")
     if _one_kind(examples.held):
         what, other = ("held", "dropped") if examples.held[0] else ("dropped", "held")
         raise CommandError(
-            f"examples: all {len(examples.held)} outcomes are {what}, which does not tell what makes grasps hold; "
+            f"{source}: all {len(examples.held)} outcomes are {what}, which does not tell what makes grasps hold; "
             f"add some that were {other}, or give pairs alone."
         )
     raw, intercept = likeliest(examples, penalty)
     if raw.max(initial=0.0) <= 0.0:
         listed = ", ".join(examples.names)
-        raise CommandError(f"examples: no criterion ({listed}) tells better from worse in its own direction.")
+        raise CommandError(f"{source}: no criterion ({listed}) tells better from worse in its own direction.")
     folds = min(FOLDS, examples.count)
     fold = np.random.default_rng(_SEED).permutation(examples.count) % folds
     told = 0.0

@@ -52,7 +52,7 @@ def calibrate(
         scored += recorded_outcomes(record)
     before = calibration_of(base)
     numbers = scored.in_numbers(before)
-    fit = fit_weights(numbers)
+    fit = fit_weights(numbers, source=" and ".join(str(path) for path in (examples, record) if path is not None))
     known = np.array([before.weights.get(name, 0.0) for name in fit.names])
     compared = told_right(numbers, known, None) if fit.pairs else None
     fitted = replace(before, weights=dict(zip(fit.names, fit.weights.round(6).tolist(), strict=True)))
