@@ -13,6 +13,7 @@ from clench.base.errors import ClenchError, CommandError, FileError
 from clench.execution.executing import execute
 from clench.execution.filming import FRAME, Film
 from clench.execution.hold import Hold
+from clench.execution.scene import build_scene
 from clench.execution.simulation import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -51,6 +52,29 @@ def test_a_film_is_as_long_as_what_it_shows(
 
 
 _ALL = ("1_start.png", "2_touch.png", "3_squeeze.png", "4_end.png")
+
+
+def test_the_whole_object_is_in_the_picture(pincer: Hand, pinch: GraspSolution, tmp_path: Path) -> None:
+    """A bottle that is longer than the hand must not be cut off at the edges."""
+    import mujoco
+    from PIL import Image
+
+    film = Film(stills=tmp_path)
+    tall = GraspObject.load("cylinder:r=0.02,h=0.5").posed(pinch.object_pose)
+    scene = build_scene(pincer, tall, pinch.hand_pose, np.zeros(3))
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    try:
+        film.begin(scene, data)
+    except ClenchError as error:
+        if "OpenGL cannot draw here" in str(error):
+            pytest.skip("no OpenGL here")
+        raise
+    picture = np.asarray(Image.open(film.finish()[0])).astype(int)
+    orange = (picture[..., 0] > 150) & (picture[..., 2] < 100)
+    assert orange.sum() > 1000
+    assert not orange[[0, -1]].any()
+    assert not orange[:, [0, -1]].any()
 
 
 def test_pictures_come_back_from_an_mp4_in_order(tmp_path: Path) -> None:

@@ -81,8 +81,8 @@ class Film:
             self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
         except Exception as error:  # whatever the graphics library raises
             raise ClenchError(_NO_OPENGL.format(error)) from None
-        bodies = [body for body in scene.link_bodies if body >= 0] + [scene.object_body]
-        places = data.xipos[bodies]
+        links = [body for body in scene.link_bodies if body >= 0]
+        places = np.vstack([data.xipos[links], *(_corners(scene.model, data, geom) for geom in scene.object_geoms)])
         self._camera = mujoco.MjvCamera()
         self._camera.lookat[:] = 0.5 * (places.min(axis=0) + places.max(axis=0))
         self._camera.distance = _DISTANCE * max(float(np.ptp(places, axis=0).max()), 0.1)
@@ -136,6 +136,13 @@ class Film:
 
         self._renderer.update_scene(data, self._camera)
         return Image.fromarray(self._renderer.render())
+
+
+def _corners(model: Any, data: Any, geom: int) -> Any:
+    """Return the corners of the box around a geom in the world [m], shape (8, 3)."""
+    center, half = model.geom_aabb[geom].reshape(2, 3)
+    signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+    return data.geom_xpos[geom] + (center + signs * half) @ data.geom_xmat[geom].reshape(3, 3).T
 
 
 def _gif(frames: list[Any]) -> bytes:
