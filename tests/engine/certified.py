@@ -2,7 +2,7 @@
 
 Run ``python tests/engine/certified.py --poses 50 --file certified.jsonl``; it takes hours, fewer poses a part of that.
 A run that was ended goes on where it was. On the closing path, every joint backed off by 1e-5 rad where it stops,
-nothing may collide; 1e-3 rad beyond a contact, its joint alone, the finger must.
+nothing may collide; at most 1e-3 rad beyond a contact, its joint alone, the finger must.
 """
 
 import argparse

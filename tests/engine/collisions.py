@@ -17,6 +17,8 @@ Floats = npt.NDArray[np.float64]
 
 #: How far each joint is backed off along its path, and how far it is advanced beyond its contact [rad].
 BACK, FURTHER = 1e-5, 1e-3
+#: Parts of the latter at which it is looked whether a contact stops its joint, the longest first.
+STEPS_BEYOND = (1.0, 0.3, 0.1, 0.01, 0.001)
 _LOOKS = 12
 
 
@@ -116,12 +118,15 @@ class Collisions:
                 continue
             counted["contacts"] += 1
             joint = self.hand.joint_index(contact.stops_joint)
-            q = end.copy()
-            q[joint] += FURTHER * self.hand.joints[joint].direction
-            if self.collide(q, T_object_palm, self.hand.finger(contact.finger)):
+            # A corner that is clipped in passing is free again before the longest step.
+            beyond = [end.copy() for _ in STEPS_BEYOND]
+            for q, step in zip(beyond, STEPS_BEYOND, strict=True):
+                q[joint] += step * FURTHER * self.hand.joints[joint].direction
+            if self.collide(beyond[0], T_object_palm, self.hand.finger(contact.finger)):
                 continue
             counted["shallow"] += 1
-            if self.core_gap(q, T_object_palm, self.hand.link_index(contact.link)) >= 0.0:
+            link = self.hand.link_index(contact.link)
+            if all(self.core_gap(q, T_object_palm, link) >= 0.0 for q in beyond):
                 wrong.append(f"{contact.stops_joint} advanced: {contact.link} does not collide ({contact.kind})")
         return counted, wrong
 

@@ -117,9 +117,12 @@ def test_without_a_screen_and_without_a_way_to_do_without(
     pincer: Hand, pinch: GraspSolution, ball: GraspObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The engine's own default would end the whole program."""
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("sys.platform", "linux")
+    # What counts is what the engine found when it was imported, not what is said later.
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setattr("mujoco.GLContext", type("GLContext", (), {"__module__": "mujoco.glfw"}), raising=False)
     with pytest.raises(ClenchError, match=r"OpenGL cannot draw here \(there is no screen\)\. .* set MUJOCO_GL=egl"):
         execute(pinch, SimulatedHand(pincer, ball, film=Film(tmp_path / "a.gif")))
 

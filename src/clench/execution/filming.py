@@ -74,8 +74,9 @@ class Film:
         import mujoco
 
         headless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-        if headless and os.environ.get("MUJOCO_GL", "") not in ("egl", "osmesa"):
-            # The engine's default needs a screen, and ends the program where there is none.
+        if headless and getattr(mujoco, "GLContext", None).__module__ == "mujoco.glfw":
+            # The engine's default, unless told otherwise when it was imported: it needs a screen, and ends the program
+            # where there is none.
             raise ClenchError(_NO_OPENGL.format("there is no screen"))
         try:
             self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
