@@ -68,20 +68,29 @@ def place_links(frames: FrameArrays, q: Floats, poses: Floats) -> None:
 def put_links(frames: FrameArrays, q: Floats, scratch: Floats, poses: Floats) -> None:
     """Do as `place_links` with scratch space, (L + 2, 3, 4)."""
     links = frames.parent.shape[0]
-    R, turned = scratch[links], scratch[links + 1]
     for i in range(links):
-        j, parent = frames.joint[i], frames.parent[i]
-        if j >= 0:
-            angle = q[j] - frames.reference[j]
-            turn_link(frames.axis[j], frames.anchor[j], angle, frames.T_parent_link[i], R, turned)
-        else:
-            copy_pose(frames.T_parent_link[i], turned)
-        if parent < 0:
-            copy_pose(turned, scratch[i])
-        else:
-            compose(scratch[parent], turned, scratch[i])
+        put_link(frames, i, q, scratch[links], scratch[links + 1], scratch)
     for i in range(links):
         compose_inverse(scratch[frames.palm[0]], scratch[i], poses[i])
+
+
+@inner_kernel
+def put_link(frames: FrameArrays, i: int, q: Floats, R: Floats, turned: Floats, poses: Floats) -> None:
+    """Write the pose of one link in the frame of the root to `poses[i]`; that of its parent is there already.
+
+    Args:
+        q: the posture (J,) [rad]. R, turned: scratch space, (3, 4) each. poses: of the links, at least (L, 3, 4).
+    """
+    j, parent = frames.joint[i], frames.parent[i]
+    if j >= 0:
+        angle = q[j] - frames.reference[j]
+        turn_link(frames.axis[j], frames.anchor[j], angle, frames.T_parent_link[i], R, turned)
+    else:
+        copy_pose(frames.T_parent_link[i], turned)
+    if parent < 0:
+        copy_pose(turned, poses[i])
+    else:
+        compose(poses[parent], turned, poses[i])
 
 
 @inner_kernel

@@ -6,14 +6,14 @@ on the same solids as the exact sweeps, so that a difference comes from the meth
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .box_query import BoxTrees, Query, make_query, within
-from .compiling import allocating_kernel, inner_kernel, kernel
-from .family_pose import compose, compose_inverse, copy_pose
+from .compiling import allocating_kernel, inner_kernel
+from .family_pose import compose_inverse
+from .frames import FrameArrays, couple, put_link
 from .layout import Floats, Ints
 
 #: What became of a degree of freedom.
@@ -29,12 +29,10 @@ ALSO_CONTACT = 2.0
 
 
 class SteppedHand(NamedTuple):
-    """Hold what stepping needs of a hand; L links, J joints, D free degrees of freedom, C couplings.
+    """Hold what stepping needs of a hand; L links, D free degrees of freedom.
 
     Args:
-        parent, joint: of each link, -1 for none, (L,). fixed: `T_parent_link`, (L, 3, 4).
-        axis, anchor: of each joint in the frame of the link that it moves, (J, 3). reference, lower, upper: (J,) [rad].
-        leader, follower: (C,). ratio, offset: (C,).
+        frames: its kinematics.
         free: joint of each degree of freedom, palm side first, finger after finger, (D,). finger: its own, (D,).
         rate: +1 or -1, so that it closes, (D,). end: its limit in that direction [rad], (D,).
         owner: the finger of each link, -1 where nothing closes it, (L,).
@@ -42,18 +40,7 @@ class SteppedHand(NamedTuple):
         links: every link in its own frame.
     """
 
-    parent: Ints
-    joint: Ints
-    fixed: Floats
-    axis: Floats
-    anchor: Floats
-    reference: Floats
-    lower: Floats
-    upper: Floats
-    leader: Ints
-    follower: Ints
-    ratio: Floats
-    offset: Floats
+    frames: FrameArrays
     free: Ints
     finger: Ints
     rate: Floats
@@ -109,12 +96,12 @@ def close_in_steps(
         q: the posture [rad], (J,), read and written. step: [rad]. most: rounds at most.
         stops, tally: what became of each degree of freedom, (D,); how many queries of what kind, (3,). log: see there.
     """
-    joints, links = q.shape[0], hand.parent.shape[0]
+    joints, links = q.shape[0], hand.frames.parent.shape[0]
     poses, turn, local = np.empty((links, 3, 4)), np.empty((3, 4)), np.empty((3, 4))
     state = _State(q, np.empty(joints), stops, poses, turn, local, tally, log, make_query(), T_root_target)
     stops[:], tally[:] = MOVING, 0
     for i in range(links):
-        put_link(hand, i, q, state)
+        put_link(hand.frames, i, q, state.turn, state.local, state.poses)
     if rule == ALL_AT_ONCE:
         step_all(hand, target, state, step, fine, most)
     elif rule == ROUND_ROBIN:
@@ -205,7 +192,7 @@ def move_all(hand: SteppedHand, state: _State, step: float) -> None:
     for d in range(hand.free.shape[0]):
         if state.stops[d] == MOVING:
             state.trial[hand.free[d]] = stepped(hand, state.q, d, step)
-    couple(hand, state.trial)
+    couple(hand.frames, state.trial)
 
 
 @inner_kernel
@@ -213,7 +200,7 @@ def move_one(hand: SteppedHand, state: _State, d: int, step: float) -> None:
     """Write the posture one step of one degree of freedom on to `trial`."""
     copy_posture(state.q, state.trial)
     state.trial[hand.free[d]] = stepped(hand, state.q, d, step)
-    couple(hand, state.trial)
+    couple(hand.frames, state.trial)
 
 
 @inner_kernel
@@ -230,14 +217,6 @@ def copy_posture(q: Floats, out: Floats) -> None:
     """Write a posture elsewhere."""
     for j in range(q.shape[0]):
         out[j] = q[j]
-
-
-@inner_kernel
-def couple(hand: SteppedHand, q: Floats) -> None:
-    """Write the angles of followers."""
-    for c in range(hand.leader.shape[0]):
-        j = hand.follower[c]
-        q[j] = min(max(hand.ratio[c] * q[hand.leader[c]] + hand.offset[c], hand.lower[j]), hand.upper[j])
 
 
 @inner_kernel
@@ -265,7 +244,7 @@ def any_hit(hand: SteppedHand, target: BoxTrees, state: _State) -> bool:
     """Say whether any moving link collides at the posture that is tried."""
     put_links(hand, state.trial, state, -1)
     found = False
-    for m in range(hand.parent.shape[0]):
+    for m in range(hand.frames.parent.shape[0]):
         if is_moving(hand, state, m) and hit_of(hand, target, state, m):
             found = True
             break
@@ -276,7 +255,7 @@ def any_hit(hand: SteppedHand, target: BoxTrees, state: _State) -> bool:
 def any_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) -> bool:
     """Say whether any moving link is nearer than a bound at the posture that is tried."""
     found = False
-    for m in range(hand.parent.shape[0]):
+    for m in range(hand.frames.parent.shape[0]):
         if is_moving(hand, state, m) and near_of(hand, target, state, m, bound):
             found = True
             break
@@ -288,7 +267,7 @@ def hits(hand: SteppedHand, target: BoxTrees, state: _State, d: int) -> bool:
     """Say whether a link that a degree of freedom moves collides at the posture that is tried."""
     put_links(hand, state.trial, state, hand.finger[d])
     found = False
-    for m in range(hand.parent.shape[0]):
+    for m in range(hand.frames.parent.shape[0]):
         if hand.moves[d, m] and hit_of(hand, target, state, m):
             found = True
             break
@@ -299,7 +278,7 @@ def hits(hand: SteppedHand, target: BoxTrees, state: _State, d: int) -> bool:
 def stop_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) -> bool:
     """Stop whatever moves a link that is nearer than a bound; say whether there is such a link."""
     found = False
-    for m in range(hand.parent.shape[0]):
+    for m in range(hand.frames.parent.shape[0]):
         if is_moving(hand, state, m) and near_of(hand, target, state, m, bound):
             stop_link(hand, state, m)
             found = True
@@ -311,7 +290,7 @@ def stop_hit(hand: SteppedHand, target: BoxTrees, state: _State, step: float) ->
     """Stop whatever moves a link that collides one step on, where no gap can be found before it."""
     move_all(hand, state, step)
     put_links(hand, state.trial, state, -1)
-    for m in range(hand.parent.shape[0]):
+    for m in range(hand.frames.parent.shape[0]):
         if is_moving(hand, state, m) and hit_of(hand, target, state, m):
             stop_link(hand, state, m)
 
@@ -362,39 +341,6 @@ def note(state: _State, m: int, kind: int, answer: bool) -> None:
 def put_links(hand: SteppedHand, q: Floats, state: _State, finger: int) -> None:
     """Write the poses of the links of a finger in the frame of the root; of all fingers for -1."""
     state.tally[POSTURES] += 1
-    for i in range(hand.parent.shape[0]):
+    for i in range(hand.frames.parent.shape[0]):
         if hand.owner[i] >= 0 and (finger < 0 or hand.owner[i] == finger):
-            put_link(hand, i, q, state)
-
-
-@inner_kernel
-def put_link(hand: SteppedHand, i: int, q: Floats, state: _State) -> None:
-    """Write the pose of one link in the frame of the root; that of its parent is up to date."""
-    j, p = hand.joint[i], hand.parent[i]
-    if j < 0:
-        copy_pose(hand.fixed[i], state.local)
-    else:
-        put_turn(hand.axis[j], hand.anchor[j], q[j] - hand.reference[j], state.turn)
-        compose(hand.fixed[i], state.turn, state.local)
-    if p < 0:
-        copy_pose(state.local, state.poses[i])
-    else:
-        compose(state.poses[p], state.local, state.poses[i])
-
-
-@kernel
-def put_turn(axis: Floats, anchor: Floats, angle: float, out: Floats) -> None:
-    """Write the turn about an axis through an anchor, (3, 4)."""
-    s, c = math.sin(angle), math.cos(angle)
-    for r in range(3):
-        for k in range(3):
-            out[r, k] = (1.0 - c) * axis[r] * axis[k]
-        out[r, r] += c
-    out[0, 1] -= s * axis[2]
-    out[0, 2] += s * axis[1]
-    out[1, 2] -= s * axis[0]
-    out[1, 0] += s * axis[2]
-    out[2, 0] -= s * axis[1]
-    out[2, 1] += s * axis[0]
-    for r in range(3):
-        out[r, 3] = anchor[r] - out[r, 0] * anchor[0] - out[r, 1] * anchor[1] - out[r, 2] * anchor[2]
+            put_link(hand.frames, i, q, state.turn, state.local, state.poses)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
+from clench.grasp.linkage import hand_frames
 from clench.grasp.plan import closing_joints
 from clench.grasp.scene import shape_elements
 from clench.models.hand.hand import Finger, Hand
@@ -138,18 +139,7 @@ def stepped_hand(hand: Hand, links: BoxTrees) -> SteppedHand:
     rate = np.array([joints[j].direction for j, _, _ in free], dtype=np.float64)
     ends = [joints[j].upper if joints[j].direction > 0 else joints[j].lower for j, _, _ in free]
     return SteppedHand(
-        parent=np.array([link.parent for link in hand.links]),
-        joint=np.array([link.joint for link in hand.links]),
-        fixed=np.ascontiguousarray([link.T_parent_link[:3] for link in hand.links]),
-        axis=np.array([x.axis for x in joints], dtype=np.float64),
-        anchor=np.array([x.anchor for x in joints], dtype=np.float64),
-        reference=np.array([x.reference for x in joints], dtype=np.float64),
-        lower=np.array([x.lower for x in joints], dtype=np.float64),
-        upper=np.array([x.upper for x in joints], dtype=np.float64),
-        leader=np.array([c.leader for c in hand.couplings], dtype=np.int64),
-        follower=np.array([c.follower for c in hand.couplings], dtype=np.int64),
-        ratio=np.array([c.ratio for c in hand.couplings], dtype=np.float64),
-        offset=np.array([c.offset for c in hand.couplings], dtype=np.float64),
+        frames=hand_frames(hand),
         free=np.array([j for j, _, _ in free], dtype=np.int64),
         finger=np.array([number for _, number, _ in free], dtype=np.int64),
         rate=rate,
