@@ -1,5 +1,6 @@
 """The controller: what the solution holds of the three inputs and of every alternative set."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -221,3 +222,21 @@ def test_the_pose_sensitivity_of_one_link_on_a_ball_is_the_closed_form():
     (finger,) = solution.fingers.values()
     found = finger.candidates[finger.chosen].scores["pose_sensitivity"]
     assert found == pytest.approx(1.0 / np.sqrt(distance**2 - 0.028**2), rel=1e-6)
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.5], ids=["touching", "out of reach"])
+def test_what_is_made_when_it_is_read_is_what_the_choice_was_made_of(distance):
+    """Alternatives, causes and reasons are made late; copies and documents hold them, read before or not."""
+    ball = BALL.posed(Pose(BALL.pose.position + distance))
+    solution, again = (clench.solve(three_links(), ball, command(planes=3)) for _ in range(2))
+    finger = again.fingers["index"]
+    assert "candidates" not in vars(finger)
+    copied = pickle.loads(pickle.dumps(again))
+    assert {**copied.to_dict(), "timing": {}} == {**solution.to_dict(), "timing": {}}
+    assert finger == solution.fingers["index"]
+    assert finger.candidates is finger.candidates
+    chosen = finger.candidates[finger.chosen]
+    assert [id(c) for c in again.contacts] == [id(c) for c in chosen.contacts]
+    assert (finger.cause is None) == (finger.status is clench.FingerStatus.TOUCH)
+    with pytest.raises(AttributeError, match="no attribute 'other'"):
+        finger.other  # noqa: B018

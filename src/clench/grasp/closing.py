@@ -185,14 +185,15 @@ def _close_plan(
     rounds: int,
 ) -> ClosingArrays:
     """Close the items of a plan, with arenas for later families that grow until they are large enough."""
-    ranges, arena = _entry_ranges(plan), arena_of(obj.tree)
+    arena = arena_of(obj.tree)
+    # Items know nothing of each other, and kernels hold no lock: the answer is the same for any ranges and threads.
+    alone = len(obj.tree.triangles) < THREADED
+    ranges = [(0, len(plan.items.entry))] if alone else _entry_ranges(plan)
     exact = exact._replace(object=obj.bodies)
     while True:
         answer = empty_answer(plan)
         close = partial(_close_range, plan, exact, obj, T, shared, arena.capacity, rounds, answer)
-        # Items know nothing of each other, and kernels hold no lock: the answer is the same for any threads.
-        alone = len(ranges) == 1 or len(obj.tree.triangles) < THREADED
-        deque(map(close, ranges) if alone else kernel_threads(core_count()).map(close, ranges), maxlen=0)
+        deque(map(close, ranges) if len(ranges) == 1 else kernel_threads(core_count()).map(close, ranges), maxlen=0)
         wanted = int(answer.overflow.max(initial=0))
         if not wanted:
             return answer

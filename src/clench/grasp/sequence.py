@@ -14,7 +14,7 @@ from clench.models.hand.hand import Hand
 from .candidates import FingerCandidate, closed_anew
 from .closing import ClosedHand, HandPlan, close_items_again
 from .exact import HandBodies
-from .linkage import placed_links
+from .linkage import placed_postures
 from .scene import PackedObject
 
 if TYPE_CHECKING:
@@ -70,15 +70,17 @@ def _placed(
     Returns:
         indices of the sets; poses of the links for every entry, shape (E, L, 3, 4).
     """
-    waiting, placed, q = [], exact.link_pose.copy(), start.copy()
+    waiting, postures, q = [], [], start.copy()
     for k, candidate in enumerate(sets):
         own = list(candidate.plan.finger.joints)
         if k >= first and candidate.plane is None and candidate.overlap is None:
             waiting.append(k)
-            posture = q.copy()
-            posture[own] = candidate.plan.posture[own]
-            placed[plan.items.entry[candidate.item]] = placed_links(hand, posture)
+            postures.append(q.copy())
+            postures[-1][own] = candidate.plan.posture[own]
         q[own] = candidate.q[own]
+    placed = exact.link_pose.copy()
+    if waiting:
+        placed[plan.items.entry[[sets[k].item for k in waiting]]] = placed_postures(hand, np.array(postures))
     return waiting, placed
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.base.deferring import DeferredMapping
+from clench.base.pose import FloatArray, Pose
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate, Touch
 from clench.grasp.depths import LinkDepth, retreat_distance
@@ -76,8 +78,9 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
     from clench import __version__
 
     hand, command, packed = problem.hand, problem.command, problem.packed
-    placed = _placed(answer, problem)
-    results = {c.plan.finger.name: _finger(answer, k, problem, placed) for k, c in enumerate(answer.best)}
+    placed = _placed(answer.best, problem.T_world_palm)
+    made = [_finger(answer, k, problem, placed) for k in range(len(answer.fingers))]
+    results = {result.name: result for _, result in made}
     for finger in asked_fingers(hand, command):
         if finger.name not in results:
             text = f"{finger.name} has no closing joint."
@@ -101,12 +104,12 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         joint_angles=dict(zip(names, answer.final.tolist(), strict=True)),
         open_angles=dict(zip(names, _opened(answer, problem).tolist(), strict=True)),
         certified=answer.certificate.holds,
-        certificate={**asdict(answer.certificate), "links": list(answer.certificate.links)},
+        certificate=answer.certificate.to_dict(),
         collision_source=str(problem.source),
         object_collision_source=str(problem.obj.collision_source),
         max_penetration=None if answer.at_end is None else max((d.depth for d in answer.at_end), default=0.0),
         fingers=results,
-        contacts=tuple(c for r in results.values() if r.candidates for c in r.candidates[r.chosen].contacts),
+        contacts=tuple(contact for best, _ in made for contact in best.contacts),
         choice=answer.choice,
         timing=dict(timing),
         speeds=dict(command.speeds),
@@ -125,32 +128,40 @@ def _opened(answer: Answer, problem: Problem) -> FloatArray:
     return q
 
 
-def _placed(answer: Answer, problem: Problem) -> _Places:
-    """Return position and normal of every touch in the world, by the touch's identity."""
-    touches = [t for group in answer.fingers for c in group for t in c.touches]
-    T = problem.T_world_palm
-    positions = T.apply(np.array([t.position for t in touches]).reshape(-1, 3))
-    normals = np.array([t.normal for t in touches]).reshape(-1, 3) @ T.rotation.T
-    return {id(t): (p, n) for t, p, n in zip(touches, positions, normals, strict=True)}
+def _placed(sets: Sequence[FingerCandidate], T_world_palm: Pose) -> _Places:
+    """Return position and normal of every touch of some sets in the world, by the touch's identity."""
+    touches = [t for c in sets for t in c.touches]
+    # One row alone would be rounded in another way than many.
+    rows = touches * 2 if len(touches) == 1 else touches
+    positions = T_world_palm.apply(np.array([t.position for t in rows]).reshape(-1, 3))
+    normals = np.array([t.normal for t in rows]).reshape(-1, 3) @ T_world_palm.rotation.T
+    return {id(t): (p, n) for t, p, n in zip(rows, positions, normals, strict=True)}
 
 
-def _finger(answer: Answer, k: int, problem: Problem, placed: _Places) -> FingerResult:
-    candidates = tuple(_candidate(c, problem, placed) for c in answer.fingers[k])
-    best = candidates[answer.chosen[k]]
-    name = answer.fingers[k][0].plan.finger.name
-    cause = finger_cause(answer.best[k], best.status, problem)
-    return FingerResult(name, best.status, best.reason, answer.chosen[k], candidates, cause)
+def _finger(answer: Answer, k: int, problem: Problem, placed: _Places) -> tuple[Candidate, FingerResult]:
+    """Return the chosen candidate of a finger, and its result, whose other candidates are made when they are read."""
+    group, chosen = tuple(answer.fingers[k]), answer.chosen[k]
+    best = _candidate(group[chosen], problem, placed)
+
+    def candidates() -> tuple[Candidate, ...]:
+        others = _placed(group, problem.T_world_palm)
+        return tuple(best if i == chosen else _candidate(c, problem, others) for i, c in enumerate(group))
+
+    cause = None
+    if best.status is not FingerStatus.TOUCH:
+        cause = DeferredMapping(partial(finger_cause, group[chosen], best.status, problem))
+    return best, FingerResult.deferred(group[0].plan.finger.name, best, chosen, candidates, cause)
 
 
 def _candidate(c: FingerCandidate, problem: Problem, placed: _Places) -> Candidate:
-    hand = problem.hand
+    joints = problem.hand.joint_names
     status, reason = _finger_status(c, problem)
     return Candidate(
         plane=c.plane,
         offset=c.offset,
         order=str(problem.command.order),
         posture=c.posture,
-        joint_angles={hand.joints[j].name: float(c.q[j]) for j in c.plan.finger.joints},
+        joint_angles={joints[j]: float(c.q[j]) for j in c.plan.finger.joints},
         status=status,
         reason=reason,
         feasible=c.feasible,
@@ -209,27 +220,32 @@ def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, 
 
 def _status(
     answer: Answer, results: Mapping[str, FingerResult], problem: Problem
-) -> tuple[SolutionStatus, dict[str, Any]]:
+) -> tuple[SolutionStatus, Mapping[str, Any]]:
+    """Return the status and its reason, which is made when it is first read."""
     deepest = max(answer.at_start, key=lambda d: d.depth, default=None)
     if deepest is not None and deepest.depth > ALLOWED_PENETRATION:
-        return SolutionStatus.BLOCKED, _overlap_reason(deepest, problem)
+        return SolutionStatus.BLOCKED, DeferredMapping(partial(_overlap_reason, deepest, problem))
     statuses = [r.status for r in results.values()]
     if all(s is FingerStatus.BLOCKED for s in statuses):
         worst = max((c.overlap for c in answer.best if c.overlap), key=lambda d: d.depth)
-        return SolutionStatus.BLOCKED, _overlap_reason(worst, problem)
+        return SolutionStatus.BLOCKED, DeferredMapping(partial(_overlap_reason, worst, problem))
     touching = [r.name for r in results.values() if r.status is FingerStatus.TOUCH]
     if not touching:
         text = "No finger touches: " + " ".join(r.reason for r in results.values())
-        return SolutionStatus.NO_CONTACT, {"code": "no_contact", "text": text, **_causes(results)}
+        return SolutionStatus.NO_CONTACT, _with_causes("no_contact", text, results)
     listed = ", ".join(touching)
     if len(touching) == len(results):
         return SolutionStatus.GRASP, {"code": "all_touch", "text": f"Every finger touches: {listed}."}
     pair = _opposition(answer)
     if pair:
         text = f"{pair[0]} and {pair[1]} oppose each other; touching: {listed}."
-        return SolutionStatus.GRASP, {"code": "opposed", "text": text, **_causes(results)}
+        return SolutionStatus.GRASP, _with_causes("opposed", text, results)
     text = f"Only some fingers touch: {listed}."
-    return SolutionStatus.PARTIAL, {"code": "some_touch", "text": text, **_causes(results)}
+    return SolutionStatus.PARTIAL, _with_causes("some_touch", text, results)
+
+
+def _with_causes(code: str, text: str, results: Mapping[str, FingerResult]) -> Mapping[str, Any]:
+    return DeferredMapping(lambda: {"code": code, "text": text, **_causes(results)})
 
 
 def _causes(results: Mapping[str, FingerResult]) -> dict[str, Any]:

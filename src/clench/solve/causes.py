@@ -48,14 +48,12 @@ class CauseCode(StrEnum):
     """the finger touched on its way, and a later joint carried it off again"""
 
 
-def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> dict[str, Any] | None:
-    """Return why a finger's chosen set does not touch the object, as plain values; None when it touches.
+def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> dict[str, Any]:
+    """Return why a finger's chosen set does not touch the object, as plain values.
 
     Args:
         c: the set. status: how it ended. problem: what was solved.
     """
-    if status is FingerStatus.TOUCH:
-        return None
     if status is FingerStatus.BLOCKED:
         return _blocked(c, problem)
     if status is FingerStatus.NO_MOTION:

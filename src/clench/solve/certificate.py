@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class Certificate:
     code: CertificateCode = CertificateCode.CERTIFIED
     links: tuple[str, ...] = ()
     finger: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {**values, "links": list(self.links)}
 
 
 def _refused(code: CertificateCode, text: str, links: Sequence[str] = (), finger: str | None = None) -> Certificate:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
@@ -137,6 +137,32 @@ class FingerResult:
     chosen: int
     candidates: tuple[Candidate, ...]
     cause: Mapping[str, Any] | None = None
+
+    @classmethod
+    def deferred(
+        cls,
+        name: str,
+        best: Candidate,
+        chosen: int,
+        candidates: Callable[[], tuple[Candidate, ...]],
+        cause: Mapping[str, Any] | None,
+    ) -> FingerResult:
+        """Return a finger that ends as its best candidate does; all candidates are made when they are first read."""
+        result = object.__new__(cls)
+        values = {"name": name, "status": best.status, "reason": best.reason, "chosen": chosen, "cause": cause}
+        result.__dict__.update(values, _make_candidates=candidates)
+        return result
+
+    def __getattr__(self, name: str) -> tuple[Candidate, ...]:
+        make: Callable[[], tuple[Candidate, ...]] | None = self.__dict__.get("_make_candidates")
+        if name != "candidates" or make is None:
+            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
+        made = self.__dict__["candidates"] = make()
+        return made
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Be copied and pickled with all candidates."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
 @dataclass(frozen=True)

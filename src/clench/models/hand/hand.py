@@ -208,7 +208,7 @@ class Hand:
         """The joints as arrays, for forward kinematics."""
         return joint_arrays(self)
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of all joints, in model order."""
         return tuple(j.name for j in self.joints)

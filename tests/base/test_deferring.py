@@ -1,0 +1,45 @@
+"""Mappings that are made when they are first read."""
+
+import copy
+import pickle
+
+import pytest
+
+from clench.base.deferring import DeferredMapping
+
+MADE = {"code": "limit", "angles": [0.1, 0.2]}
+
+
+def test_it_is_made_once_when_it_is_read():
+    calls = []
+    deferred = DeferredMapping(lambda: calls.append(1) or MADE)
+    assert calls == []
+    assert deferred["code"] == "limit"
+    assert list(deferred) == ["code", "angles"]
+    assert len(deferred) == 2
+    assert calls == [1]
+    with pytest.raises(KeyError):
+        deferred["other"]
+
+
+def test_it_reads_as_what_it_holds():
+    deferred = DeferredMapping(lambda: MADE)
+    assert deferred == MADE
+    assert MADE.__eq__(deferred) is NotImplemented  # so that the deferred one is asked
+    assert repr(deferred) == repr(MADE)
+    assert {**deferred, "more": 1} == {**MADE, "more": 1}
+    assert deferred != {"code": "limit"}
+
+
+@pytest.mark.parametrize("copied", [lambda d: pickle.loads(pickle.dumps(d)), copy.copy, copy.deepcopy])
+def test_a_copy_is_the_plain_mapping(copied):
+    again = copied(DeferredMapping(lambda: MADE))
+    assert type(again) is dict
+    assert again == MADE
+
+
+def test_what_fails_fails_again():
+    deferred = DeferredMapping(lambda: {"a": 1 / 0})
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            deferred["a"]
