@@ -15,7 +15,8 @@ from clench.apps.bench.checking import Checked, Surface, check_answer, triangle_
 from clench.apps.bench.main import BENCHMARKS, main
 from clench.apps.bench.report import BenchReport, describe_place
 from clench.base.errors import CommandError, UnknownNameError
-from clench.solve.controller import finger_sets, make_problem, make_setting
+from clench.solve.alternatives import finger_sets
+from clench.solve.problem import make_problem, make_setting
 from clench.solve.solution import GraspSolution
 from handmade import make_solution
 

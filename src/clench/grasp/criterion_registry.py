@@ -41,7 +41,7 @@ ALWAYS: Final = ("range_of_motion", "touching_links", "limit_distance")
 
 _KINDS: Final = {"name": str, "unit": str, "source": str, "scale": Real, "larger_is_better": bool}
 _SAID: Final = {str: "text", Real: "a number above 0", bool: "True or False"}
-_registry: dict[str, Criterion | HandCriterion] = {
+_BUILT_IN: Final[Mapping[str, Criterion | HandCriterion]] = {
     c.name: c
     for c in (
         RangeOfMotion(),
@@ -60,6 +60,7 @@ _registry: dict[str, Criterion | HandCriterion] = {
         TendonTension(),
     )
 }
+_registry: dict[str, Criterion | HandCriterion] = dict(_BUILT_IN)
 
 
 def register_criterion(criterion: Criterion | HandCriterion) -> None:
@@ -124,6 +125,11 @@ def _load_installed() -> None:
                 f"criterion '{point.name}' of package '{point.value}' cannot be loaded: {error}."
             ) from None
         register_criterion(criterion)
+
+
+def is_built_in(names: Iterable[str]) -> bool:
+    """Say whether criteria, and those that are always scored, are ours, and none of them one that replaced it."""
+    return all(_registry[name] is _BUILT_IN.get(name) for name in (*ALWAYS, *names))
 
 
 def is_of_hand(criterion: Criterion | HandCriterion) -> TypeGuard[HandCriterion]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -32,7 +32,7 @@ from .solution import (
 )
 
 if TYPE_CHECKING:
-    from .controller import Problem
+    from .problem import Problem
 
 _KINDS = (
     ContactKind.SIDE,
@@ -53,24 +53,20 @@ class Answer:
     """Hold what was computed and chosen.
 
     Args:
-        fingers: candidates of each finger that closes. chosen: index of the chosen one of each.
-        final: posture of the hand, shape (J,) [rad].
+        sets: returns the candidates of a finger that closes, by number, as closed without the other fingers.
+        chosen: index of the chosen one of each. best: the chosen ones. final: posture of the hand, shape (J,) [rad].
         at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the
             end; None when not measured. certificate: what is promised. choice: why these sets, see `explain_choice`.
     """
 
-    fingers: Sequence[Sequence[FingerCandidate]]
+    sets: Callable[[int], Sequence[FingerCandidate]]
     chosen: Sequence[int]
+    best: Sequence[FingerCandidate]
     final: FloatArray
     at_start: Sequence[LinkDepth]
     at_end: Sequence[LinkDepth] | None
     certificate: Certificate
     choice: Mapping[str, Any]
-
-    @property
-    def best(self) -> list[FingerCandidate]:
-        """The chosen candidate of each finger."""
-        return [group[i] for group, i in zip(self.fingers, self.chosen, strict=True)]
 
 
 def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> GraspSolution:
@@ -79,7 +75,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
 
     hand, command, packed = problem.hand, problem.command, problem.packed
     placed = _placed(answer.best, problem.T_world_palm)
-    made = [_finger(answer, k, problem, placed) for k in range(len(answer.fingers))]
+    made = [_finger(answer, k, problem, placed) for k in range(len(answer.best))]
     results = {result.name: result for _, result in made}
     for finger in asked_fingers(hand, command):
         if finger.name not in results:
@@ -140,17 +136,18 @@ def _placed(sets: Sequence[FingerCandidate], T_world_palm: Pose) -> _Places:
 
 def _finger(answer: Answer, k: int, problem: Problem, placed: _Places) -> tuple[Candidate, FingerResult]:
     """Return the chosen candidate of a finger, and its result, whose other candidates are made when they are read."""
-    group, chosen = tuple(answer.fingers[k]), answer.chosen[k]
-    best = _candidate(group[chosen], problem, placed)
+    c, chosen = answer.best[k], answer.chosen[k]
+    best = _candidate(c, problem, placed)
 
     def candidates() -> tuple[Candidate, ...]:
-        others = _placed(group, problem.T_world_palm)
-        return tuple(best if i == chosen else _candidate(c, problem, others) for i, c in enumerate(group))
+        group = answer.sets(k)
+        places = _placed(group, problem.T_world_palm)
+        return tuple(best if i == chosen else _candidate(other, problem, places) for i, other in enumerate(group))
 
     cause = None
     if best.status is not FingerStatus.TOUCH:
-        cause = DeferredMapping(partial(finger_cause, group[chosen], best.status, problem))
-    return best, FingerResult.deferred(group[0].plan.finger.name, best, chosen, candidates, cause)
+        cause = DeferredMapping(partial(finger_cause, c, best.status, problem))
+    return best, FingerResult.deferred(c.plan.finger.name, best, chosen, candidates, cause)
 
 
 def _candidate(c: FingerCandidate, problem: Problem, placed: _Places) -> Candidate:

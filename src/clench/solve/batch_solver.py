@@ -17,8 +17,10 @@ from clench.grasp.motion import asked_fingers, palm_pose
 from clench.grasp.plan import closing_joints
 from clench.models.command import ClosingOrder, GraspCommand
 
-from .controller import make_problem, make_setting, planned, solve
+from .controller import solve
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
+from .planning import planned
+from .problem import make_problem, make_setting
 from .solution import FingerStatus, GraspSolution
 
 if TYPE_CHECKING:
@@ -59,7 +61,8 @@ class BatchSolver:
             return None
         calibration = calibration_of(command.criteria)
         make_setting(problem, calibration)
-        plan, exact = planned(problem)
+        made = planned(problem)
+        plan, exact = made.plan, made.exact
         usual = command.order == ClosingOrder.PROXIMAL_FIRST and command.rounds == 1 and not command.check_sets
         if not (usual and is_covered(problem.hand, plan, calibration)):
             return None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from clench.base.pose import FloatArray
     from clench.kernels.bodies import BodyArrays
 
-    from .controller import Problem
+    from .problem import Problem
 
 #: A follower that could turn further by less than this is at its limit, too [rad].
 _AT_LIMIT = 1e-6

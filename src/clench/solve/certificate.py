@@ -20,7 +20,7 @@ from clench.grasp.linkage import placed_links
 if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
 
-    from .controller import Problem
+    from .problem import Problem
 
 
 class CertificateCode(StrEnum):

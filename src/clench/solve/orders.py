@@ -99,8 +99,8 @@ def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolut
 
 def settled(command: GraspCommand, solution: GraspSolution) -> GraspCommand:
     """Return a command with the order that a solution of it was closed in."""
-    orders = (solution.choice or {}).get("orders")
-    if not command.orders or orders is None:
+    orders = (solution.choice or {}).get("orders") if command.orders else None
+    if orders is None:
         return command
     return replace(command, order=ClosingOrder(orders["chosen"]), orders=())
 

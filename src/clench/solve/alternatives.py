@@ -1,0 +1,104 @@
+"""The sets of every finger, and the choice among them; made when they are read where they decide nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from clench.grasp.blocking import start_overlaps
+from clench.grasp.calibration import Calibration
+from clench.grasp.candidates import FingerCandidate, read_candidates
+from clench.grasp.choice import HandChoice, choose
+from clench.grasp.closing import ClosedHand, HandPlan, close_hand
+from clench.grasp.criteria import Setting
+from clench.grasp.criterion_registry import is_built_in, score_hand
+from clench.grasp.explaining import explain_choice
+from clench.grasp.feasibility import judge_sets
+
+from .planning import planned
+
+if TYPE_CHECKING:
+    from .planning import Planned
+    from .problem import Problem
+
+Groups = list[list[FingerCandidate]]
+
+
+def finger_sets(problem: Problem) -> Groups:
+    """Return the sets of every finger that the choice is made of."""
+    return close_sets(problem, planned(problem), lambda stage: None)[1]
+
+
+def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> tuple[ClosedHand, Groups]:
+    """Close every alternative of every finger that is planned, and judge what it passes through.
+
+    Args:
+        problem: the three inputs. made: the plan. lap: is told the name of each stage that ends.
+    """
+    hand, packed, T, plan = problem.hand, problem.packed, problem.T_palm_object, made.plan
+    closed = close_hand(plan, made.exact, packed, T, problem.rounds)
+    lap("close")
+    overlaps = start_overlaps(hand, plan, made.exact.link_pose, closed, packed, T, problem.source)
+    candidates = read_candidates(hand, plan, packed, closed, overlaps)
+    judged = judge_sets(hand, candidates, packed, T, problem.source, problem.command.check_sets, plan.together)
+    lap("sets")
+    return closed, group_by_finger(plan, judged)
+
+
+def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> Groups:
+    """Return the candidates of each finger that closes, in the command's order."""
+    groups: dict[int, list[FingerCandidate]] = {}
+    for entry, candidate in zip(plan.items.entry.tolist(), candidates, strict=True):
+        groups.setdefault(plan.finger[entry], []).append(candidate)
+    return list(groups.values())
+
+
+def decided(problem: Problem, calibration: Calibration) -> Planned | None:
+    """Return the plan of the sets that are chosen whatever the others are, or None where the choice is open.
+
+    The full width goes before every plane: it alone passes through nothing, or a plane has its angles. So where each
+    finger has one full width there is nothing to choose. Criteria that others wrote are asked about every set at once,
+    so that what they raise is raised by the solve; so are sets that are all to be measured.
+    """
+    if problem.command.check_sets or not is_built_in(calibration.criteria):
+        return None
+    return planned(problem).full_width
+
+
+@dataclass(frozen=True, eq=False)
+class Alternatives:
+    """Hold the sets that every finger has, and the choice among them; both are made when they are first read."""
+
+    problem: Problem
+    calibration: Calibration
+    setting: Setting
+
+    @cached_property
+    def _groups_and_choice(self) -> tuple[Groups, HandChoice]:
+        return self.choose_among(finger_sets(self.problem))
+
+    def choose_among(self, groups: Groups) -> tuple[Groups, HandChoice]:
+        """Choose among sets that were closed already."""
+        found = groups, choose(groups, self.calibration, self.setting)
+        self.__dict__["_groups_and_choice"] = found
+        return found
+
+    def of_finger(self, k: int) -> Sequence[FingerCandidate]:
+        """Return the sets of a finger, as closed without the other fingers."""
+        return self._groups_and_choice[0][k]
+
+    def explained(self, best: Sequence[FingerCandidate], changed: Sequence[int]) -> dict[str, Any]:
+        """Return the choice as plain values; see `explain_choice`.
+
+        Args:
+            best: the chosen sets. changed: numbers of those fingers that the others made close again.
+        """
+        groups, choice = self._groups_and_choice
+        explained = explain_choice(choice, groups)
+        for k in changed:
+            explained["fingers"][best[k].plan.finger.name]["closed_again"] = True
+        if changed:
+            explained["final_hand_scores"] = score_hand(best, choice.used, self.setting)
+        return explained

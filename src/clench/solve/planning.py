@@ -1,0 +1,116 @@
+"""The plan of a hand at a posture, made once for as many objects and poses as are asked for."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clench.base.errors import CommandError, HandError
+from clench.grasp.closing import HandPlan, make_hand_plan, only_items
+from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
+from clench.grasp.motion import alternatives, asked_fingers
+from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
+from clench.models.command import ClosingOrder
+from clench.models.hand.hand import Hand
+
+from .problem import Problem
+
+if TYPE_CHECKING:
+    from clench.kernels.exact import ExactArrays
+
+_KEPT_PLANS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """Hold the plan of a hand and what its exact sweeps need."""
+
+    hand: Hand
+    plan: HandPlan
+    exact: ExactArrays
+
+    @cached_property
+    def full_width(self) -> Planned | None:
+        """The full width of every finger alone; None where a finger has several of them, or none."""
+        items = np.flatnonzero(self.plan.whole)
+        fingers = {self.plan.finger[entry] for entry in self.plan.items.entry[items]}
+        if not len(items) == len(fingers) == len(self.plan.plans):
+            return None
+        exact = self.exact._replace(wanted=np.ascontiguousarray(self.exact.wanted[items]))
+        return Planned(self.hand, only_items(self.plan, items.tolist()), exact)
+
+
+_plans: OrderedDict[tuple[object, ...], Planned] = OrderedDict()
+
+
+def planned(problem: Problem) -> Planned:
+    """Return the plan of a hand at a posture; the same posture is planned once.
+
+    Raises:
+        HandError: no finger asked for has a closing joint. CommandError: fingers that cannot close in this order.
+    """
+    hand, command = problem.hand, problem.command
+    key = (
+        id(hand),
+        problem.start.tobytes(),
+        None if command.fingers is None else tuple(command.fingers),
+        command.planes,
+        command.rounds != 1,
+        problem.together,
+        tuple(sorted(command.speeds.items())),
+        command.full_width,
+        tuple(command.yaw_grid),
+        tuple(command.open_variants),
+        tuple(command.opposition_grid),
+        problem.source,
+    )
+    kept = _plans.get(key)
+    if kept is not None and kept.hand is hand:
+        return kept
+    plans, finger, posture = [], [], []
+    for f, asked in enumerate(asked_fingers(hand, command)):
+        if closing_joints(hand, asked):
+            for p, q in enumerate(alternatives(hand, asked, problem.start, command)):
+                plans.append(plan_finger(hand, asked, q, command.planes, problem.source, command.speeds))
+                finger.append(f)
+                posture.append(p)
+    if not plans:
+        raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
+    if problem.together or command.rounds != 1:
+        _check_parallel(plans, f"order {command.order}" if problem.together else "rounds")
+    plan = make_hand_plan(plans, finger, posture, command.full_width, problem.together)
+    exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
+    if problem.together:
+        exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
+    made = _plans[key] = Planned(hand, plan, exact)
+    while len(_plans) > _KEPT_PLANS:
+        _plans.popitem(last=False)
+    return made
+
+
+def _check_parallel(plans: list[FingerPlan], what: str) -> None:
+    """Refuse joints that move at once, or again, where outlines, cut once at the open posture, would no longer hold.
+
+    Raises:
+        CommandError: a finger whose closing axes are not parallel.
+    """
+    for plan in plans:
+        if len(plan.families) > 1:
+            raise CommandError(
+                f"{what}: finger '{plan.finger.name}' closes about axes that are not parallel; only order "
+                f"'{ClosingOrder.PROXIMAL_FIRST}' with one round covers that."
+            )
+
+
+def _with_resting(hand: Hand, plans: Sequence[FingerPlan], bodies: HandBodies) -> np.ndarray:
+    """Return which links may not overlap while all fingers close: those of fingers that rest are in the way."""
+    closing = {plan.finger.name for plan in plans}
+    resting = [link for f in hand.fingers if f.name not in closing for link in f.links]
+    checked = bodies.within.copy()
+    checked[:, resting] = bodies.across[:, resting]
+    return checked

@@ -1,0 +1,103 @@
+"""The three inputs of a solve, checked and brought together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from clench.base.errors import ObjectError, UnknownNameError
+from clench.base.pose import FloatArray, Pose
+from clench.grasp.calibration import Calibration
+from clench.grasp.criteria import Setting
+from clench.grasp.motion import next_postures, open_posture, palm_pose, task_wrenches
+from clench.grasp.scene import PackedObject, pack_object
+from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.command_file import check_command
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.shapes import CollisionSource
+
+#: More rounds than any finger needs that comes to rest.
+UNTIL_REST = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Hold the three inputs, checked and brought together.
+
+    Args:
+        start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
+        T_world_palm, T_world_object: poses. packed: the object.
+    """
+
+    hand: Hand
+    obj: GraspObject
+    command: GraspCommand
+    start: FloatArray
+    source: CollisionSource
+    T_world_palm: Pose
+    T_world_object: Pose
+    packed: PackedObject
+
+    @property
+    def rounds(self) -> int:
+        """How often all degrees of freedom are gone through."""
+        return self.command.rounds or UNTIL_REST
+
+    @property
+    def together(self) -> bool:
+        """Whether all joints close at once."""
+        return self.command.order != ClosingOrder.PROXIMAL_FIRST
+
+    @cached_property
+    def T_palm_object(self) -> FloatArray:
+        """Where the object is for the hand, shape (4, 4)."""
+        from clench.kernels.frames import relate_poses
+
+        T = np.eye(4)
+        palm, there = (np.array([pose.wxyz_xyz]) for pose in (self.T_world_palm, self.T_world_object))
+        relate_poses(palm, there, T[None, :3])
+        return T
+
+
+def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:
+    """Check the three inputs and bring them together."""
+    check_command(hand, command)
+    if not any(body.role is BodyRole.GRASPABLE for body in obj.bodies):
+        raise ObjectError(f"{obj.name}: no body to grasp; every body is an obstacle.")
+    start = open_posture(hand, command)
+    source = CollisionSource(command.collision_source or hand.default_source)
+    T_world_object = command.object_pose if command.object_pose is not None else obj.pose
+    return Problem(hand, obj, command, start, source, palm_pose(hand, command, start), T_world_object, pack_object(obj))
+
+
+def make_setting(problem: Problem, calibration: Calibration) -> Setting:
+    """Return what the criteria judge sets in.
+
+    Raises:
+        UnknownNameError: the calibration weighs a joint that the hand does not have.
+    """
+    hand = problem.hand
+    weights = np.ones(len(hand.joints))
+    for name, weight in calibration.joints.items():
+        if name not in hand.joint_names:
+            raise UnknownNameError(
+                "joint", name, f"hand '{hand.name}', though {calibration.name} names it", hand.joint_names
+            )
+        weights[hand.joint_index(name)] = weight
+    return Setting(
+        hand,
+        problem.start,
+        problem.packed,
+        problem.T_palm_object,
+        problem.source,
+        next_postures(hand, problem.command.next_steps),
+        weights if calibration.joints else None,
+        problem.obj,
+        problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
+        not problem.together and problem.command.rounds == 1,
+        task_wrenches(problem.command, problem.T_world_palm),
+        problem.command.order == ClosingOrder.FINGERTIP,
+    )

@@ -1,0 +1,114 @@
+"""Sets that decide nothing are made when they are read, and are what they are when all are made at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clench
+from clench.base.errors import CommandError
+from clench.base.pose import Pose
+from clench.grasp import criterion_registry
+from clench.solve import alternatives, controller
+from clench.solve.planning import planned
+from clench.solve.problem import make_problem
+
+HANDS = {name: clench.Hand.load(name) for name in ("robonaut2", "patent15")}
+ASKED: dict[str, dict[str, Any]] = {
+    "ball": {"planes": 3},
+    "box:x=0.05,y=0.06,z=0.08": {"planes": 2, "criteria": "steady"},
+    "cylinder:r=0.004,h=0.2": {"planes": 2, "order": "together"},
+    "mug": {"planes": 2, "criteria": {"pose_sensitivity": 1.0, "limit_distance": 0.5}},
+}
+
+
+def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.GraspCommand]) -> list[dict[str, Any]]:
+    return [{**clench.solve(hand, obj, c).to_dict(), "timing": {}} for c in commands]
+
+
+def commands(hand: clench.Hand, obj: clench.GraspObject, **asked: Any) -> list[clench.GraspCommand]:
+    """Return commands at approach poses, and at one inside the object."""
+    poses = clench.approach_poses(hand, obj, 3, 0)
+    return [clench.GraspCommand(hand_pose=p, **asked) for p in (*poses, Pose(obj.pose.position, poses[0].wxyz))]
+
+
+@pytest.mark.parametrize("model", ASKED)
+@pytest.mark.parametrize("name", HANDS)
+def test_documents_are_those_of_a_choice_among_all_sets(name: str, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    hand, obj = HANDS[name], clench.GraspObject.load(model)
+    asked = commands(hand, obj, **ASKED[model])
+    late = documents(hand, obj, asked)
+    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
+    assert late == documents(hand, obj, asked)
+
+
+def test_fingers_that_the_others_made_close_again_are_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("cylinder:r=0.004,h=0.2")
+    poses = clench.approach_poses(hand, obj, 12, 0)
+    asked = [clench.GraspCommand(hand_pose=pose, planes=2, criteria="steady") for pose in poses]
+    late = documents(hand, obj, asked)
+    assert any(f["closed_again"] for d in late for f in d["choice"]["fingers"].values())
+    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
+    assert late == documents(hand, obj, asked)
+
+
+@pytest.mark.parametrize(
+    ("asked", "closed"),
+    [
+        ({}, "full width"),
+        ({"criteria": "steady"}, "full width"),
+        ({"full_width": False}, "all"),
+        ({"check_sets": True}, "all"),
+        ({"open_variants": (0.0, 0.2)}, "all"),
+        ({"criteria": {"own": 1.0}}, "all"),
+    ],
+    ids=str,
+)
+def test_only_what_may_be_chosen_is_closed(asked: dict[str, Any], closed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    register(monkeypatch, "own", lambda: 1.0)
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
+    command = commands(hand, obj, planes=2, **asked)[0]
+    items = []
+    close = alternatives.close_hand
+
+    def counted(plan: Any, *rest: Any) -> Any:
+        items.append(len(plan.items.entry))
+        return close(plan, *rest)
+
+    monkeypatch.setattr(alternatives, "close_hand", counted)
+    every = len(planned(make_problem(hand, obj, command)).plan.items.entry)
+    solution = clench.solve(hand, obj, command)
+    assert items == [every if closed == "all" else len(hand.fingers)]
+    for finger in solution.fingers.values():
+        angles = finger.candidates[finger.chosen].joint_angles
+        assert all(solution.joint_angles[name] == angle for name, angle in angles.items())
+    assert solution.choice is not None
+    assert items == ([every] if closed == "all" else [len(hand.fingers), every])
+
+
+@pytest.mark.parametrize("name", ["own", "range_of_motion"])
+def test_what_a_criterion_of_others_raises_is_raised_by_the_solve(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    register(monkeypatch, name, lambda: np.nan)
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
+    command = commands(hand, obj, planes=2, criteria={name: 1.0})[0]
+    with pytest.raises(CommandError, match="expected a finite number"):
+        clench.solve(hand, obj, command)
+
+
+def register(monkeypatch: pytest.MonkeyPatch, called: str, value: Callable[[], float]) -> None:
+    """Register a criterion, for one test, that gives planes a value."""
+
+    class Own:
+        name = called
+        unit = source = "test"
+        scale = 1.0
+        larger_is_better = True
+
+        def score(self, candidate: Any, setting: Any) -> float | None:
+            return None if candidate.plane is None else value()
+
+    monkeypatch.setattr(criterion_registry, "_registry", dict(criterion_registry._registry))
+    clench.register_criterion(Own())
