@@ -120,3 +120,24 @@ def test_a_wall_across_the_axis_stops_nothing_that_slides_along_it(count):
     chain = np.array([[1.0, 0.02, 0.0], [1.8, 0.0, 0.0]])[2 - count :]
     found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, BEST, False, np.zeros((6, 3)))
     assert found == BEST
+
+
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("turn", [0.05, 0.3, 1.2])
+def test_what_slides_on_a_wall_is_not_stopped_by_a_side_of_one_of_its_triangles(count, flat, turn):
+    """The wall lies across the axis; the core comes from beside the triangle, with a corner or a face on the wall."""
+    height = 0.0 if flat else 0.01
+    core = np.array([[0.05, 0.0, 0.0], [0.05, height, -0.01], [0.03, height, 0.0]])
+    c, d = np.cos(turn), np.sin(turn)
+    wall = np.array([[0.0, 0.0, 0.0], [0.1 * c, 0.0, 0.1 * d], [-0.05, 0.0, 0.1]])
+    chain = np.array([[0.7, 0.001, 0.0], [1.0, 0.0, 0.0]])[2 - count :]
+    found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, 2.0, False, np.zeros((6, 3)))
+    assert found == 2.0
+
+
+def test_what_slides_on_a_wall_stops_at_a_step_of_it():
+    core = np.array([[0.05, 0.0, 0.0], [0.05, 0.01, -0.01], [0.03, 0.01, 0.0]])
+    step = np.array([[0.0, -0.01, 0.03], [0.1, -0.01, 0.03], [0.05, 0.01, 0.03]])
+    found = sweep(core, step, best=2.0)
+    assert found == pytest.approx(np.arcsin(0.6), abs=1e-8)

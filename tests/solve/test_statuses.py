@@ -260,6 +260,23 @@ def test_an_open_sheet_flush_with_a_link_between_the_planes_stops_it(faces):
     assert solution.status == "grasp"
 
 
+@pytest.mark.parametrize("gap", [0.0, 1e-15, 1e-12, 1e-6])
+def test_a_link_slides_along_a_wall_beside_it(gap):
+    """The wall is made of large triangles that the link enters as it goes; beyond them a bar stops it."""
+    link = Shape(ShapeKind.BOX, (0.02, 0.01, 0.005), Pose([0.06, 0, 0]))
+    hand = HandBuilder().finger("index", [link], [0.08]).hand()
+    wall = clench.GraspObject.load("box:x=0.3,y=0.02,z=0.06").bodies[0].shapes[0].to_mesh()
+    bar = clench.GraspObject.load("box:x=0.02,y=0.1,z=0.02").bodies[0].shapes[0].to_mesh()
+    both = [
+        (wall.vertices + [0.0, 0.02 + gap, 0.035], wall.triangles),
+        (bar.vertices + [0.0, 0.0, 0.07], bar.triangles),
+    ]
+    alone = clench.solve(hand, clench.GraspObject.from_meshes(both[1:]), command())
+    beside = clench.solve(hand, clench.GraspObject.from_meshes(both), command())
+    assert alone.status == "grasp"
+    assert beside.joint_angles["index_0"] == pytest.approx(alone.joint_angles["index_0"], abs=1e-9)
+
+
 def test_triangles_without_area_change_nothing():
     box = clench.GraspObject.load("box:x=0.02,y=0.1,z=0.02").bodies[0].shapes[0].to_mesh()
     vertices = np.vstack([box.vertices, box.vertices[:1], 0.5 * (box.vertices[0] + box.vertices[1])])

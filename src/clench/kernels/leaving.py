@@ -25,8 +25,13 @@ OVERLAPPING = 10.0
 BLOCKED, OVERLAP = 0.0, -1.0
 #: Edges with a smaller sine between them give no plane [-].
 ALONG = 1e-6
+#: A plane across which the cores are known to lie the other way round does not separate them: the cosine [-].
+OPPOSED = -0.5
 #: A plane that separates a touching pair may turn this many times as fast as the moving core [-].
 TILT = 64.0
+
+
+Direction = tuple[float, float, float]
 
 
 @inner_kernel
@@ -133,6 +138,7 @@ def try_direction(
     nx: float,
     ny: float,
     nz: float,
+    known: Direction,
     s: float,
     touch: float,
     best: float,
@@ -140,7 +146,12 @@ def try_direction(
     """Return how far a touching pair may move on from `s` if a plane across n separates it and permits the motion.
 
     `BLOCKED` when the plane does not permit it, `OVERLAP` when it does not even separate.
+
+    Args:
+        known: unit direction from the resting to the moving core; zeros where they are too close to have one.
     """
+    if nx * known[0] + ny * known[1] + nz * known[2] < OPPOSED:
+        return OVERLAP
     if not separates(placed, ka, fixed, kb, w, nx, ny, nz, touch):
         return OVERLAP
     offset = plane_offset(fixed, kb, nx, ny, nz) + w
@@ -156,8 +167,9 @@ def try_across(
     ka: int,
     fixed: Floats,
     kb: int,
-    u: tuple[float, float, float],
-    v: tuple[float, float, float],
+    u: Direction,
+    v: Direction,
+    known: Direction,
     chain: Floats,
     count: int,
     s: float,
@@ -171,13 +183,13 @@ def try_across(
     if size * size <= ALONG * ALONG * scale:
         return OVERLAP
     nx, ny, nz = nx / size, ny / size, nz / size
-    one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, s, touch, best)
-    other = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, -nx, -ny, -nz, s, touch, best)
+    one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
+    other = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, -nx, -ny, -nz, known, s, touch, best)
     return max(one, other)
 
 
 @inner_kernel
-def side(core: Floats, corners: int, k: int) -> tuple[float, float, float]:
+def side(core: Floats, corners: int, k: int) -> Direction:
     """Return a core's edge from corner `k` on."""
     j = (k + 1) % corners
     return core[j, 0] - core[k, 0], core[j, 1] - core[k, 1], core[j, 2] - core[k, 2]
@@ -190,6 +202,7 @@ def leave_touch(
     ka: int,
     fixed: Floats,
     kb: int,
+    known: Direction,
     chain: Floats,
     count: int,
     s: float,
@@ -205,7 +218,7 @@ def leave_touch(
     for i in range(ka if ka > 1 else 0):
         for k in range(kb if kb > 1 else 0):
             u, v = side(placed, ka, i), side(fixed, kb, k)
-            found = max(found, try_across(core, placed, ka, fixed, kb, u, v, chain, count, s, touch, best))
+            found = max(found, try_across(core, placed, ka, fixed, kb, u, v, known, chain, count, s, touch, best))
     for face in range(2):
         nx, ny, nz, size = 0.0, 0.0, 0.0, 0.0
         if face == 0 and kb == 3:
@@ -216,20 +229,20 @@ def leave_touch(
             n = (nx, ny, nz)
             for _ in range(2):
                 nx, ny, nz = -nx, -ny, -nz
-                one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, s, touch, best)
+                one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
                 found = max(found, one)
             for k in range(ka if ka > 1 else 0):
                 u = side(placed, ka, k)
-                found = max(found, try_across(core, placed, ka, fixed, kb, n, u, chain, count, s, touch, best))
+                found = max(found, try_across(core, placed, ka, fixed, kb, n, u, known, chain, count, s, touch, best))
             for k in range(kb if kb > 1 else 0):
                 v = side(fixed, kb, k)
-                found = max(found, try_across(core, placed, ka, fixed, kb, n, v, chain, count, s, touch, best))
+                found = max(found, try_across(core, placed, ka, fixed, kb, n, v, known, chain, count, s, touch, best))
     return found
 
 
 @inner_kernel
 def starts_apart(
-    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: tuple[float, float, float], turn: float, touch: float
+    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Direction, turn: float, touch: float
 ) -> bool:
     """Say whether a plane separates a touching pair from which one across m is reached by a turn of that size.
 
@@ -268,6 +281,7 @@ def probe(
     fixed: Floats,
     kb: int,
     w: float,
+    known: Direction,
     chain: Floats,
     count: int,
     s: float,
@@ -297,6 +311,8 @@ def probe(
     d, mx, my, mz, _, _, _, _, _ = separation(ahead, ka, fixed, kb)
     if d - w <= FLAT * touch or plane_gap(ahead, ka, fixed, kb, mx, my, mz) - w <= 0.5 * FLAT * touch:
         return BLOCKED
+    if mx * known[0] + my * known[1] + mz * known[2] < OPPOSED:
+        return BLOCKED
     turn = chain[count - 1, 0] * step
     return step if starts_apart(placed, ka, fixed, kb, w, (mx, my, mz), turn, touch) else BLOCKED
 
@@ -322,12 +338,14 @@ def move_on(
 
     Args:
         core, placed: the moving core relative to the last pivot, and where it is at `s` (and scratch space), (6, 3).
-        n: direction between the cores, where w > 0. The others as for `sweep_pair`.
+        n: unit direction from the resting to the moving core; zeros where they are too close to have one, and w = 0.
+        The others as for `sweep_pair`.
     """
+    known = (nx, ny, nz)
     if w > 0.0:
-        free = try_direction(core, placed, ka, fixed, kb, w, chain, count, nx, ny, nz, s, touch, best)
+        free = try_direction(core, placed, ka, fixed, kb, w, chain, count, nx, ny, nz, known, s, touch, best)
     else:
-        free = leave_touch(core, placed, ka, fixed, kb, chain, count, s, touch, best)
+        free = leave_touch(core, placed, ka, fixed, kb, known, chain, count, s, touch, best)
     if free == BLOCKED:
-        free = probe(core, placed, ka, fixed, kb, w, chain, count, s, touch, best)
+        free = probe(core, placed, ka, fixed, kb, w, known, chain, count, s, touch, best)
     return free

@@ -16,7 +16,7 @@ from .compiling import inner_kernel, kernel
 from .core_motion import base_motion, corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
-from .leaving import BLOCKED, FLAT, OVERLAP, move_on
+from .leaving import FLAT, OVERLAP, move_on
 
 #: Planes that are laid for one pair at most; a pair that needs more stops there, which is safe.
 PLANES = 400
@@ -144,32 +144,29 @@ def sweep_pair(
         gap = d - w
         if s == 0.0 and crosses(placed, ka, fixed, kb):
             gap = -w
-        if level >= 0.0 and gap <= CLOSE * level:
-            return s
         if level < 0.0 and rough and gap <= touch:
             return s
-        if level < 0.0 and gap <= FLAT * touch:
-            free = move_on(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, touch, best - s)
-            if free <= 0.0:
-                return s if free == BLOCKED else OVERLAP
-            if s + free >= best:
-                return best
-            s += 0.5 * free
-        else:
+        flat = level < 0.0 and gap <= FLAT * touch
+        step = 0.0
+        if not flat and (level < 0.0 or gap > CLOSE * level):
             if level < 0.0:
                 level = 0.5 * min(gap, touch)
             offset = plane_offset(fixed, kb, nx, ny, nz) + w + level
             step = step_to_plane(placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
-            if step <= 0.0:
-                return s
-            if turn >= PLAIN:
-                # Edges that slide along each other: the closest points run, and no plane that rests lasts.
-                longer = turning_step(
-                    core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, level, leap, best - s
-                )
-                leap = 2.0 * leap if longer > 0.0 else 0.25 * leap
-                step = max(step, longer)
-            s += step
-            if s >= best:
-                return best
+        if step <= 0.0:
+            # They touch. What moves along a wall is not stopped by the sides of the triangles that make it up.
+            if flat and w == 0.0:
+                nx, ny, nz = 0.0, 0.0, 0.0
+            free = move_on(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, touch, best - s)
+            if free <= 0.0:
+                return OVERLAP if flat and free == OVERLAP else s
+            level, step = -1.0, free if s + free >= best else 0.5 * free
+        elif turn >= PLAIN:
+            # Edges that slide along each other: the closest points run, and no plane that rests lasts.
+            longer = turning_step(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, level, leap, best - s)
+            leap = 2.0 * leap if longer > 0.0 else 0.25 * leap
+            step = max(step, longer)
+        s += step
+        if s >= best:
+            return best
     return s
