@@ -119,7 +119,8 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["solve", "--hand", "robonaut2", "--object", "absent.obj"], "clench: error: "),
         (
             ["solve", "--hand", "robonaut2", "--object", "ball", "--criteria", "stedy"],
-            "clench: error: Preset 'stedy' is not in clench; a file is named with its ending. Did you mean 'steady'?",
+            "clench: error: Preset 'stedy' is not in clench's criteria presets (a file is named with its ending). "
+            "Did you mean 'steady'?",
         ),
         (
             ["solve", "--hand", "robonaut2", "--object", "ball", "--criteria", "absent.toml"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clench.base.errors import CommandError
 from clench.execution.timing import time_path
 
 
@@ -37,6 +38,18 @@ def test_it_stands_still_at_a_corner_and_turns_back() -> None:
     for k, t in enumerate(path.times):
         np.testing.assert_allclose(path.at(t), path.corners[k], atol=1e-12)
         assert np.abs(path.at(t + step) - path.at(t - step)).max() / (2 * step) < 2e-4
+
+
+@pytest.mark.parametrize("far", [1e7, 1e300, np.inf, np.nan])
+def test_absurd_angles_are_refused(far: float) -> None:
+    with pytest.raises(CommandError, match=r"joint angle of .* expected up to 1e\+06"):
+        timed([[0.0, 0.0], [1.0, far]])
+
+
+@pytest.mark.parametrize(("velocity", "acceleration"), [(1e-4, 10.0), (1e-30, 10.0), (1.0, 1e-9), (1e-320, 1e-320)])
+def test_motions_without_end_are_refused(velocity: float, acceleration: float) -> None:
+    with pytest.raises(CommandError, match=r"The motion would take .* s, more than 3600 s; expected"):
+        timed([[0.0], [1.0]], velocity, acceleration)
 
 
 def test_stretching_is_even() -> None:

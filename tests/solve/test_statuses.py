@@ -268,8 +268,8 @@ def test_a_link_slides_along_a_wall_beside_it(gap):
     wall = clench.GraspObject.load("box:x=0.3,y=0.02,z=0.06").bodies[0].shapes[0].to_mesh()
     bar = clench.GraspObject.load("box:x=0.02,y=0.1,z=0.02").bodies[0].shapes[0].to_mesh()
     both = [
-        (wall.vertices + [0.0, 0.02 + gap, 0.035], wall.triangles),
-        (bar.vertices + [0.0, 0.0, 0.07], bar.triangles),
+        (wall.vertices + np.array([0.0, 0.02 + gap, 0.035]), wall.triangles),
+        (bar.vertices + np.array([0.0, 0.0, 0.07]), bar.triangles),
     ]
     alone = clench.solve(hand, clench.GraspObject.from_meshes(both[1:]), command())
     beside = clench.solve(hand, clench.GraspObject.from_meshes(both), command())

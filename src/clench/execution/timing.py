@@ -9,12 +9,16 @@ from typing import Any, Final
 
 import numpy as np
 
+from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
 
 #: Largest acceleration of a joint unless another is asked for [rad/s²]: models do not say.
 ACCELERATION: Final = 10.0
 #: Two directions whose unit vectors differ by less are one straight line [-].
 _STRAIGHT: Final = 1e-9
+#: Larger angles [rad] and longer motions [s] are mistakes in a file.
+_FARTHEST: Final = 1e6
+_LONGEST: Final = 3600.0
 #: Way-points of a timed path are this far apart, and at every corner [s].
 SAMPLE: Final = 0.02
 
@@ -67,8 +71,17 @@ def time_path(stages: Sequence[FloatArray], velocity: FloatArray, acceleration: 
     Args:
         stages: way-points that follow each other [rad], each of shape (n, J).
         velocity: largest of every joint [rad/s], shape (J,). acceleration: the same [rad/s²].
+
+    Raises:
+        CommandError: an angle that no joint reaches, or a motion that takes more than an hour.
     """
-    corners = _corners(np.vstack(list(stages)))
+    points = np.vstack(list(stages))
+    farthest = float(np.abs(points).max(initial=0.0))
+    if not farthest <= _FARTHEST:
+        raise CommandError(
+            f"Cannot time a motion to a joint angle of {farthest:.3g} rad; expected up to {_FARTHEST:g}."
+        )
+    corners = _corners(points)
     profiles = tuple(_profile(b - a, velocity, acceleration) for a, b in pairwise(corners))
     times = np.concatenate([np.zeros(1), np.cumsum([profile.duration for profile in profiles])])
     return TimedPath(corners, times, profiles)
@@ -96,9 +109,17 @@ def _profile(step: FloatArray, velocity: FloatArray, acceleration: FloatArray) -
     import ruckig
 
     moved = np.abs(step)
+    moving = moved > 0.0
+    fastest = float((velocity[moving] / moved[moving]).min())
+    hardest = float((acceleration[moving] / moved[moving]).min())
+    least = max(1.0 / fastest if fastest > 0.0 else np.inf, hardest**-0.5 if hardest > 0.0 else np.inf)
+    if not least <= _LONGEST:
+        raise CommandError(
+            f"The motion would take {least:.3g} s, more than {_LONGEST:g} s; expected smaller joint angles, "
+            f"or higher speeds (joint velocities of the hand, speed, acceleration)."
+        )
     asked, profile = ruckig.InputParameter(1), ruckig.Trajectory(1)
     asked.current_position, asked.target_position = [0.0], [1.0]
-    asked.max_velocity = [float((velocity[moved > 0.0] / moved[moved > 0.0]).min())]
-    asked.max_acceleration = [float((acceleration[moved > 0.0] / moved[moved > 0.0]).min())]
+    asked.max_velocity, asked.max_acceleration = [fastest], [hardest]
     ruckig.Ruckig(1).calculate(asked, profile)
     return profile

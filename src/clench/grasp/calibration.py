@@ -102,7 +102,9 @@ def load_preset(name: str) -> Calibration:
         UnknownNameError: there is none of this name.
     """
     if name not in preset_names():
-        raise UnknownNameError("preset", name, "clench; a file is named with its ending", preset_names())
+        raise UnknownNameError(
+            "preset", name, "clench's criteria presets (a file is named with its ending)", preset_names()
+        )
     return load_calibration(_PRESETS / f"{name}.toml", name)
 
 

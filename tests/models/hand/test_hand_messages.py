@@ -97,6 +97,12 @@ def test_no_joint_below_the_named_palm(tmp_path) -> None:
         Hand.load(path, palm="plam")
 
 
+def test_a_link_turned_by_nothing_is_named(tmp_path) -> None:
+    turned = three_fingers().replace('<body name="index_link1"', '<body quat="1e200 0 0 0" name="index_link1"')
+    with pytest.raises(ClenchError, match=r"link 'index_link1'\.wxyz: expected a unit quaternion"):
+        Hand.load(written(tmp_path, turned))
+
+
 def test_prismatic_finger(tmp_path) -> None:
     sliding = finger("a").replace('<joint name="a_j1"', '<joint type="slide" name="a_j1"')
     text = hand(sliding, finger("b", (0.03, 0, 0.05)))

@@ -8,6 +8,7 @@ import pytest
 from clench.base.errors import FileError, ObjectError, UnknownNameError
 from clench.base.pose import Pose
 from clench.models.objects.grasp_object import BodyRole, GraspObject, MeshPart
+from clench.models.objects.mesh_file import read_mesh
 from clench.models.objects.obstacles import obstacle, table
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.models.tessellation import BOX_TRIANGLES, tessellate
@@ -213,6 +214,18 @@ def test_several_meshes_with_poses_and_roles():
     assert second.shapes[0].pose == shelf
     assert second.shapes[0].to_mesh().vertices[:, 2].max() == pytest.approx(-0.15)
     assert all(body.closed for body in made.bodies)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1.6e6, 1e150])
+def test_vertices_of_a_mesh_of_any_size_are_merged(tmp_path, size):
+    mesh = box()
+    soup = mesh.vertices[mesh.triangles].reshape(-1, 3) * size
+    lines = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in soup]
+    lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, len(soup), 3)]
+    (tmp_path / "soup.obj").write_text("\n".join(lines))
+    vertices, triangles = read_mesh(tmp_path / "soup.obj")
+    assert len(vertices) == 8
+    assert vertices[triangles].reshape(-1, 3) == pytest.approx(soup, rel=1e-15)
 
 
 def test_vertices_of_a_soup_are_merged():

@@ -73,9 +73,9 @@ def build_skeleton(
     efforts = _efforts(m)
     for body in bodies:
         parent = link_of_body.get(int(m.body_parentid[body]), -1) if body else -1
-        T = Pose(m.body_pos[body], m.body_quat[body]).matrix
-        moving = _revolute_joints(compiled, body, palm, findings)
         name = compiled.body_name(body)
+        T = Pose(m.body_pos[body], m.body_quat[body], key=f"link '{name}'").matrix
+        moving = _revolute_joints(compiled, body, palm, findings)
         for k, j in enumerate(moving):
             joints.append(_joint(compiled, j, efforts.get(j), velocities, given))
             joint_of_model[j] = len(joints) - 1

@@ -54,10 +54,11 @@ def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntAr
     largest = float(np.abs(points).max(initial=0.0))
     if largest < SMALLEST_COORDINATE:
         return points, faces
-    mesh = trimesh.Trimesh(points, faces, process=False, validate=False)
-    digits = 8 - int(np.floor(np.log10(largest))) if largest > 0 else 8
-    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=digits)
-    return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    # Powers of two scale exactly; coordinates far from 1 overflow the rounding to whole numbers.
+    exponent = int(np.frexp(largest)[1])
+    mesh = trimesh.Trimesh(np.ldexp(points, -exponent), faces, process=False, validate=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=8)
+    return np.ldexp(np.array(mesh.vertices, dtype=np.float64), exponent), np.array(mesh.faces, dtype=np.int64)
 
 
 def _parse(path: Path, file_type: str) -> Any:
