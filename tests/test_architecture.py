@@ -191,7 +191,20 @@ def kernels(*decorators: str) -> dict[str, ast.FunctionDef]:
 
 def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
     # What they hand out would be freed once too often, and what they are handed would never be freed.
-    numbers = {"None", "bool", "int", "float", "tuple", "Point", "Flat", "Triple", "Deepest", "Separation", "Outline"}
+    numbers = {
+        "None",
+        "bool",
+        "int",
+        "float",
+        "tuple",
+        "Point",
+        "Vector",
+        "Flat",
+        "Triple",
+        "Deepest",
+        "Separation",
+        "Outline",
+    }
     plain = kernels(*PLAIN_KERNELS)
     assert len(plain) > 100
     for name, node in plain.items():

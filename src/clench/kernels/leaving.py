@@ -31,7 +31,7 @@ OPPOSED = -0.5
 TILT = 64.0
 
 
-Direction = tuple[float, float, float]
+Vector = tuple[float, float, float]
 
 
 @inner_kernel
@@ -138,7 +138,7 @@ def try_direction(
     nx: float,
     ny: float,
     nz: float,
-    known: Direction,
+    known: Vector,
     s: float,
     touch: float,
     best: float,
@@ -167,9 +167,9 @@ def try_across(
     ka: int,
     fixed: Floats,
     kb: int,
-    u: Direction,
-    v: Direction,
-    known: Direction,
+    u: Vector,
+    v: Vector,
+    known: Vector,
     chain: Floats,
     count: int,
     s: float,
@@ -189,7 +189,7 @@ def try_across(
 
 
 @inner_kernel
-def side(core: Floats, corners: int, k: int) -> Direction:
+def side(core: Floats, corners: int, k: int) -> Vector:
     """Return a core's edge from corner `k` on."""
     j = (k + 1) % corners
     return core[j, 0] - core[k, 0], core[j, 1] - core[k, 1], core[j, 2] - core[k, 2]
@@ -202,7 +202,7 @@ def leave_touch(
     ka: int,
     fixed: Floats,
     kb: int,
-    known: Direction,
+    known: Vector,
     chain: Floats,
     count: int,
     s: float,
@@ -242,7 +242,7 @@ def leave_touch(
 
 @inner_kernel
 def starts_apart(
-    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Direction, turn: float, touch: float
+    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Vector, turn: float, touch: float
 ) -> bool:
     """Say whether a plane separates a touching pair from which one across m is reached by a turn of that size.
 
@@ -281,7 +281,7 @@ def probe(
     fixed: Floats,
     kb: int,
     w: float,
-    known: Direction,
+    known: Vector,
     chain: Floats,
     count: int,
     s: float,
