@@ -1,0 +1,45 @@
+"""Let the kernels run as plain Python, so that coverage sees them and mistakes can be put into them.
+
+A plugin: ``python -m pytest -p interpreted --at-most 10``. Only the kernels do: what else is compiled, like oracles,
+stays fast, which NUMBA_DISABLE_JIT would not allow. Tests that take longer so are ended, and said to be skipped.
+"""
+
+import signal
+import sys
+from collections.abc import Generator
+from typing import Any, NoReturn
+
+import pytest
+
+from clench.kernels import compiling
+
+
+def _as_it_is(function: Any, **options: bool) -> Any:
+    return function
+
+
+_compiled_already = [n for n in sys.modules if n.startswith("clench.kernels.") and n != compiling.__name__]
+assert not _compiled_already, _compiled_already
+compiling._compiled = _as_it_is
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Say how long a test may take."""
+    parser.addoption("--at-most", type=float, default=0.0, help="skip what takes longer [s of processor time]")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """End a test that takes too long."""
+    seconds = item.config.getoption("--at-most")
+
+    def end(*_: object) -> NoReturn:
+        pytest.skip(f"takes more than {seconds:g} s with kernels as Python")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        return (yield)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
