@@ -5,8 +5,9 @@ import pytest
 
 from chain_hands import HandBuilder, along_x, mount
 from clench.base.pose import Pose
-from clench.grasp.exact import HandBodies, boxes_meet, hand_bodies
+from clench.grasp.exact import HandBodies, hand_bodies
 from clench.kernels.bodies import pack_bodies
+from clench.kernels.boxes import mark_meeting
 from clench.kernels.nearness import link_gap
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
@@ -20,6 +21,12 @@ def bodies_of(*shapes: Shape) -> HandBodies:
 
 def placed(*poses: Pose) -> np.ndarray:
     return np.ascontiguousarray([np.eye(4)[:3], *(p.matrix[:3] for p in poses)])
+
+
+def boxes_meet(bodies: HandBodies, poses: np.ndarray) -> np.ndarray:
+    meet = np.full((len(poses),) * 2, -1, dtype=np.int64)
+    mark_meeting(bodies.links.box, poses, meet)
+    return meet
 
 
 def gap(bodies: HandBodies, poses: np.ndarray) -> float:

@@ -25,7 +25,8 @@ def at(travel, plane=None):
 
 
 def judge(candidates, *, measure, hand=HAND, obj=WALL):
-    return judge_sets(hand, candidates, pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, measure)
+    judge_sets(hand, candidates, pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, measure)
+    return candidates
 
 
 def first_touch():

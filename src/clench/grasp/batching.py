@@ -13,13 +13,13 @@ from clench.base.pose import FloatArray
 from clench.models.hand.hand import Finger, Hand
 from clench.models.shapes import CollisionSource
 
+from .blocking import link_masks
 from .calibration import Calibration
 from .closing import HandPlan, KernelObject, object_for_closing
 from .containment import link_within_link
 from .criterion_registry import ALWAYS
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
 from .exact import HandBodies
-from .plan import resting_links
 from .scene import PackedObject
 from .surface import object_surface
 
@@ -136,7 +136,7 @@ def _wanted(
 ) -> Wanted:
     from clench.kernels.batch_layout import Wanted
 
-    meshes = link_mesh_arrays(hand, source)
+    meshes, masks = link_mesh_arrays(hand, source), link_masks(hand, plan.plans, source)
     fingers = [p.finger for p in plan.plans]
     terms = [name for name in calibration.criteria if name in ALWAYS]
     return Wanted(
@@ -144,8 +144,8 @@ def _wanted(
         start_pose=np.ascontiguousarray(hand.link_poses(start)[:, :3]),
         fixed=mesh_mask(meshes, hand.fixed_links),
         fingers=mesh_mask(meshes, [link for finger in hand.fingers for link in finger.links]),
-        own=np.array([mesh_mask(meshes, finger.links) for finger in fingers]),
-        resting=np.array([mesh_mask(meshes, resting_links(hand, p)) for p in plan.plans]),
+        own=masks.own,
+        resting=masks.resting,
         joints=_own_joints(fingers),
         thumb=np.array([finger.is_thumb for finger in fingers], dtype=np.int64),
         worth=np.array([calibration.worth(name, 1.0) for name in terms], dtype=np.float64),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,10 @@ from .surface import object_surface
 
 if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
+    from clench.kernels.layout import ClosingArrays
 
 
-@dataclass(frozen=True, eq=False)
-class Touch:
+class Touch(NamedTuple):
     """Describe one contact, in the palm frame.
 
     Args:
@@ -59,9 +59,9 @@ class Touch:
         return self.gap > PASSED_GAP
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class FingerCandidate:
-    """Hold one alternative set of a finger.
+    """Hold one alternative set of a finger; the judgement is filled in once it is closed.
 
     Args:
         plan: the finger at its posture. posture: index of the posture alternative.
@@ -123,7 +123,7 @@ def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandi
     """Return the posture of the whole hand with every finger at its chosen set, shape (J,) [rad]."""
     q = start.copy()
     for candidate in chosen:
-        own = list(candidate.plan.finger.joints)
+        own = candidate.plan.finger.own
         q[own] = candidate.q[own]
     return hand.tied(q)
 
@@ -133,28 +133,31 @@ def read_candidates(
 ) -> list[FingerCandidate]:
     """Return one candidate per item, in item order; `overlaps` as `start_overlaps` gives them, per entry."""
     entries = plan.items.entry.tolist()
-    blocked = np.array([overlaps[entry] is not None for entry in entries])
-    contacts = np.where(blocked, 0, closed.answer.contacts)
-    touches = _read_touches(hand, plan, packed, closed, contacts)
+    blocked = [overlaps[entry] is not None for entry in entries]
+    answer = closed.answer
+    if any(blocked):
+        still = np.array(blocked)
+        travel, contacts = answer.travel.copy(), np.where(still, 0, answer.contacts)
+        travel[still] = 0.0
+        answer = answer._replace(travel=travel, contacts=contacts)
+    touches, postures = _read_items(hand, plan, packed, closed.T_palm_object, answer)
+    groups, low, skipped = plan.arrays.entry_group.tolist(), plan.items.low.tolist(), answer.skipped.tolist()
     candidates = []
     for i, entry in enumerate(entries):
-        finger = plan.plans[entry]
-        first, last = plan.arrays.entry_group[entry : entry + 2]
-        travel = np.zeros(last - first) if blocked[i] else closed.answer.travel[i, first:last].copy()
-        q = finger.angles(hand, travel)
+        finger, q = plan.plans[entry], postures[i]
         if any(finger.breaks) and not blocked[i]:
-            q = finger.turned(hand, closed.answer.turn[i, plan.joints_of(entry)])
+            q = finger.turned(hand, answer.turn[i, plan.joints_of(entry)])
         candidates.append(
             FingerCandidate(
                 item=i,
                 plan=finger,
                 posture=plan.posture[entry],
-                plane=None if plan.whole[i] else int(plan.items.low[i]),
-                travel=travel,
+                plane=None if plan.whole[i] else low[i],
+                travel=answer.travel[i, groups[entry] : groups[entry + 1]],
                 q=q,
-                touches=tuple(touches[i]),
+                touches=touches[i],
                 overlap=overlaps[entry],
-                exact=bool(plan.whole[i] and not closed.answer.skipped[i]),
+                exact=plan.whole[i] and not skipped[i],
             )
         )
     return candidates
@@ -176,21 +179,22 @@ def closed_anew(
     return replace(found, item=candidate.item)
 
 
-def _read_touches(
-    hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, contacts: np.ndarray
-) -> list[list[Touch]]:
-    """Return the touches of every item, in stage order; `contacts` says how many each has."""
+def _read_items(
+    hand: Hand, plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, answer: ClosingArrays
+) -> tuple[list[tuple[Touch, ...]], FloatArray]:
+    """Return the touches of every item, in stage order, and the angles of all joints, (I, J) [rad]."""
     from clench.kernels.touches import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays, read_touches
 
-    shape = closed.answer.hit.shape[:2]
+    shape = answer.hit.shape[:2]
     read = TouchArrays(np.empty((*shape, TOUCH_INTEGERS), dtype=np.int64), np.empty((*shape, TOUCH_FLOATS)))
-    answer = closed.answer._replace(contacts=contacts)
-    T = np.ascontiguousarray(closed.T_palm_object[:3])
-    read_touches(plan.arrays, plan.frames(hand), object_surface(packed), plan.items, answer, T, read)
-    return [
-        [_touch(*row) for row in zip(numbers[:n].tolist(), values[:n].tolist(), values[:n], strict=True)]
-        for n, numbers, values in zip(contacts.tolist(), read.number, read.value, strict=True)
-    ]
+    postures = np.empty((shape[0], len(hand.joints)))
+    T = np.ascontiguousarray(T_palm_object[:3])
+    read_touches(plan.arrays, plan.frames(hand), object_surface(packed), plan.items, answer, T, read, postures)
+    touches = []
+    for i, n in enumerate(answer.contacts.tolist()):
+        numbers, values = read.number[i, :n].tolist(), read.value[i, :n].tolist()
+        touches.append(tuple(map(_touch, numbers, values, read.value[i])))
+    return touches, postures
 
 
 def _touch(number: list[int], value: list[float], row: FloatArray) -> Touch:

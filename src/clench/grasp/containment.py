@@ -46,23 +46,6 @@ def contained_link(
     return None if found < 0 else found
 
 
-def may_hold_part(
-    hand: Hand, link_pose: FloatArray, packed: PackedObject, T_palm_object: FloatArray, source: CollisionSource
-) -> np.ndarray:
-    """Say, for every entry, whether a part of the object may lie inside a link, as their balls tell; shape (E,).
-
-    Args:
-        hand: the hand. link_pose: see `ExactArrays`, shape (E, L, 3, 4). The others as for `contained_link`.
-    """
-    meshes = link_meshes(hand, source)
-    T = link_pose[:, [mesh.link for mesh in meshes]]
-    centers = np.einsum("emij,mj->emi", T[..., :3], np.reshape([mesh.center for mesh in meshes], (-1, 3))) + T[..., 3]
-    points = packed.points @ T_palm_object[:3, :3].T + T_palm_object[:3, 3]
-    away = np.linalg.norm(centers[:, :, None] - points, axis=-1)
-    near: np.ndarray = (away <= np.array([mesh.radius for mesh in meshes])[:, None]).any(axis=(1, 2))
-    return near
-
-
 def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked: np.ndarray) -> tuple[int, int] | None:
     """Return a link that has a part inside another one, and that one, or None; looked for once per posture.
 

@@ -97,4 +97,4 @@ class HandCriterion(Protocol):
 
 def own_angles(candidate: FingerCandidate, q: FloatArray) -> FloatArray:
     """Return the angles of a finger's own joints in a posture of the hand [rad]."""
-    return q[np.array(candidate.plan.finger.joints, dtype=np.intp)]
+    return q[candidate.plan.finger.own]

@@ -101,7 +101,8 @@ def hand_depths(
 
 def mesh_mask(meshes: LinkMeshArrays, links: Collection[int]) -> NDArray[np.int64]:
     """Return which meshes are those of the given links, shape (M,)."""
-    return np.isin(meshes.link, list(links)).astype(np.int64)
+    wanted = set(links)
+    return np.array([link in wanted for link in meshes.link.tolist()], dtype=np.int64)
 
 
 def object_mesh(packed: PackedObject) -> ObjectMesh:

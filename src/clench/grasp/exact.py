@@ -52,23 +52,6 @@ def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
     return HandBodies(pack_bodies(parts), _within(hand, across), across)
 
 
-def boxes_meet(bodies: HandBodies, poses: FloatArray) -> np.ndarray:
-    """Say which links have boxes that no face of either keeps apart, shape (L, L).
-
-    Args:
-        poses: `T_palm_link` of every link, shape (L, 3, 4).
-    """
-    R, size = poses[:, :, :3], bodies.links.box[:, 3:]
-    middle = np.einsum("lij,lj->li", R, bodies.links.box[:, :3]) + poses[:, :, 3]
-    # Of link m (row) and r, along the axes k of m's frame: how far apart they are, and the half size of r.
-    away = np.abs(np.einsum("mik,mri->mrk", R, middle - middle[:, None]))
-    with np.errstate(invalid="ignore"):
-        reach = np.einsum("mrkj,rj->mrk", np.abs(np.einsum("mik,rij->mrkj", R, R)), size)
-        near = np.all(away <= size[:, None] + reach, axis=2)
-    meet: np.ndarray = (near & near.T).astype(np.int64)
-    return meet
-
-
 def _across(hand: Hand) -> np.ndarray:
     checked = np.ones((len(hand.links),) * 2, dtype=np.int64)
     np.fill_diagonal(checked, 0)
@@ -132,6 +115,7 @@ def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
     return -T[:3, 1], anchor
 
 
+@kept_by_identity(_KEPT_HANDS)
 def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:
     """Return how far the surfaces that are swept may lie inside the true ones [m]: 0 but for cylinders, ellipsoids."""
     shapes = [s for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -30,8 +29,8 @@ def judge_sets(
     source: CollisionSource,
     measure: bool,
     together: bool = False,
-) -> list[FingerCandidate]:
-    """Return the candidates with `clear`, and on request `feasible` and `penetration`, filled.
+) -> None:
+    """Fill `clear` of the candidates, and on request `feasible` and `penetration`.
 
     A set that was swept exactly passes through nothing. Without that, the full-width set passes through nothing on any
     plane; a plane's own set that equals it is the same set. Every other one passes through what another plane would
@@ -42,22 +41,17 @@ def judge_sets(
         source: geometry of the hand. measure: measure every set, along its path. together: all joints close at once.
     """
     whole = {id(c.plan): c for c in candidates if c.plane is None}
-    judged = []
     for c in candidates:
         if c.overlap is not None:
-            judged.append(replace(c, feasible=False, penetration=c.overlap.depth))
-            continue
-        if c.exact:
-            judged.append(replace(c, clear=True, feasible=True, penetration=0.0))
-            continue
-        full = whole.get(id(c.plan))
-        clear = full is not None and bool(np.abs(c.q - full.q).max(initial=0.0) <= _SAME)
-        if measure:
-            depth, allowed = _deepest(hand, c, packed, T_palm_object, source, together)
-            judged.append(replace(c, clear=clear, feasible=depth <= allowed, penetration=depth))
+            c.feasible, c.penetration = False, c.overlap.depth
+        elif c.exact:
+            c.clear, c.feasible, c.penetration = True, True, 0.0
         else:
-            judged.append(replace(c, clear=clear))
-    return judged
+            full = whole.get(id(c.plan))
+            c.clear = full is not None and bool(np.abs(c.q - full.q).max(initial=0.0) <= _SAME)
+            if measure:
+                c.penetration, allowed = _deepest(hand, c, packed, T_palm_object, source, together)
+                c.feasible = c.penetration <= allowed
 
 
 def _deepest(

@@ -6,18 +6,21 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import Pose
-from clench.models.hand.hand import DEFAULT_SPEED
+from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import BodyRole
 
 from .candidates import FingerCandidate
 from .criteria import Setting, own_angles
+from .plan import FingerPlan
 from .pose_change import PoseChange
 from .reach import nearest_link, obstacle_body
 from .stages import closing_stages
 
 #: More clearance than this is no better [m].
 MOST_CLEARANCE: Final = 0.05
+_KEPT_PLANS: Final = 256
 
 
 class RangeOfMotion:
@@ -62,14 +65,16 @@ class LimitDistance:
 
     def score(self, candidate: FingerCandidate, setting: Setting) -> float:
         """Return the least distance to a limit in the closing direction, 0 to 1."""
-        least = 1.0
-        for p in candidate.plan.joints:
-            joint = setting.hand.joints[p.joint]
-            limit = joint.upper if joint.direction > 0 else joint.lower
-            span = joint.upper - joint.lower
-            if span > 0.0:
-                least = min(least, abs(limit - candidate.q[p.joint]) / span)
-        return float(least)
+        q = candidate.q
+        return min([1.0, *(abs(end - q.item(j)) / span for j, end, span in _ranges(setting.hand, candidate.plan))])
+
+
+@kept_by_identity(_KEPT_PLANS)
+def _ranges(hand: Hand, plan: FingerPlan) -> list[tuple[int, float, float]]:
+    """Return each closing joint that has a range, the limit in its closing direction [rad], and the range [rad]."""
+    joints = [(p.joint, hand.joints[p.joint]) for p in plan.joints]
+    ends = [(j, joint.upper if joint.direction > 0 else joint.lower, joint.upper - joint.lower) for j, joint in joints]
+    return [(j, float(end), float(span)) for j, end, span in ends if span > 0.0]
 
 
 class NextStepTime:

@@ -86,9 +86,10 @@ def task_wrenches(command: GraspCommand, T_world_palm: Pose) -> FloatArray:
 
 def decompose(hand: Hand, q: FloatArray) -> dict[str, dict[str, float]]:
     """Return a posture as its two motions, by joint name [rad]; upstream joints count as posture."""
-    closing = {j.name: float(a) for j, a in zip(hand.joints, q, strict=True) if j.role is JointRole.CLOSING}
-    posture = {j.name: float(a) for j, a in zip(hand.joints, q, strict=True) if j.role is not JointRole.CLOSING}
-    return {"posture": posture, "closing": closing}
+    found: dict[str, dict[str, float]] = {"posture": {}, "closing": {}}
+    for joint, angle in zip(hand.joints, q.tolist(), strict=True):
+        found["closing" if joint.role is JointRole.CLOSING else "posture"][joint.name] = angle
+    return found
 
 
 def _with_zero(offsets: Sequence[float]) -> list[float]:

@@ -72,7 +72,7 @@ def _placed(
     """
     waiting, postures, q = [], [], start.copy()
     for k, candidate in enumerate(sets):
-        own = list(candidate.plan.finger.joints)
+        own = candidate.plan.finger.own
         if k >= first and candidate.plane is None and candidate.overlap is None:
             waiting.append(k)
             postures.append(q.copy())

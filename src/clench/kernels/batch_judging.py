@@ -11,12 +11,13 @@ from clench.base.tolerances import ALLOWED_PENETRATION, PASSED_GAP
 
 from .batch_closing import answer_at
 from .batch_layout import Solved, Wanted
-from .batch_sequence import any_deep, take_joints
+from .batch_sequence import take_joints
 from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays, find_link_overlap
 from .frames import FrameArrays, couple, place_links, put_angles
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
 from .link_meshes import LinkMeshArrays, ObjectMesh, find_contained
+from .start_overlap import any_deep
 from .touches import (
     TOUCH_FLOATS,
     TOUCH_GAP,

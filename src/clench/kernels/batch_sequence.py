@@ -4,43 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from clench.base.tolerances import ALLOWED_PENETRATION
-
 from .batch_closing import answer_at, clear_answer
 from .batch_layout import Wanted
-from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
-from .depth import CROSSINGS
+from .compiling import allocating_kernel, inner_kernel
 from .frames import FrameArrays, put_angles, put_links
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
-from .link_meshes import LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
-from .tree import STACK_SIZE
-
-
-@inner_allocating_kernel
-def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
-    """Say whether a link that is wanted overlaps the object by more than is allowed."""
-    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
-    for k in range(meshes.link.shape[0]):
-        if wanted[k]:
-            depth = depth_of(meshes, k, poses[meshes.link[k]], solid, T_palm_object, crossings, stack)[0]
-            if depth > ALLOWED_PENETRATION:
-                return True
-    return False
-
-
-@inner_allocating_kernel
-def starts_blocked(
-    link_pose: Floats,
-    meshes: LinkMeshArrays,
-    wanted: Wanted,
-    entry: int,
-    solid: ObjectMesh,
-    T_palm_object: Floats,
-) -> bool:
-    """Say whether links of a finger that the planes do not tell of overlap the object; see `start_overlaps`."""
-    around = may_hold_part(meshes, link_pose, solid, T_palm_object)
-    mask = wanted.own[entry] if around else wanted.resting[entry]
-    return bool(any_deep(meshes, mask, link_pose, solid, T_palm_object))
+from .link_meshes import LinkMeshArrays, ObjectMesh
+from .start_overlap import start_overlap
 
 
 @allocating_kernel
@@ -68,7 +38,8 @@ def find_blocked(
             for i in range(items.entry.shape[0]):
                 crossed = crossed or (items.entry[i] == entry and answer.overlap[i] >= 0)
             if not crossed:
-                crossed = starts_blocked(link_pose[entry], meshes, wanted, entry, solid, T_palm_object[n])
+                own, resting = wanted.own[entry], wanted.resting[entry]
+                crossed = start_overlap(link_pose[entry], meshes, own, resting, solid, T_palm_object[n]) != 0
             blocked[n, entry] = 1 if crossed else 0
         for i in range(items.entry.shape[0]):
             if blocked[n, items.entry[i]]:

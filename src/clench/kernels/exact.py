@@ -12,6 +12,7 @@ from clench.base.tolerances import SWEEP_FRACTION
 from .advance import fill_chain, place_joints
 from .bodies import BodyArrays, pack_bodies
 from .body_sweep import sweep_body
+from .boxes import boxes_meet
 from .closest import AT_CORNER, separation
 from .compiling import allocating_kernel, inner_kernel
 from .family_pose import compose_inverse, copy_pose
@@ -305,7 +306,7 @@ def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, 
         if bodies_overlap(exact.links, m, exact.object, 0, allowed, sweep):
             return m, links
         for r in range(m):
-            if exact.checked[m, r] != 0:
+            if exact.checked[m, r] != 0 and boxes_meet(exact.links.box, poses, m, r):
                 copy_pose(poses[r], sweep.resting)
                 if bodies_overlap(exact.links, m, exact.links, r, allowed, sweep):
                     return m, r

@@ -234,9 +234,16 @@ def read_touches(
     answer: ClosingArrays,
     T_palm_object: Floats,
     touches: TouchArrays,
+    postures: Floats,
 ) -> None:
-    """Read the contacts of every item; rows beyond `ClosingArrays.contacts` are left as they are."""
+    """Read the contacts of every item, and the angles of all joints, (I, J).
+
+    Rows beyond `ClosingArrays.contacts` are left as they are. The angles are those of joints that do not break away.
+    """
     for i in range(items.entry.shape[0]):
+        entry = items.entry[i]
         for n in range(answer.contacts[i]):
             number, value = touches.number[i, n], touches.value[i, n]
-            read_touch(hand, frames, surface, items.entry[i], answer, i, n, T_palm_object, number, value)
+            read_touch(hand, frames, surface, entry, answer, i, n, T_palm_object, number, value)
+        first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
+        put_angles(frames, entry, first, last, answer.travel[i], postures[i])

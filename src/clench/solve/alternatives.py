@@ -42,9 +42,9 @@ def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> t
     lap("close")
     overlaps = start_overlaps(hand, plan, made.exact.link_pose, closed, packed, T, problem.source)
     candidates = read_candidates(hand, plan, packed, closed, overlaps)
-    judged = judge_sets(hand, candidates, packed, T, problem.source, problem.command.check_sets, plan.together)
+    judge_sets(hand, candidates, packed, T, problem.source, problem.command.check_sets, plan.together)
     lap("sets")
-    return closed, group_by_finger(plan, judged)
+    return closed, group_by_finger(plan, candidates)
 
 
 def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> Groups:

@@ -119,7 +119,7 @@ def _opened(answer: Answer, problem: Problem) -> FloatArray:
     """Return the posture from which the chosen sets close, shape (J,) [rad]."""
     q = problem.start.copy()
     for c in answer.best:
-        own = list(c.plan.finger.joints)
+        own = c.plan.finger.own
         q[own] = c.plan.posture[own]
     return q
 

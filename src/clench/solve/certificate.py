@@ -14,7 +14,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate
 from clench.grasp.containment import contained_link, link_within_link
 from clench.grasp.depths import LinkDepth
-from clench.grasp.exact import boxes_meet, hand_bodies, swept_deviation, tilt_deviation
+from clench.grasp.exact import hand_bodies, swept_deviation, tilt_deviation
 from clench.grasp.linkage import placed_links
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def certify(
             text = f"Links of {name} overlap other links of the hand before it moves."
             links = _overlapping(problem, c.plan.posture, exact)
             return _refused(CertificateCode.SELF_COLLISION_AT_START, text, links, name)
-        own = list(c.plan.finger.joints)
+        own = c.plan.finger.own
         opened[own] = c.plan.posture[own]
     overlap = _overlap(problem, opened, final, exact)
     if overlap is not None:
@@ -146,7 +146,7 @@ def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[st
 
     hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])
     poses = placed_links(hand, q)
-    bodies = hand_bodies(hand, problem.source)
-    everything = exact._replace(object=problem.packed.bodies, checked=bodies.across * boxes_meet(bodies, poses))
+    across = hand_bodies(hand, problem.source).across
+    everything = exact._replace(object=problem.packed.bodies, checked=across)
     pair = find_link_overlap(everything, poses, T, ALLOWED_PENETRATION)
     return [hand.links[i].name for i in pair if 0 <= i < len(hand.links)]

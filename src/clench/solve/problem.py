@@ -80,12 +80,13 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         UnknownNameError: the calibration weighs a joint that the hand does not have.
     """
     hand = problem.hand
-    weights = np.ones(len(hand.joints))
+    weights = np.ones(len(hand.joints)) if calibration.joints else None
     for name, weight in calibration.joints.items():
         if name not in hand.joint_names:
             raise UnknownNameError(
                 "joint", name, f"hand '{hand.name}', though {calibration.name} names it", hand.joint_names
             )
+        assert weights is not None
         weights[hand.joint_index(name)] = weight
     return Setting(
         hand,
@@ -94,9 +95,9 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         problem.T_palm_object,
         problem.source,
         next_postures(hand, problem.command.next_steps),
-        weights if calibration.joints else None,
+        weights,
         problem.obj,
-        problem.T_world_palm.rotation.T @ np.array([0.0, 0.0, -1.0]),
+        0.0 - problem.T_world_palm.rotation[2],
         not problem.together and problem.command.rounds == 1,
         task_wrenches(problem.command, problem.T_world_palm),
         problem.command.order == ClosingOrder.FINGERTIP,

@@ -172,6 +172,8 @@ def without_repeats(links: Sequence[int], positions: Sequence[FloatArray], norma
     Args:
         links: indices of the touching links. positions: [m]. normals: unit; links in a corner have two at one place.
     """
+    if len(links) < 2:
+        return list(range(len(links)))
     kept: list[int] = []
     for i, link in enumerate(links):
         known = (k for k in kept if links[k] == link)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.pose import FloatArray
@@ -132,6 +133,11 @@ class Finger:
     joints: tuple[int, ...]
     is_thumb: bool
     tip_link: int
+
+    @cached_property
+    def own(self) -> NDArray[np.intp]:
+        """Its own joints as an index of postures, shape (n,)."""
+        return np.array(self.joints, dtype=np.intp)
 
 
 @dataclass(frozen=True)
