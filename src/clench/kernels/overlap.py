@@ -59,8 +59,10 @@ def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: floa
         if crosses(ax, az, bx, bz, cx, cz, dx, dz, margin):
             return True
         if limit > 0.0:
+            # Both ends: an open sheet ends where no other segment begins.
             d, _, _ = point_segment(ax, az, cx, cz, dx, dz)
-            if d < limit:
+            e, _, _ = point_segment(bx, bz, cx, cz, dx, dz)
+            if min(d, e) < limit:
                 return True
     if outline.s1 - outline.s0 >= 3 and core_holds(outline, ax, az, work):
         d, _, _ = core_distance(outline, ax, az, work)
