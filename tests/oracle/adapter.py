@@ -123,11 +123,21 @@ def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
 
 
 def solve_planar(
-    finger: PlanarFinger, curve: PlanarCurve, hand: HandArrays | None = None, *, together: bool = False
+    finger: PlanarFinger,
+    curve: PlanarCurve,
+    hand: HandArrays | None = None,
+    sections: SectionArrays | None = None,
+    *,
+    together: bool = False,
 ) -> tuple[tuple[StageAnswer, ...], ClosingArrays]:
-    """Close a planar finger with the kernel, packed in a way of its own if given; return its stages and the answer."""
+    """Close a planar finger with the kernel; return its stages and the raw answer.
+
+    Args:
+        finger, curve: the case. hand, sections: the same, packed in a way of their own.
+        together: all groups move at once.
+    """
     hand = pack_finger(finger) if hand is None else hand
-    sections = pack_curve(curve)
+    sections = pack_curve(curve) if sections is None else sections
     items = ItemArrays(_ints([0]), _ints([0]), _ints([1]), np.full((1, len(finger.rates)), np.inf))
     answer = empty_answer(hand, 1, finger.groups)
     closed = not curve.two_sided

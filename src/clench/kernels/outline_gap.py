@@ -6,7 +6,8 @@ import math
 
 from .compiling import inner_kernel
 from .conics import region_gap
-from .layout import Floats, Outline, SectionArrays, Work
+from .layout import KIND_SIDE, Floats, Outline, SectionArrays, Work
+from .turning_pairs import note
 
 
 @inner_kernel
@@ -30,49 +31,76 @@ def side_ends(side: Floats, i: int) -> tuple[float, float, float, float]:
 
 
 @inner_kernel
-def outline_distance(outline: Outline, sections: SectionArrays, row: int, work: Work) -> tuple[float, float, float]:
-    """Return the least distance of an outline (put in family coordinates) to a section, and the section's point."""
-    best, x, z = math.inf, 0.0, 0.0
-    segments = sections.segments
+def outline_distance(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> float:
+    """Return the least distance of an outline (put in family coordinates) to a section; `work.best` gets the pair."""
+    best = math.inf
+    segments, pair = sections.segments, work.best
     for i in range(sections.counts[row, 0]):
         ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
         for v in range(outline.v0, outline.v1):
-            d, fx, fz = point_segment(work.vertex[v, 0], work.vertex[v, 1], ax, az, bx, bz)
+            x, z = work.vertex[v, 0], work.vertex[v, 1]
+            d, fx, fz = point_segment(x, z, ax, az, bx, bz)
             if d < best:
-                best, x, z = d, fx, fz
+                best, which = d, 0
+                if segments[row, i, 4] * (x - fx) + segments[row, i, 5] * (z - fz) < -touch:
+                    which = 1
+                if outline.radius > 0.0 and ((fx == ax and fz == az) or (fx == bx and fz == bz)):
+                    which = 2 if fx == ax and fz == az else 3
+                note(pair, outline.tip, outline.number, v, i, which, 0)
         for s in range(outline.s0, outline.s1):
-            cx, cz, dx, dz = side_ends(work.side, s)
-            d, _, _ = point_segment(ax, az, cx, cz, dx, dz)
+            d = side_distance(work.side, s, ax, az)
             if d < best:
-                best, x, z = d, ax, az
-            d, _, _ = point_segment(bx, bz, cx, cz, dx, dz)
+                best = d
+                note(pair, KIND_SIDE, outline.number, s, i, face(outline, work.side, s, ax, az), 0)
+            d = side_distance(work.side, s, bx, bz)
             if d < best:
-                best, x, z = d, bx, bz
-    gap, fx, fz = round_distance(outline, sections, row, work)
-    return (best - outline.radius, x, z) if best - outline.radius <= gap else (gap, fx, fz)
+                best = d
+                note(pair, KIND_SIDE, outline.number, s, i, 1 + face(outline, work.side, s, bx, bz), 0)
+    return round_distance(outline, sections, row, best - outline.radius, work)
 
 
 @inner_kernel
-def round_distance(outline: Outline, sections: SectionArrays, row: int, work: Work) -> tuple[float, float, float]:
-    """Return the least distance of an outline to the round parts of a section, and the section's point."""
-    best, x, z = math.inf, 0.0, 0.0
+def side_distance(side: Floats, s: int, px: float, pz: float) -> float:
+    """Return the distance of a point to the inside of a side, infinite where an end, which is a vertex, is nearest."""
+    along = side[s, 0] * pz - side[s, 1] * px
+    return abs(side[s, 0] * px + side[s, 1] * pz - side[s, 2]) if side[s, 3] < along < side[s, 4] else math.inf
+
+
+@inner_kernel
+def face(outline: Outline, side: Floats, s: int, px: float, pz: float) -> int:
+    """Return 2 where a point is behind a side of which both faces count, else 0."""
+    return 2 if outline.both and side[s, 0] * px + side[s, 1] * pz < side[s, 2] else 0
+
+
+@inner_kernel
+def round_distance(outline: Outline, sections: SectionArrays, row: int, best: float, work: Work) -> float:
+    """Return the least distance of an outline to the round parts of a section, if below `best`; as above."""
     for i in range(sections.counts[row, 1]):
-        qx, qz, radius = sections.disks[row, i, 0], sections.disks[row, i, 1], sections.disks[row, i, 2]
-        d, nx, nz = core_distance(outline, qx, qz, work)
-        if d - radius - outline.radius < best:
-            best = d - radius - outline.radius
-            x, z = qx + radius * nx, qz + radius * nz
-    for i in range(sections.counts[row, 2]):
+        qx, qz, reach = sections.disks[row, i, 0], sections.disks[row, i, 1], sections.disks[row, i, 2] + outline.radius
         for v in range(outline.v0, outline.v1):
-            d, _, _, fx, fz = region_gap(sections.ellipses[row, i], work.vertex[v, 0], work.vertex[v, 1])
-            if d - outline.radius < best:
-                best, x, z = d - outline.radius, fx, fz
+            d = math.hypot(work.vertex[v, 0] - qx, work.vertex[v, 1] - qz) - reach
+            if d < best:
+                best = d
+                note(work.best, outline.tip, outline.number, v, i, 0, 1)
         for s in range(outline.s0, outline.s1):
-            px, pz = nearest_scaled(sections.ellipses[row, i], work.side, s)
-            d, _, _, fx, fz = region_gap(sections.ellipses[row, i], px, pz)
-            if d - outline.radius < best:
-                best, x, z = d - outline.radius, fx, fz
-    return best, x, z
+            d = side_distance(work.side, s, qx, qz) - reach
+            if d < best:
+                best = d
+                note(work.best, KIND_SIDE, outline.number, s, i, face(outline, work.side, s, qx, qz), 1)
+    for i in range(sections.counts[row, 2]):
+        e = sections.ellipses[row, i]
+        for v in range(outline.v0, outline.v1):
+            d = region_gap(e, work.vertex[v, 0], work.vertex[v, 1])[0] - outline.radius
+            if d < best:
+                best = d
+                note(work.best, outline.tip, outline.number, v, i, 0, 2)
+        for s in range(outline.s0, outline.s1):
+            px, pz, inside = nearest_scaled(e, work.side, s)
+            d = region_gap(e, px, pz)[0] - outline.radius
+            if inside and d < best:
+                best = d
+                note(work.best, KIND_SIDE, outline.number, s, i, face(outline, work.side, s, e[0], e[1]), 2)
+    return best
 
 
 @inner_kernel
@@ -94,12 +122,12 @@ def core_distance(outline: Outline, qx: float, qz: float, work: Work) -> tuple[f
 
 
 @inner_kernel
-def nearest_scaled(e: Floats, side: Floats, s: int) -> tuple[float, float]:
-    """Return the point of a side nearest to an ellipse's centre where the ellipse is a unit circle."""
+def nearest_scaled(e: Floats, side: Floats, s: int) -> tuple[float, float, bool]:
+    """Return the point of a side nearest to an ellipse's centre where the ellipse is a unit circle; whether no end."""
     ax, az, bx, bz = side_ends(side, s)
     px, pz = ((ax - e[0]) * e[2] + (az - e[1]) * e[3]) / e[4], ((az - e[1]) * e[2] - (ax - e[0]) * e[3]) / e[5]
     qx, qz = ((bx - e[0]) * e[2] + (bz - e[1]) * e[3]) / e[4], ((bz - e[1]) * e[2] - (bx - e[0]) * e[3]) / e[5]
     dx, dz = qx - px, qz - pz
     square = dx * dx + dz * dz
     t = min(max(-(px * dx + pz * dz) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return ax + t * (bx - ax), az + t * (bz - az)
+    return ax + t * (bx - ax), az + t * (bz - az), 0.0 < t < 1.0

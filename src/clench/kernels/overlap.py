@@ -83,8 +83,7 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
             return True
     if sections.counts[row, 1] == 0 and sections.counts[row, 2] == 0:
         return False
-    gap, _, _ = round_distance(outline, sections, row, work)
-    if gap < -margin:
+    if round_distance(outline, sections, row, 0.0, work) < -margin:
         return True
     for i in range(sections.counts[row, 1]):
         if core_holds(outline, sections.disks[row, i, 0], sections.disks[row, i, 1], work):

@@ -29,6 +29,7 @@ from .layout import (
     Floats,
     HandArrays,
     Ints,
+    Outline,
     OutlineArrays,
     SectionArrays,
     Work,
@@ -128,10 +129,15 @@ def describe_hit(
 ) -> None:
     """Write where and how the winner of `advance` touches, at the posture it was stopped in."""
     place_joints(hand.chain, family, turns, work.place)
-    row = plane - base
+    hit[HIT_PLANE], hit[HIT_GROUP], hit[HIT_FAMILY] = plane, group, family
+    describe_touch(hand, sections, plane - base, work, hit, point)
+
+
+@inner_kernel
+def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Work, hit: Ints, point: Floats) -> None:
+    """Write where and how the pair in `work.best` touches with the joints where they are placed."""
     source, shape = work.best[3], work.best[5]
-    hit[HIT_PLANE], hit[HIT_OUTLINE], hit[HIT_KIND] = plane, work.best[1], work.best[0]
-    hit[HIT_GROUP], hit[HIT_FAMILY] = group, family
+    hit[HIT_OUTLINE], hit[HIT_KIND] = work.best[1], work.best[0]
     hit[HIT_FEATURE], hit[HIT_WHICH] = work.best[2], work.best[4]
     if shape == 0:
         hit[HIT_SOURCE] = sections.sources[row, source]
@@ -145,6 +151,20 @@ def describe_hit(
 
 
 @inner_kernel
+def still_touches(outline: Outline, hit: Ints, point: Floats, work: Work) -> bool:
+    """Say whether the feature that touched a point is still where the touch's normal says, to `PASSED_GAP`."""
+    x, z = point[HIT_X] + outline.radius * point[HIT_NX], point[HIT_Z] + outline.radius * point[HIT_NZ]
+    if hit[HIT_KIND] != KIND_SIDE:
+        vertex = work.vertex[hit[HIT_FEATURE]]
+        return bool(math.hypot(vertex[0] - x, vertex[1] - z) <= PASSED_GAP)
+    side = work.side[hit[HIT_FEATURE]]
+    turned = abs(side[0] * point[HIT_NZ] - side[1] * point[HIT_NX])
+    along, away = side[0] * z - side[1] * x, abs(side[0] * x + side[1] * z - side[2])
+    inside = side[3] - PASSED_GAP <= along <= side[4] + PASSED_GAP
+    return bool(inside and turned <= PASSED_GAP and away <= PASSED_GAP)
+
+
+@inner_kernel
 def settle_hit(
     hand: HandArrays,
     start: int,
@@ -155,20 +175,17 @@ def settle_hit(
     point: Floats,
     work: Work,
 ) -> None:
-    """Evaluate a contact again at the final posture; what later motions carried along gets its new place."""
+    """Evaluate a contact again at the final posture; what later motions carried along gets its new place and pair."""
     family, plane, o = hit[HIT_FAMILY], hit[HIT_PLANE], hit[HIT_OUTLINE]
     sections, row = shared, plane
     if family > start:
         sections, row = own, plane - hand.family_plane[start]
     place_joints(hand.chain, family, turns, work.place)
     outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
-    if hit[HIT_KIND] == KIND_SIDE:
-        nx, nz = side_normal(hand.outlines, work, o, hit[HIT_FEATURE], hit[HIT_WHICH])
-        point[HIT_NX], point[HIT_NZ] = -nx, -nz
+    touch = TOUCH_FRACTION * hand.family_length[family]
     gap, _, _ = core_distance(outline, point[HIT_X], point[HIT_Z], work)
     point[HIT_GAP] = gap - outline.radius
-    if abs(point[HIT_GAP]) > TOUCH_FRACTION * hand.family_length[family]:
-        gap, x, z = outline_distance(outline, sections, row, work)
-        point[HIT_GAP] = gap
-        if gap <= PASSED_GAP:
-            point[HIT_X], point[HIT_Z] = x, z
+    if abs(point[HIT_GAP]) > touch or not still_touches(outline, hit, point, work):
+        point[HIT_GAP] = outline_distance(outline, sections, row, touch, work)
+        if point[HIT_GAP] <= PASSED_GAP:
+            describe_touch(hand, sections, row, work, hit, point)
