@@ -18,6 +18,7 @@ from clench.apps.cli.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.base.errors import CommandError
 from clench.execution.report import ExecutionReport, JointReached
+from clench.grasp import approach
 from clench.kernels import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource
@@ -53,7 +54,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     monkeypatch.setitem(vars(clench), "GraspObject", loader)
     monkeypatch.setitem(vars(clench), "solve", fake.solve)
     poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
-    monkeypatch.setitem(vars(clench), "approach_poses", lambda *_: poses)
+    monkeypatch.setattr(approach, "drawn_poses", lambda *_: iter(poses))
     monkeypatch.setitem(vars(clench), "complete", lambda solution, *_, **__: solution)
     # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
     monkeypatch.setattr(warming, "announce", lambda: None)
@@ -243,14 +244,6 @@ def test_solve_without_command_takes_the_first_pose_that_gives_a_grasp(
     document = json.loads(capsys.readouterr().out)
     assert document["status"] == statuses[taken]
     assert clench.GraspSolution.from_dict(document).hand_pose.position[2] == pytest.approx(0.1 * taken)
-
-
-def test_solve_says_when_there_is_no_approach_pose(
-    solver: FakeSolver, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(vars(clench), "approach_poses", lambda *_: [])
-    assert main(SOLVE) == 2
-    assert "No approach pose of hand 'pincer'" in capsys.readouterr().err
 
 
 def test_solve_with_a_command_file(solver: FakeSolver, tmp_path: Path) -> None:

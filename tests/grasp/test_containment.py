@@ -64,6 +64,16 @@ def test_a_point_of_every_part():
     assert part_points(build_tree(np.empty((0, 3)), np.empty((0, 3)))).shape == (0, 3)
 
 
+@pytest.mark.parametrize("merged", [True, False])
+def test_faces_at_the_same_places_are_one_part_whether_they_share_vertices_or_not(merged):
+    box = Shape(ShapeKind.BOX, (1.0, 1.0, 1.0), Pose([3.0, 0.0, 0.0])).to_mesh(1e-3)
+    vertices, triangles = box.vertices, box.triangles
+    if not merged:
+        vertices, triangles = vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
+    (point,) = part_points(build_tree(vertices, triangles))
+    assert point.tolist() == min(box.vertices.tolist())
+
+
 @pytest.mark.parametrize(("away", "found"), [(0.0, True), (0.02, True), (0.2, False)])
 def test_a_link_within_another_is_found_from_either_side(away, found):
     for first in (True, False):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from numbers import Real
 from typing import Final
@@ -46,18 +47,26 @@ def approach_poses(
         UnknownNameError: a joint of the preshape that does not exist.
         ObjectError: no graspable surface, or no free pose found.
     """
-    if count < 0 or seed < 0:
-        raise CommandError(f"approach poses: expected a count and a seed of 0 or more, got {count} and {seed}.")
-    q = _open_posture(hand, {} if preshape is None else preshape)
+    if count < 0:
+        raise CommandError(f"approach poses: expected a count of 0 or more, got {count}.")
+    return list(itertools.islice(drawn_poses(hand, obj, seed, {} if preshape is None else preshape), count))
+
+
+def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, float]) -> Iterator[Pose]:
+    """Draw the poses of `approach_poses` one after another, without end; arguments and errors as there."""
+    if seed < 0:
+        raise CommandError(f"approach poses: expected a seed of 0 or more, got {seed}.")
+    q = _open_posture(hand, preshape)
     packed = pack_object(obj)
     surface = _Surface(obj, packed)
     T_world_object = obj.pose.matrix
-    poses = []
-    for number in range(count):
+
+    def drawn(number: int) -> Pose:
         # One stream per pose, so that no pose depends on how many others are drawn or how often they were drawn anew.
         rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((seed, number))))
-        poses.append(Pose.from_matrix(T_world_object @ _draw(rng, hand, q, packed, surface, obj.name)))
-    return poses
+        return Pose.from_matrix(T_world_object @ _draw(rng, hand, q, packed, surface, obj.name))
+
+    return map(drawn, itertools.count())
 
 
 class _Surface:

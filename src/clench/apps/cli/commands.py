@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -115,13 +115,10 @@ def solve(
     mass = _checked_mass(mass, friction, criteria)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
-    commands = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
-    if planes is not None:
-        commands = [replace(one, planes=planes) for one in commands]
-    if order:
-        commands = [in_orders(one, order) for one in commands]
-    if criteria is not None:
-        commands = [replace(one, criteria=criteria) for one in commands]
+    given = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
+    asked: dict[str, Any] = {} if planes is None else {"planes": planes}
+    asked |= {} if criteria is None else {"criteria": criteria}
+    commands = (in_orders(replace(one, **asked), order or ()) for one in given)
     announce()
     warm_up()
     the_command, solution = first_grasp(the_hand, the_object, commands)
@@ -285,21 +282,22 @@ COMMANDS: dict[str, Callable[..., int]] = {
 }
 
 
-def approaches(hand: Hand, obj: GraspObject, seed: int) -> list[GraspCommand]:
-    """Return a command for each of the first approach poses of a seed.
+def approaches(hand: Hand, obj: GraspObject, seed: int) -> Iterator[GraspCommand]:
+    """Return a command for each of the first approach poses of a seed, which are drawn one after another.
 
     Raises:
-        CommandError: there is none.
+        ClenchError: see `clench.approach_poses`.
     """
+    from itertools import islice
+
     import clench
+    from clench.grasp.approach import drawn_poses
 
-    poses = clench.approach_poses(hand, obj, APPROACHES, seed)
-    if not poses:
-        raise CommandError(f"No approach pose of hand '{hand.name}' on '{obj.name}' for seed {seed}; give --command.")
-    return [clench.GraspCommand(hand_pose=pose, seed=seed) for pose in poses]
+    poses = islice(drawn_poses(hand, obj, seed, {}), APPROACHES)
+    return (clench.GraspCommand(hand_pose=pose, seed=seed) for pose in poses)
 
 
-def first_grasp(hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand]) -> tuple[GraspCommand, GraspSolution]:
+def first_grasp(hand: Hand, obj: GraspObject, commands: Iterable[GraspCommand]) -> tuple[GraspCommand, GraspSolution]:
     """Return the first command that gives a grasp, and its solution; without any, the first that touches most."""
     import clench
 
@@ -312,13 +310,15 @@ def first_grasp(hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand]) 
 
 
 def in_orders(command: GraspCommand, names: Sequence[Order]) -> GraspCommand:
-    """Return a command for one closing order, or for several as alternatives."""
+    """Return a command for one closing order, or for several as alternatives; without any, as it is."""
     from dataclasses import replace
 
     from clench.models.command import ClosingOrder
 
     orders = tuple(map(ClosingOrder, names))
-    return replace(command, order=orders[0], orders=()) if len(orders) == 1 else replace(command, orders=orders)
+    if len(orders) == 1:
+        return replace(command, order=orders[0], orders=())
+    return replace(command, orders=orders) if orders else command
 
 
 def loadable(model: str) -> str:
