@@ -28,7 +28,7 @@ POSES = {
 def cut(kind, pose, offset):
     rounds = RoundArrays(np.array([NUMBER[kind]]), np.array([SIZE]), pose.matrix[None, :3].copy())
     sections = make_sections(1, 0, 1)
-    cut_rounds(rounds, np.eye(4)[:3].copy(), offset, 0, sections)
+    cut_rounds(rounds, np.eye(4)[:3].copy(), offset, 0, sections, np.empty((3, 4)))
     segments, disks, ellipses = sections.counts[0]
     return sections.segments[0, :segments], sections.disks[0, :disks], sections.ellipses[0, :ellipses]
 
@@ -110,6 +110,6 @@ def test_semi_axes_of_an_oblique_cylinder():
 def test_a_ball_shaped_ellipsoid_is_cut_in_a_circle():
     rounds = RoundArrays(np.array([3]), np.array([[0.02, 0.02, 0.02]]), POSES["oblique"].matrix[None, :3].copy())
     sections = make_sections(1, 0, 1)
-    cut_rounds(rounds, np.eye(4)[:3].copy(), 0.012, 0, sections)
+    cut_rounds(rounds, np.eye(4)[:3].copy(), 0.012, 0, sections, np.empty((3, 4)))
     assert sections.counts[0].tolist() == [0, 1, 0]
     assert sections.disks[0, 0] == pytest.approx([0.01, -0.01, np.sqrt(0.02**2 - 0.01**2)])

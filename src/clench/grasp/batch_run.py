@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from threading import Lock
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,23 +23,28 @@ if TYPE_CHECKING:
 Whole = NDArray[np.int64]
 
 
-def solve_packed(problem: PackedProblem, T_palm_object: FloatArray, threads: int) -> Solved:
+#: Threads take turns on a device.
+_ON_DEVICE: Final = Lock()
+
+
+def solve_packed(problem: PackedProblem, T_palm_object: FloatArray, threads: int, on_device: bool) -> Solved:
     """Solve for every pose of the object; the answer is the same for any number of threads.
 
     Args:
         problem: the rest. T_palm_object: where the object is, shape (N, 3, 4). threads: how many are used.
+        on_device: fingers close on a CUDA device.
     """
     solved = _empty_solved(problem, len(T_palm_object))
-    # A few more parts than threads, as poses that touch nothing are quick.
-    count = min(len(T_palm_object), 4 * threads)
+    # A few more parts than threads, as poses that touch nothing are quick; a device likes large ones.
+    count = min(len(T_palm_object), threads if on_device else 4 * threads)
     if threads == 1 or count < 2:
-        _Range(problem, T_palm_object).solve(solved)
+        _Range(problem, T_palm_object, on_device).solve(solved)
         return solved
     ends = np.linspace(0, len(T_palm_object), count + 1).astype(int).tolist()
 
     def run(span: tuple[int, int]) -> None:
         columns: list[Any] = [column[slice(*span)] for column in solved]
-        _Range(problem, T_palm_object[slice(*span)]).solve(type(solved)(*columns))
+        _Range(problem, T_palm_object[slice(*span)], on_device).solve(type(solved)(*columns))
 
     deque(kernel_threads(threads).map(run, pairwise(ends)), maxlen=0)
     return solved
@@ -46,8 +53,8 @@ def solve_packed(problem: PackedProblem, T_palm_object: FloatArray, threads: int
 class _Range:
     """Solve a range of poses, stage after stage."""
 
-    def __init__(self, problem: PackedProblem, T_palm_object: FloatArray) -> None:
-        self._problem, self._T = problem, T_palm_object
+    def __init__(self, problem: PackedProblem, T_palm_object: FloatArray, on_device: bool) -> None:
+        self._problem, self._T, self._on_device = problem, T_palm_object, on_device
         self._count, self._items = len(T_palm_object), len(problem.items.entry)
         self._blocked = np.zeros((self._count, len(problem.frames.posture)), dtype=np.int64)
         self._answers = _empty_answers(problem, self._count)
@@ -132,10 +139,8 @@ class _Range:
         overlaps: Whole,
         answers: ClosingArrays,
     ) -> None:
-        from clench.kernels.batch_closing import close_poses
-
         p = self._problem
-        close_poses(
+        _closing(self._on_device)(
             p.hand,
             exact,
             target.tree,
@@ -198,6 +203,21 @@ class _Range:
         self._run(exact, none, poses, placed, length, asked, 0, overlaps, answers)
         meets: NDArray[np.bool_] = (asked != 0) & ((answers.contacts > 0) | (answers.skipped > 0))
         return meets
+
+
+def _closing(on_device: bool) -> Callable[..., None]:
+    """Return what closes the fingers for many poses."""
+    if not on_device:
+        from clench.kernels.batch_closing import close_poses
+
+        return close_poses
+    from clench.kernels.cuda_closing import close_poses_on_device
+
+    def close(*given: Any) -> None:
+        with _ON_DEVICE:
+            close_poses_on_device(*given)
+
+    return close
 
 
 def _rows(answers: ClosingArrays, rows: Whole) -> ClosingArrays:

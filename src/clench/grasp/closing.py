@@ -126,7 +126,8 @@ def close_hand(
     obj = object_for_closing(packed)
     arena = arena_of(obj.tree)
     shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
-    while wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared):
+    scratch = np.empty((2, 3, 4))
+    while wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared, scratch):
         arena.grow(wanted)
         shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
     overlaps = np.empty(len(plan.plans), dtype=np.int64)

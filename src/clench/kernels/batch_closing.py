@@ -8,7 +8,7 @@ from .compiling import allocating_kernel, inner_allocating_kernel
 from .exact import ExactArrays
 from .family_section import cut_first_families
 from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays
-from .overlap import find_overlaps
+from .overlap import look_for_overlaps
 from .sweeping import make_sweep_work
 from .tree import MeshTree
 
@@ -98,18 +98,18 @@ def close_poses(
         hand, exact, tree, rounds, closed, items: see `close_items`. T_palm_object: where the object is, (N, 3, 4).
         link_pose, length: that of `exact` and of the chain for every pose, (N, ...), or for all of them, (1, ...).
         asked: whether an item is to be closed at a pose, (N, I); answers of others are left as they are.
-        shared, own: arenas of sections. overlaps: see `find_overlaps`, (N, E); such entries are not closed.
+        shared, own: arenas of sections. overlaps: see `look_for_overlaps`, (N, E); such entries are not closed.
         answers: see `ClosingArrays`, with the poses first; `overflow` is written for all items of a pose.
     """
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
     sweep = make_sweep_work(work.chain, exact.checked.shape[0])
     for n in range(T_palm_object.shape[0]):
         answer, T, one = answer_at(answers, n), T_palm_object[n], min(n, link_pose.shape[0] - 1)
-        overflow = cut_first_families(hand, tree, rounds, T, shared)
+        overflow = cut_first_families(hand, tree, rounds, T, shared, work.pose)
         if overflow > 0:
             answer.overflow[:] = overflow
             continue
-        find_overlaps(hand, tree, rounds, closed, T, shared, overlaps[n])
+        look_for_overlaps(hand, tree, rounds, closed, T, shared, overlaps[n], work)
         fingers, placed = with_lengths(hand, length[one]), with_links(exact, link_pose[one])
         for i in range(items.entry.shape[0]):
             if not asked[n, i]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import advance, make_work
-from .compiling import allocating_kernel, inner_kernel
+from .compiling import allocating_kernel, inner_kernel, kernel
 from .exact import ExactArrays, describe_pair, last_mover, pose_movers, settle_pair, sweep_stage
 from .family_pose import compose_inverse, copy_pose, pose_family
 from .family_section import cut_planes
@@ -162,7 +162,7 @@ def enter_family(
         T = work.pose[0]
         compose_inverse(answer.pose[i, family], T_palm_object, T)
         low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
-        wanted = cut_planes(hand, family, low, high, tree, rounds, T, own, hand.family_plane[start])
+        wanted = cut_planes(hand, family, low, high, tree, rounds, T, own, hand.family_plane[start], work.pose[1])
         answer.overflow[i] = max(answer.overflow[i], wanted)
 
 
@@ -240,7 +240,7 @@ def write_contact(
     describe_pair(exact, T_palm_object, met, group, family, sweep, hit, point)
 
 
-@inner_kernel
+@kernel
 def close_item(
     hand: HandArrays,
     exact: ExactArrays,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ def signed_distance(tree: MeshTree, p: Any, closed: bool) -> float:
         p: the point in the mesh's frame [m], three numbers.
         closed: the mesh is watertight with outward normals.
     """
-    distance = float(np.sqrt(closest_point(tree, p, np.inf)[0]))
+    distance = math.sqrt(closest_point(tree, p, np.inf)[0])
     return -distance if is_inside(tree, p, closed) else distance
 
 
@@ -124,14 +125,14 @@ def winding_number(tree: MeshTree, p: Any) -> float:
         ax, ay, az = a[0] - p[0], a[1] - p[1], a[2] - p[2]
         bx, by, bz = b[0] - p[0], b[1] - p[1], b[2] - p[2]
         cx, cy, cz = c[0] - p[0], c[1] - p[1], c[2] - p[2]
-        la = np.sqrt(ax * ax + ay * ay + az * az)
-        lb = np.sqrt(bx * bx + by * by + bz * bz)
-        lc = np.sqrt(cx * cx + cy * cy + cz * cz)
+        la = math.sqrt(ax * ax + ay * ay + az * az)
+        lb = math.sqrt(bx * bx + by * by + bz * bz)
+        lc = math.sqrt(cx * cx + cy * cy + cz * cz)
         volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
         below = la * lb * lc + (ax * bx + ay * by + az * bz) * lc
         below += (bx * cx + by * cy + bz * cz) * la + (cx * ax + cy * ay + cz * az) * lb
-        total += np.arctan2(volume, below)
-    return total / (2.0 * np.pi)
+        total += math.atan2(volume, below)
+    return total / (2.0 * math.pi)
 
 
 @inner_kernel

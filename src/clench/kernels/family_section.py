@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiling import allocating_kernel, inner_kernel
-from .family_pose import compose_inverse
+from .compiling import inner_kernel, kernel
+from .family_pose import compose, compose_inverse
 from .layout import Floats, HandArrays, RoundArrays, SectionArrays
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
 from .section import cut
@@ -25,17 +25,11 @@ def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
     )
 
 
-@allocating_kernel
-def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections: SectionArrays) -> None:
-    """Append the sections of all round primitives with one plane."""
-    pose = np.empty((3, 4))
+@kernel
+def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections: SectionArrays, pose: Floats) -> None:
+    """Append the sections of all round primitives with one plane; `pose` is scratch space, (3, 4)."""
     for i in range(rounds.kind.shape[0]):
-        for r in range(3):
-            for c in range(4):
-                total = T[r, 3] if c == 3 else 0.0
-                for k in range(3):
-                    total += T[r, k] * rounds.pose[i, k, c]
-                pose[r, c] = total
+        compose(T, rounds.pose[i], pose)
         kind, size = rounds.kind[i], rounds.size[i]
         if kind == CYLINDER:
             cut_cylinder(pose, size[0], size[1], offset, True, i, row, sections)
@@ -58,11 +52,12 @@ def cut_planes(
     T: Floats,
     sections: SectionArrays,
     base: int,
+    pose: Floats,
 ) -> int:
     """Cut the object by the planes `low` to `high` of a family; row `plane - base` of the arena is written.
 
     Args:
-        T: `T_family_object`, shape (3, 4).
+        T: `T_family_object`, shape (3, 4). pose: scratch space, (3, 4).
 
     Returns:
         0, or the capacity that the arena should have had.
@@ -83,24 +78,31 @@ def cut_planes(
     )
     for plane in range(low, high):
         sections.counts[plane - base, 1], sections.counts[plane - base, 2] = 0, 0
-        cut_rounds(rounds, T, hand.plane_offset[plane], plane - base, sections)
+        cut_rounds(rounds, T, hand.plane_offset[plane], plane - base, sections, pose)
     return int(wanted)
 
 
-@allocating_kernel
+@kernel
 def cut_first_families(
-    hand: HandArrays, tree: MeshTree, rounds: RoundArrays, T_palm_object: Floats, sections: SectionArrays
+    hand: HandArrays,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    T_palm_object: Floats,
+    sections: SectionArrays,
+    scratch: Floats,
 ) -> int:
     """Cut the object by the planes of every entry's first family, which no turn moves; row = global plane.
+
+    Args:
+        scratch: two poses, (2, 3, 4). The others as for `close_items`.
 
     Returns:
         0, or the capacity that the arena should have had.
     """
-    wanted = 0
-    T = np.empty((3, 4))
+    wanted, T = 0, scratch[0]
     for entry in range(hand.entry_family.shape[0] - 1):
         family = hand.entry_family[entry]
         compose_inverse(hand.family_pose[family], T_palm_object, T)
         low, high = hand.family_plane[family], hand.family_plane[family + 1]
-        wanted = max(wanted, cut_planes(hand, family, low, high, tree, rounds, T, sections, 0))
+        wanted = max(wanted, cut_planes(hand, family, low, high, tree, rounds, T, sections, 0, scratch[1]))
     return wanted

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import make_work, place_joints, put_outline
-from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
-from .distance import is_inside
-from .family_pose import compose_inverse, pose_family
+from .compiling import allocating_kernel, inner_kernel, kernel
+from .distance import Point, is_inside
+from .family_pose import back, compose_inverse
 from .layout import Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
 from .outline_gap import core_distance, point_segment, round_distance, side_ends
 from .outline_sweep import stadium_gap
@@ -98,7 +96,7 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
 
 
 @inner_kernel
-def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
+def inside_round(rounds: RoundArrays, i: int, p: Point) -> bool:
     """Say whether a point of the object's frame lies inside a round primitive."""
     pose, size = rounds.pose[i], rounds.size[i]
     x, y, z = 0.0, 0.0, 0.0
@@ -115,18 +113,12 @@ def inside_round(rounds: RoundArrays, i: int, p: Floats) -> bool:
     return bool(x * x + y * y + beyond * beyond < size[0] ** 2)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def starts_inside(
     tree: MeshTree, rounds: RoundArrays, closed: bool, T_family_object: Floats, x: float, y: float, z: float
 ) -> bool:
     """Say whether a point given in a family's frame lies inside the object's mesh or one of its round primitives."""
-    p = np.empty(3)
-    for k in range(3):
-        p[k] = (
-            T_family_object[0, k] * (x - T_family_object[0, 3])
-            + T_family_object[1, k] * (y - T_family_object[1, 3])
-            + T_family_object[2, k] * (z - T_family_object[2, 3])
-        )
+    p = back(T_family_object, x, y, z)
     for i in range(rounds.kind.shape[0]):
         if inside_round(rounds, i, p):
             return True
@@ -135,11 +127,11 @@ def starts_inside(
     for k in range(3):
         if p[k] < tree.low[0, k] or p[k] > tree.high[0, k]:
             return False
-    return bool(is_inside(tree, (p[0], p[1], p[2]), closed))
+    return bool(is_inside(tree, p, closed))
 
 
-@allocating_kernel
-def find_overlaps(
+@kernel
+def look_for_overlaps(
     hand: HandArrays,
     tree: MeshTree,
     rounds: RoundArrays,
@@ -147,19 +139,18 @@ def find_overlaps(
     T_palm_object: Floats,
     sections: SectionArrays,
     overlaps: Ints,
+    work: Work,
 ) -> None:
     """Write, for every entry, an outline that overlaps the object before anything moves, or -1, shape (E,)."""
-    work = make_work(hand.chain.rate.shape[0], hand.outlines)
-    turns = np.zeros(hand.chain.rate.shape[0])
-    poses = np.empty((hand.family_pose.shape[0], 3, 4))
-    T = np.empty((3, 4))
+    turns, T = work.turns, work.pose[0]
+    for j in range(turns.shape[0]):
+        turns[j] = 0.0
     for entry in range(hand.entry_family.shape[0] - 1):
         overlaps[entry] = -1
         family = hand.entry_family[entry]
         touch = TOUCH_FRACTION * hand.family_length[family]
-        pose_family(hand, family, True, turns, work, poses)
         place_joints(hand.chain, family, turns, work.place)
-        compose_inverse(poses[family], T_palm_object, T)
+        compose_inverse(hand.family_pose[family], T_palm_object, T)
         for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
             for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
                 outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
@@ -186,3 +177,18 @@ def closer_than(outline: Outline, sections: SectionArrays, row: int, margin: flo
         if d <= margin:
             return True
     return False
+
+
+@allocating_kernel
+def find_overlaps(
+    hand: HandArrays,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    closed: bool,
+    T_palm_object: Floats,
+    sections: SectionArrays,
+    overlaps: Ints,
+) -> None:
+    """Do what `look_for_overlaps` does, with scratch space of its own."""
+    work = make_work(hand.chain.rate.shape[0], hand.outlines)
+    look_for_overlaps(hand, tree, rounds, closed, T_palm_object, sections, overlaps, work)

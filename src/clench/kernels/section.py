@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -276,10 +277,10 @@ def _normal(ax: float, az: float, bx: float, bz: float, fx: float, fz: float, sh
     if fx == 0.0 and fz == 0.0:
         return 0.0, 0.0
     nx, nz = az - bz, bx - ax
-    length = np.sqrt(nx * nx + nz * nz)
+    length = math.sqrt(nx * nx + nz * nz)
     side = nx * fx + nz * fz
     if length <= short or side == 0.0:
-        length = np.sqrt(fx * fx + fz * fz)
+        length = math.sqrt(fx * fx + fz * fz)
         return fx / length, fz / length
     share = 1.0 / length if side > 0.0 else -1.0 / length
     return nx * share, nz * share

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .compiling import inner_kernel
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
+
+#: A positive number times this is the next one below it.
+BELOW = 1.0 - 2.0**-53
 
 
 @inner_kernel
 def sooner(found: float, best: float) -> float:
     """Return a winner's travel below `best`, which rounding may have lost."""
-    return min(found, float(np.nextafter(best, 0.0)))
+    return min(found, best * BELOW)
 
 
 @inner_kernel

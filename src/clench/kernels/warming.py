@@ -132,7 +132,7 @@ def sample_values() -> dict[str, Any]:
         "f1": ("turns", "rates", "point", "q"),
         "f2": ("T_palm_object", "T_palm_family", "first", "second", "out", "postures"),
         "i1": ("overlaps", "hit", "wanted"),
-        "f3": ("poses", "placed"),
+        "f3": ("poses", "placed", "scratch"),
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])

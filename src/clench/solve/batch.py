@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, Final
@@ -19,6 +21,7 @@ from clench.models.command import GraspCommand
 
 from .batch_progress import shown
 from .batch_solver import BatchSolver
+from .devices import CPU, why_not
 from .grasp_batch import GraspBatch
 
 if TYPE_CHECKING:
@@ -42,6 +45,7 @@ def solve_batch(
     threads: int | None = None,
     chunk: int = CHUNK,
     progress: bool | None = None,
+    device: str = CPU,
 ) -> GraspBatch:
     """Solve a command at many poses; every answer has the bits of `clench.solve` at that pose, for any threads.
 
@@ -55,16 +59,18 @@ def solve_batch(
             every posture, which takes much longer than a solve: few different ones are quick, many are not.
         threads: how many are used; all cores by default. chunk: poses at a time, which bounds the memory besides the
             answers. progress: show a bar on standard error after a second; by default where that is a terminal.
+        device: what closes the fingers, "cpu" or "cuda"; where there is no CUDA device, a warning says so, and the
+            CPU does it. Answers of a device differ in their last bits.
 
     Raises:
-        CommandError: malformed poses or numbers, or see `clench.solve`.
+        CommandError: malformed poses or numbers, an unknown device, or see `clench.solve`.
     """
     asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
     rows = pose_rows(hand_poses, "hand_poses")
     there = None if object_poses is None else pose_rows(object_poses, "object_poses")
     if there is not None and len(there) != len(rows):
         raise CommandError(f"object_poses: expected {len(rows)} poses, one per hand pose, got {len(there)}.")
-    count, size = _threads(threads), _whole(chunk, "chunk")
+    count, size, device = _threads(threads), _whole(chunk, "chunk"), _usable(device)
     columns = _preshapes(preshapes, len(rows))
     groups = _postures(columns, len(rows))
     parts = []
@@ -74,7 +80,7 @@ def solve_batch(
             solver = BatchSolver(hand, obj, replace(asked, preshape={**asked.preshape, **shape}))
             for begin in range(0, max(len(where), 1), size):
                 part = where[begin : begin + size]
-                parts.append(solver.solve(rows[part], None if there is None else there[part], count))
+                parts.append(solver.solve(rows[part], None if there is None else there[part], count, device))
                 advance(len(part))
     batch = GraspBatch.joined(parts)
     if len(groups) > 1:
@@ -92,6 +98,7 @@ def solve_stream(
     object_poses: Iterable[Pose | ArrayLike] | None = None,
     threads: int | None = None,
     chunk: int = CHUNK,
+    device: str = CPU,
 ) -> Iterator[GraspBatch]:
     """Solve a command at any number of poses, in constant memory: yield batches of up to `chunk` poses.
 
@@ -102,16 +109,16 @@ def solve_stream(
         CommandError: malformed poses or numbers, or see `clench.solve`.
     """
     asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
-    count, size = _threads(threads), _whole(chunk, "chunk")
+    count, size, device = _threads(threads), _whole(chunk, "chunk"), _usable(device)
     solver = BatchSolver(hand, obj, asked)
-    return _stream(solver, iter(hand_poses), None if object_poses is None else iter(object_poses), count, size)
+    solve = partial(solver.solve, threads=count, device=device)
+    return _stream(solve, iter(hand_poses), None if object_poses is None else iter(object_poses), size)
 
 
 def _stream(
-    solver: BatchSolver,
+    solve: Callable[[FloatArray, FloatArray | None], GraspBatch],
     hand_poses: Iterator[Pose | ArrayLike],
     object_poses: Iterator[Pose | ArrayLike] | None,
-    threads: int,
     size: int,
 ) -> Iterator[GraspBatch]:
     while True:
@@ -121,12 +128,21 @@ def _stream(
             raise CommandError("object_poses: expected as many poses as hand_poses has.")
         if not len(rows):
             return
-        yield solver.solve(rows, there, threads)
+        yield solve(rows, there)
 
 
 def _next_rows(poses: Iterator[Pose | ArrayLike], size: int, key: str) -> FloatArray:
     some: list[Any] = [pose.wxyz_xyz if isinstance(pose, Pose) else pose for pose in islice(poses, size)]
     return pose_rows(some, key)
+
+
+def _usable(device: str) -> str:
+    """Return the device, or the CPU with a warning that says why."""
+    reason = why_not(device)
+    if reason is None:
+        return device
+    warnings.warn(f"{reason} Solving on the CPU.", stacklevel=3)
+    return CPU
 
 
 def _threads(threads: int | None) -> int:

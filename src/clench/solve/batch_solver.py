@@ -18,6 +18,7 @@ from clench.grasp.plan import closing_joints
 from clench.models.command import ClosingOrder, GraspCommand
 
 from .controller import solve
+from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
 from .planning import planned
 from .problem import make_problem, make_setting
@@ -78,12 +79,14 @@ class BatchSolver:
             len(self._idle),
         )
 
-    def solve(self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int) -> GraspBatch:
+    def solve(
+        self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int, device: str = CPU
+    ) -> GraspBatch:
         """Return the answers.
 
         Args:
             hand_rows: poses as the command means them, (N, 7). object_rows: of the object, (N, 7); None: where it is.
-            threads: how many are used.
+            threads: how many are used. device: what closes the fingers, see `clench.solve_batch`.
         """
         if object_rows is None:
             object_rows = np.repeat(self._start.T_world_object.wxyz_xyz[None], len(hand_rows), axis=0)
@@ -94,7 +97,7 @@ class BatchSolver:
         palms = self._palms(hand_rows)
         T_palm_object = np.empty((len(palms), 3, 4))
         relate_poses(palms, object_rows, T_palm_object)
-        solved = solve_packed(self.packed, T_palm_object, threads)
+        solved = solve_packed(self.packed, T_palm_object, threads, device == CUDA)
         return self._read(solved, palms, hand_rows, object_rows)
 
     def _palms(self, hand_rows: FloatArray) -> FloatArray:

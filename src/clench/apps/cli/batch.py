@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,8 @@ def batch(
     planes: int | None = None,
     planes_only: bool = False,
     threads: int | None = None,
+    device: str = "cpu",
+    chunk: int | None = None,
     out: Path | None = None,
     strict: bool = False,
     json: bool = False,
@@ -50,6 +53,8 @@ def batch(
         planes: curl planes per finger.
         planes_only: close on the planes alone; what lies between them is not looked at, and nothing is certified.
         threads: how many are used; all cores by default.
+        device: what closes the fingers, cpu or cuda (an NVIDIA GPU; docs/batch.md).
+        chunk: poses at a time; a GPU wants some ten thousand.
         out: NumPy file (.npz) to write.
         strict: exit with 1 unless a pose gives a grasp.
         json: print one JSON document on standard output.
@@ -58,12 +63,18 @@ def batch(
 
     import clench
     from clench.kernels.warming import announce, warm_up
+    from clench.solve.batch import CHUNK
+    from clench.solve.devices import CPU, why_not
 
     from .printing import print_batch, print_files
     from .results import print_json
 
     if out is not None and out.suffix != ".npz":
         raise CommandError(f"--out: expected a file that ends in .npz, got '{out}'.")
+    reason = why_not(device)
+    if reason is not None:
+        sys.stderr.write(f"clench: {reason} Solving on the CPU.\n")
+        device = CPU
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(object, scale=scale)
     asked = clench.GraspCommand(hand_pose=clench.Pose.identity())
@@ -81,7 +92,9 @@ def batch(
     warm_up()
     rows = clench.approach_poses(the_hand, the_object, count, seed) if read is None else read
     began = time.perf_counter()
-    answers = clench.solve_batch(the_hand, the_object, rows, asked, threads=threads)
+    answers = clench.solve_batch(
+        the_hand, the_object, rows, asked, threads=threads, chunk=CHUNK if chunk is None else chunk, device=device
+    )
     seconds = time.perf_counter() - began
     if out is not None:
         answers.save(out)
