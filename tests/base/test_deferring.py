@@ -14,9 +14,11 @@ def test_it_is_made_once_when_it_is_read():
     calls = []
     deferred = DeferredMapping(lambda: calls.append(1) or MADE)
     assert calls == []
+    assert not deferred.is_made
     assert deferred["code"] == "limit"
     assert list(deferred) == ["code", "angles"]
     assert len(deferred) == 2
+    assert deferred.is_made
     assert calls == [1]
     with pytest.raises(KeyError):
         deferred["other"]

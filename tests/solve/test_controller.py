@@ -230,12 +230,17 @@ def test_what_is_made_when_it_is_read_is_what_the_choice_was_made_of(distance):
     ball = BALL.posed(Pose(BALL.pose.position + distance))
     solution, again = (clench.solve(three_links(), ball, command(planes=3)) for _ in range(2))
     finger = again.fingers["index"]
+    assert again.violations() == solution.violations() == ()
+    assert again.is_valid() == (distance == 0.0)
+    assert list(finger.made) == [finger.chosen]
     assert "candidates" not in vars(finger)
     copied = pickle.loads(pickle.dumps(again))
     assert {**copied.to_dict(), "timing": {}} == {**solution.to_dict(), "timing": {}}
     assert finger == solution.fingers["index"]
     assert finger.candidates is finger.candidates
     chosen = finger.candidates[finger.chosen]
+    assert finger.best is chosen
+    assert finger.made == dict(enumerate(finger.candidates))
     assert [id(c) for c in again.contacts] == [id(c) for c in chosen.contacts]
     assert (finger.cause is None) == (finger.status is clench.FingerStatus.TOUCH)
     with pytest.raises(AttributeError, match="no attribute 'other'"):

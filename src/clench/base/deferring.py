@@ -17,6 +17,11 @@ class DeferredMapping(Mapping[str, Any]):
         self._make: Callable[[], Mapping[str, Any]] | None = make
         self._made: dict[str, Any] = {}
 
+    @property
+    def is_made(self) -> bool:
+        """Whether it has been read."""
+        return self._make is None
+
     def _all(self) -> dict[str, Any]:
         make = self._make
         if make is not None:

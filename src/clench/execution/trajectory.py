@@ -299,9 +299,8 @@ def _followers(hand: Hand, leader: int) -> list[int]:
 
 def _chosen(solution: GraspSolution, finger: str) -> tuple[Any, ...]:
     result = solution.fingers.get(finger)
-    if result is None or not 0 <= result.chosen < len(result.candidates):
-        return ()
-    return (result.candidates[result.chosen],)
+    best = None if result is None else result.best
+    return () if best is None else (best,)
 
 
 def _eased(start: FloatArray, end: FloatArray) -> FloatArray:

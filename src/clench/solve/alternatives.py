@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration
@@ -14,6 +14,7 @@ from clench.grasp.choice import HandChoice, choose
 from clench.grasp.closing import ClosedHand, HandPlan, close_hand
 from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import is_built_in, score_hand
+from clench.grasp.depths import LinkDepth
 from clench.grasp.explaining import explain_choice
 from clench.grasp.feasibility import judge_sets
 
@@ -26,12 +27,21 @@ if TYPE_CHECKING:
 Groups = list[list[FingerCandidate]]
 
 
+class ClosedSets(NamedTuple):
+    """Hold what closing gave: the kernels' answer, what overlaps at the start per entry, and the sets per item."""
+
+    closed: ClosedHand
+    overlaps: list[LinkDepth | None]
+    sets: list[FingerCandidate]
+
+
 def finger_sets(problem: Problem) -> Groups:
     """Return the sets of every finger that the choice is made of."""
-    return close_sets(problem, planned(problem), lambda stage: None)[1]
+    made = planned(problem)
+    return group_by_finger(made.plan, close_sets(problem, made, lambda stage: None).sets)
 
 
-def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> tuple[ClosedHand, Groups]:
+def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> ClosedSets:
     """Close every alternative of every finger that is planned, and judge what it passes through.
 
     Args:
@@ -41,10 +51,27 @@ def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> t
     closed = close_hand(plan, made.exact, packed, T, problem.rounds)
     lap("close")
     overlaps = start_overlaps(hand, plan, made.exact.link_pose, closed, packed, T, problem.source)
-    candidates = read_candidates(hand, plan, packed, closed, overlaps)
-    judge_sets(hand, candidates, packed, T, problem.source, problem.command.check_sets, plan.together)
+    sets = read_candidates(hand, plan, packed, closed, overlaps)
+    _judge(problem, sets)
     lap("sets")
-    return closed, group_by_finger(plan, candidates)
+    return ClosedSets(closed, overlaps, sets)
+
+
+def _judge(problem: Problem, sets: Sequence[FingerCandidate]) -> None:
+    p = problem
+    judge_sets(p.hand, sets, p.packed, p.T_palm_object, p.source, p.command.check_sets, p.together)
+
+
+def with_planes(
+    problem: Problem, overlaps: Sequence[LinkDepth | None], full_width: Sequence[FingerCandidate]
+) -> Groups:
+    """Return the sets of every finger, the full widths as they were closed already, with what overlaps per entry."""
+    made, T = planned(problem).planes, problem.T_palm_object
+    closed = close_hand(made.plan, made.exact, problem.packed, T, problem.rounds)
+    sets = read_candidates(problem.hand, made.plan, problem.packed, closed, overlaps)
+    _judge(problem, [*sets, *full_width])
+    groups = group_by_finger(made.plan, sets)
+    return [[*group, whole] for group, whole in zip(groups, full_width, strict=True)]
 
 
 def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> Groups:
@@ -69,25 +96,30 @@ def decided(problem: Problem, calibration: Calibration) -> Planned | None:
 
 @dataclass(frozen=True, eq=False)
 class Alternatives:
-    """Hold the sets that every finger has, and the choice among them; both are made when they are first read."""
+    """Hold the sets that every finger has, and the choice among them; both are made when they are first read.
+
+    Args:
+        problem, calibration, setting: what the sets are chosen by. close: returns the sets.
+    """
 
     problem: Problem
     calibration: Calibration
     setting: Setting
+    close: Callable[[], Groups]
 
     @cached_property
-    def _groups_and_choice(self) -> tuple[Groups, HandChoice]:
-        return self.choose_among(finger_sets(self.problem))
+    def _scored(self) -> tuple[Groups, HandChoice]:
+        groups = self.close()
+        return groups, choose(groups, self.calibration, self.setting)
 
-    def choose_among(self, groups: Groups) -> tuple[Groups, HandChoice]:
-        """Choose among sets that were closed already."""
-        found = groups, choose(groups, self.calibration, self.setting)
-        self.__dict__["_groups_and_choice"] = found
-        return found
+    @property
+    def choice(self) -> HandChoice:
+        """The choice among the sets."""
+        return self._scored[1]
 
     def of_finger(self, k: int) -> Sequence[FingerCandidate]:
-        """Return the sets of a finger, as closed without the other fingers."""
-        return self._groups_and_choice[0][k]
+        """Return the sets of a finger, as closed without the other fingers, with their scores."""
+        return self._scored[0][k]
 
     def explained(self, best: Sequence[FingerCandidate], changed: Sequence[int]) -> dict[str, Any]:
         """Return the choice as plain values; see `explain_choice`.
@@ -95,7 +127,7 @@ class Alternatives:
         Args:
             best: the chosen sets. changed: numbers of those fingers that the others made close again.
         """
-        groups, choice = self._groups_and_choice
+        groups, choice = self._scored
         explained = explain_choice(choice, groups)
         for k in changed:
             explained["fingers"][best[k].plan.finger.name]["closed_again"] = True

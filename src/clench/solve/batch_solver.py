@@ -170,7 +170,7 @@ class BatchSolver:
             solutions = list(pool.map(run, zip(hand_rows, object_rows, strict=True)))
         fingers = [[s.fingers[finger.name] for finger in self.fingers] for s in solutions]
         shape = (len(solutions), len(self.fingers))
-        planes = [[-1 if not f.candidates else _plane(f.candidates[f.chosen].plane) for f in row] for row in fingers]
+        planes = [[-1 if f.best is None else _plane(f.best.plane) for f in row] for row in fingers]
         codes = [[FINGER_STATUSES.index(f.status) for f in row] for row in fingers]
         return self._batch(
             hand_poses=hand_rows,

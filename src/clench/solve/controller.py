@@ -23,7 +23,7 @@ from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
-from .alternatives import Alternatives, close_sets, decided
+from .alternatives import Alternatives, close_sets, decided, group_by_finger, with_planes
 from .assembly import Answer, assemble
 from .certificate import certify
 from .orders import best_order
@@ -71,19 +71,20 @@ def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSo
     full_width = decided(problem, calibration)
     made = full_width or planned(problem)
     clock.lap("plan")
-    closed, groups = close_sets(problem, made, clock.lap)
-    alternatives = Alternatives(problem, calibration, setting)
+    found = close_sets(problem, made, clock.lap)
     if full_width:
-        best = [group[0] for group in groups]
+        close = partial(with_planes, problem, found.overlaps, found.sets)
+        alternatives = Alternatives(problem, calibration, setting, close)
+        best, names = list(found.sets), calibration.criteria
         chosen = [len(c.plan.families[0].offsets) for c in best]
-        names = calibration.criteria
         score_sets(best, names, setting)
     else:
-        choice = alternatives.choose_among(groups)[1]
-        chosen, names = choice.chosen, choice.used
-        best = [group[i] for group, i in zip(groups, chosen, strict=True)]
+        close = partial(group_by_finger, made.plan, found.sets)
+        alternatives = Alternatives(problem, calibration, setting, close)
+        chosen, names = alternatives.choice.chosen, alternatives.choice.used
+        best = [alternatives.of_finger(k)[i] for k, i in enumerate(chosen)]
     clock.lap("choose")
-    again = _with_each_other(problem, made, closed, best)
+    again = _with_each_other(problem, made, found.closed, best)
     changed = [k for k, (old, new) in enumerate(zip(best, again, strict=True)) if new is not old]
     for k in changed:
         best[k] = replace(again[k], clear=best[k].clear)

@@ -134,7 +134,7 @@ def recorded_outcomes(path: str | Path) -> ScoredExamples:
 
 def solve_scores(solution: GraspSolution) -> dict[str, float]:
     """Return the scores of a whole solution: sums over the fingers' chosen sets, and those of the whole hand."""
-    chosen = [f.candidates[f.chosen].scores for f in solution.fingers.values() if f.candidates]
+    chosen = [f.best.scores for f in solution.fingers.values() if f.best is not None]
     names = dict.fromkeys(name for scores in chosen for name in scores)
     sums = {n: float(sum(s[n] for s in chosen)) for n in names if all(n in s for s in chosen)}
     return {**sums, **(solution.choice or {}).get("final_hand_scores", {})}

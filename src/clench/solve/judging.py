@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from clench.base.deferring import DeferredMapping
 from clench.base.tolerances import ALLOWED_PENETRATION, PASSED_GAP
 
 from .solution import Contact, FingerResult, FingerStatus, GraspSolution
@@ -25,8 +26,9 @@ UNIT_SLACK = 1e-6
 def violations(solution: GraspSolution) -> tuple[str, ...]:
     """Return a sentence for everything that makes a solution unfit to execute; empty when there is nothing.
 
-    Checked: every number is finite; no penetration beyond the allowance; the chosen candidates are feasible and give
-    the solution's angles; angles are inside the joints' limits; contacts that did not pass touch.
+    Checked: every number is finite, of what has been made so far; no penetration beyond the allowance; the chosen
+    candidates are feasible and give the solution's angles; angles are inside the joints' limits; contacts that did not
+    pass touch.
     """
     numbers = tuple(_non_finite(solution))
     if numbers:
@@ -54,14 +56,14 @@ def _limits(solution: GraspSolution) -> Iterator[str]:
 
 
 def _finger(name: str, finger: FingerResult, solution: GraspSolution) -> Iterator[str]:
-    if not finger.candidates:
-        if finger.status is FingerStatus.TOUCH:
+    chosen = finger.best
+    if chosen is None:
+        count = len(finger.candidates)
+        if count:
+            yield f"Finger '{name}' has {count} candidates, but number {finger.chosen} is the chosen one."
+        elif finger.status is FingerStatus.TOUCH:
             yield f"Finger '{name}' is said to touch but has no candidate."
         return
-    if not 0 <= finger.chosen < len(finger.candidates):
-        yield f"Finger '{name}' has {len(finger.candidates)} candidates, but number {finger.chosen} is the chosen one."
-        return
-    chosen = finger.candidates[finger.chosen]
     sampled = not solution.certified and chosen.penetration is not None and chosen.penetration <= SAMPLED_PENETRATION
     if chosen.feasible is False and not sampled:
         depth = f" by {chosen.penetration:.3g} m" if chosen.penetration else ""
@@ -104,6 +106,12 @@ def _bad_numbers(value: Any, path: str) -> Iterator[str]:
     if isinstance(value, float | np.floating | np.ndarray):
         if not np.isfinite(value).all():
             yield path
+    elif isinstance(value, DeferredMapping) and not value.is_made:
+        return
+    elif isinstance(value, FingerResult):
+        for i, candidate in value.made.items():
+            yield from _bad_numbers(candidate, f"{path}.candidates[{i}]")
+        yield from _bad_numbers(value.cause, f"{path}.cause")
     elif isinstance(value, Mapping):
         for key, item in value.items():
             yield from _bad_numbers(item, f"{path}.{key}")

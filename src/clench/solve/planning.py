@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, HandError
 from clench.grasp.closing import HandPlan, make_hand_plan, only_items
@@ -39,8 +40,14 @@ class Planned:
         """The full width of every finger alone; None where a finger has several of them, or none."""
         items = np.flatnonzero(self.plan.whole)
         fingers = {self.plan.finger[entry] for entry in self.plan.items.entry[items]}
-        if not len(items) == len(fingers) == len(self.plan.plans):
-            return None
+        return self._only(items) if len(items) == len(fingers) == len(self.plan.plans) else None
+
+    @cached_property
+    def planes(self) -> Planned:
+        """The single planes of every finger alone."""
+        return self._only(np.flatnonzero(~np.array(self.plan.whole)))
+
+    def _only(self, items: NDArray[np.intp]) -> Planned:
         exact = self.exact._replace(wanted=np.ascontiguousarray(self.exact.wanted[items]))
         return Planned(self.hand, only_items(self.plan, items.tolist()), exact)
 

@@ -123,9 +123,9 @@ def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -
     """Return why what stopped the joints cannot be found again, or nothing."""
     for finger in moved:
         result = solution.fingers[finger.name]
-        if not result.candidates:
+        if result.best is None:
             return f"the solution has no set of {finger.name}; in which order it closed is not known"
-        order = result.candidates[result.chosen].order
+        order = result.best.order
         if solution.rounds != 1:
             return "its joints were gone through more than once; changes are known for one round alone"
         if order != ClosingOrder.PROXIMAL_FIRST:

@@ -150,8 +150,19 @@ class FingerResult:
         """Return a finger that ends as its best candidate does; all candidates are made when they are first read."""
         result = object.__new__(cls)
         values = {"name": name, "status": best.status, "reason": best.reason, "chosen": chosen, "cause": cause}
-        result.__dict__.update(values, _make_candidates=candidates)
+        result.__dict__.update(values, _make_candidates=candidates, _made={chosen: best})
         return result
+
+    @property
+    def made(self) -> Mapping[int, Candidate]:
+        """The candidates that have been made, by index: the chosen one, if there is one, and all once they are read."""
+        some: Mapping[int, Candidate] | None = self.__dict__.get("_made")
+        return dict(enumerate(self.candidates)) if some is None or "candidates" in self.__dict__ else some
+
+    @property
+    def best(self) -> Candidate | None:
+        """The chosen candidate, or None; the others are not made for it."""
+        return self.made.get(self.chosen)
 
     def __getattr__(self, name: str) -> tuple[Candidate, ...]:
         make: Callable[[], tuple[Candidate, ...]] | None = self.__dict__.get("_make_candidates")

@@ -271,9 +271,9 @@ def print_files(files: Sequence[Path]) -> None:
 
 def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tuple[str, ...]:
     links = dict.fromkeys(c.link for c in solution.contacts if c.finger == name and not c.passed)
-    if not 0 <= finger.chosen < len(finger.candidates):
+    chosen = finger.best
+    if chosen is None:
         return name, finger.status.value, "", finger.reason, ""
-    chosen = finger.candidates[finger.chosen]
     plane = "full width" if chosen.plane is None else f"plane {chosen.plane + 1}"
     angles = " ".join(f"{np.rad2deg(a):.1f}" for a in chosen.joint_angles.values())
     return name, finger.status.value, plane, ", ".join(links) or finger.reason, angles
