@@ -57,6 +57,19 @@ def test_a_path_that_passes_through_is_infeasible_though_its_end_is_free():
     assert judged.penetration > 1e-3
 
 
+@pytest.mark.parametrize(("together", "feasible"), [(False, False), (True, True)])
+def test_the_path_is_that_of_the_order(together, feasible):
+    """A bead beyond the tip of the straight finger: joint after joint sweeps over it, all at once curls in before."""
+    hand = chain([CLOSING, CLOSING])
+    plan = plan_finger(hand, hand.fingers[0], np.zeros(2), 3, CollisionSource.ENGINE)
+    travel = np.array([1.4, 1.4])
+    candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
+    bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose([0.087 * np.cos(1.2), 0.0, 0.087 * np.sin(1.2)]))
+    packed, place = pack_object(bead), bead.pose.matrix
+    judge_sets(hand, [candidate], packed, place, CollisionSource.ENGINE, True, together)
+    assert candidate.feasible is feasible
+
+
 def test_pads_may_be_indented():
     touch = first_touch()
     padded = replace(HAND, links=(HAND.links[0], replace(HAND.links[1], pad_indentation=0.001)))

@@ -6,7 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from clench.kernels import closest
 from clench.kernels.closest import separation
+from kernels.kernel_entries import entry
+
+crosses = entry(closest.crosses)
 
 corner = st.tuples(*[st.integers(-8, 8).map(lambda k: k / 4.0)] * 3)
 core = st.lists(corner, min_size=3, max_size=3)
@@ -62,3 +66,36 @@ def test_corner_edge_and_face_are_told_apart():
     assert separation(face, 3, above, 3)[4:6] == (2, 0)
     across = np.array([[0.5, -0.2, 0.1], [0.5, 0.2, 0.1], [0.5, 0.0, 1.0]])
     assert separation(across[:, [0, 2, 1]] * [1, -1, 1], 2, face, 3)[4:6] == (1, 1)
+
+
+FACE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+LINE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+
+
+def test_an_edge_crosses_a_face_that_it_goes_through():
+    for x, y, through in ((0.2, 0.3, True), (0.7, 0.7, False), (-0.1, 0.3, False), (0.0, 0.5, True)):
+        edge = np.array([[x, y, -0.5], [x + 0.01, y, 0.5], [9.0, 9.0, 9.0]])
+        assert crosses(edge, 2, FACE, 3) == crosses(FACE, 3, edge, 2) == through
+        assert not crosses(edge - np.array([0.0, 0.0, 1.0]), 2, FACE, 3)
+    pierced = np.array([[0.2, 0.2, -0.5], [0.3, 0.2, 0.5], [0.2, 0.3, 0.5]])
+    assert crosses(pierced, 3, FACE, 3)
+
+
+def test_points_edges_and_triangles_without_area_have_no_face_to_go_through():
+    edge = np.array([[0.5, 0.0, -0.5], [0.5, 0.0, 0.5], [0.0, 0.0, 0.0]])
+    assert not crosses(edge, 2, LINE, 3)
+    assert not crosses(LINE, 3, edge, 2)
+    assert not crosses(edge, 2, LINE, 2)
+    assert not crosses(edge, 1, LINE, 3)
+    # In the plane of the face nothing goes through it.
+    flat = np.array([[0.2, 0.2, 0.0], [0.9, 0.9, 0.0], [0.0, 0.0, 0.0]])
+    assert not crosses(flat, 2, FACE, 3)
+
+
+def test_edges_that_run_alike_are_apart_along_what_is_between_them():
+    """Their cross product has no direction; a distance of 0 has none either."""
+    above = LINE + np.array([0.3, 0.0, 0.25])
+    d, nx, ny, nz, fa, fb, *_ = separation(above, 2, LINE, 2)
+    assert (d, nx, ny, nz) == (0.25, 0.0, 0.0, 1.0)
+    assert 1 in (fa, fb)
+    assert separation(LINE, 2, LINE, 2)[:4] == (0.0, 0.0, 0.0, 1.0)

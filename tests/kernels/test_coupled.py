@@ -147,3 +147,11 @@ def test_a_touch_at_the_start_that_opens_is_left_and_comes_back():
 def test_a_point_on_the_axis_never_moves():
     terms = np.array([[1.0, 0.0, 0.0]])
     assert next_root(terms, 1, 0.0, 0.0, 1.0, 0.0, TOUCH, 2.0) == 2.0
+
+
+def test_what_takes_too_many_steps_ends_before_a_root_not_behind_it():
+    """It passes zero closely, thousands of times: the search gives up on its way, at a place that is free."""
+    terms, constant = np.array([[1e3, 1.0, 0.0]]), 1.0 + 1e-6
+    root = next_root(terms, 1, constant, 0.0, 1.0, 1e6, 1e-12, 1e3)
+    assert 0.0 < root < 1e3
+    assert evaluate(terms, 1, constant, root)[0] > 0.0

@@ -94,3 +94,11 @@ def test_what_leaves_a_face_comes_back_to_it(below, at):
     face = [(-0.1, -0.1, z - below), (0.1, -0.1, z - below), (0.0, 0.1, z - below)]
     assert swept([(x, 0.0, z)], face, best=4.0) == pytest.approx(np.pi - 2.0 * at, abs=1e-8)
     assert swept([(x, 0.0, z)], face, best=3.0 - 2.0 * at) == 3.0 - 2.0 * at
+
+
+def test_a_pair_that_takes_too_many_planes_ends_where_it_is_free():
+    """A point on two joints that turn alike goes round and round, past another one by 1e-6 m."""
+    chain = np.array([[1.0, 0.02, 0.0], [1.0, 0.0, 0.0]])
+    found = swept([(0.03, 0.0, 0.0)], [(-0.05 - 1e-6, 0.0, 0.0)], chain=chain, best=2000.0)
+    assert 0.0 < found < 2000.0
+    assert np.hypot(0.05 * np.cos(found) + 0.05 + 1e-6, 0.05 * np.sin(found)) >= 1e-6

@@ -26,22 +26,25 @@ TESTS_FOLDER = Path(__file__).parents[1]
 KERNELS = TESTS_FOLDER.parent / "src" / "clench" / "kernels"
 PLANAR = "mutation/few_planar.py"
 WIDTH = "mutation/few_width.py"
+TWO_SIDED = "kernels/test_two_sided_outlines.py"
+ROUND = "kernels/test_round_sections_stop.py"
+TOUCHING = "kernels/test_touching.py"
 #: The tests that hold each kernel, the quickest first.
 TESTS = {
     "turning": ["kernels/test_turning.py", PLANAR],
-    "turning_pairs": [PLANAR],
+    "turning_pairs": [PLANAR, TWO_SIDED],
     "coupled": ["kernels/test_coupled.py", PLANAR],
-    "coupled_pairs": [PLANAR],
-    "outline_sweep": ["kernels/test_outline_sweep.py", PLANAR],
-    "outline_gap": [PLANAR],
-    "touching": [PLANAR],
-    "segments": [PLANAR],
+    "coupled_pairs": [PLANAR, TWO_SIDED],
+    "outline_sweep": ["kernels/test_outline_sweep.py", PLANAR, ROUND],
+    "outline_gap": [ROUND, TOUCHING, "kernels/test_overlap.py"],
+    "touching": [ROUND, TOUCHING],
+    "segments": ["kernels/test_segments.py"],
     "closest": ["kernels/test_closest.py", "kernels/test_sweep_pairs.py"],
-    "core_motion": ["kernels/test_sweep_pairs.py", "kernels/test_leaving.py"],
+    "core_motion": ["kernels/test_core_motion.py"],
     "sweep_pairs": ["kernels/test_sweep_pairs.py", "kernels/test_leaving.py"],
     "leaving": ["kernels/test_leaving.py", "kernels/test_sweep_pairs.py"],
-    "earliest": ["kernels/test_earliest.py", WIDTH],
-    "sweeping": [WIDTH],
+    "earliest": ["kernels/test_earliest.py"],
+    "sweeping": ["kernels/test_nearness.py", "grasp/test_boxes.py", WIDTH],
     "translation": ["kernels/test_translation.py"],
 }
 #: A mutant that takes this many times as long as the kernel without a mistake never ends, which the tests notice.
