@@ -113,6 +113,11 @@ def inside_core(px: float, pz: float, body: Body, outline: int, placed: Floats) 
 def crossing_depth(e: Floats, s: Floats) -> float:
     """Return how far two crossing segments must move to part: the least distance of an end to the other; else -1."""
     ex, ez, sx, sz = e[0] + e[2], e[1] + e[3], s[0] + s[2], s[1] + s[3]
+    # On one line, signs of areas are rounding; segments that cross have boxes that overlap.
+    if max(e[0], ex) < min(s[0], sx) or max(s[0], sx) < min(e[0], ex):
+        return -1.0
+    if max(e[1], ez) < min(s[1], sz) or max(s[1], sz) < min(e[1], ez):
+        return -1.0
     a = e[2] * (s[1] - e[1]) - e[3] * (s[0] - e[0])
     b = e[2] * (sz - e[1]) - e[3] * (sx - e[0])
     c = s[2] * (e[1] - s[1]) - s[3] * (e[0] - s[0])

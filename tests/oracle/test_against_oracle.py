@@ -4,14 +4,26 @@ import os
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 
+import numpy as np
 import pytest
 
 from oracle.adapter import solve_planar
 from oracle.cases import cases, make_case
 from oracle.checking import check_answer
+from oracle.scene import PlanarCurve, PlanarFinger, PlanarOutline
+from oracle.shapes import ring_of_sides
 
 #: Cases that were wrong once.
-WRONG_ONCE = [(0, 2037), (2024, 9562), (2024, 40871), (2024, 47220), (2024, 56375)]
+WRONG_ONCE = [
+    (0, 2037),
+    (2024, 9562),
+    (2024, 40871),
+    (2024, 47220),
+    (2024, 56375),
+    (2026, 47765),
+    (2026, 61947),
+    (2026, 151225),
+]
 
 
 def judge(seed: int, count: int, start: int = 0) -> tuple[Counter[str], list[str]]:
@@ -53,6 +65,23 @@ def test_cases_that_were_wrong_once(seed: int, index: int) -> None:
     case = make_case(seed, index)
     stages, _ = solve_planar(case.finger, case.curve)
     assert check_answer(case.finger, case.curve, stages).failures == ()
+
+
+@pytest.mark.parametrize(("rate", "ends"), [(1.0, "contact"), (-1.0, "limit")])
+@pytest.mark.parametrize("lean", [0.1, 0.5, 0.9])
+def test_a_notch_of_the_link_leaves_the_corner_that_is_in_it(rate: float, ends: str, lean: float) -> None:
+    """A step of the link meets the object's corner, which points into the step, at once; the other way it goes free."""
+    step = [(0.0, -0.01), (0.05, -0.01), (0.05, 0.02), (0.03, 0.02), (0.03, 0.0), (0.0, 0.0)]
+    sides = ring_of_sides(6)
+    link = PlanarOutline(0, np.array(step), sides, 0.0)
+    finger = PlanarFinger(np.zeros((1, 2)), np.array([rate]), np.zeros(1, dtype=np.int64), np.array([1.0]), (link,))
+    middle = np.pi / 2.0 * (1.0 + lean)
+    tips = [0.01 * np.array([np.cos(middle + turn), np.sin(middle + turn)]) for turn in (-0.1, 0.1)]
+    curve = PlanarCurve((np.array([0.03, 0.0]) + np.array([np.zeros(2), *tips]),))
+    (stage,), _ = solve_planar(finger, curve)
+    assert stage.ended == ends
+    assert stage.parameter == (0.0 if ends == "contact" else 1.0)
+    assert check_answer(finger, curve, (stage,)).failures == ()
 
 
 @pytest.mark.long

@@ -2,7 +2,8 @@
 
 The gap of one vertex and one line decides alone where the touch lies inside the line's segment. Where two corners
 meet, the line of either side is only one of several that separate them: the motion is blocked when it closes the gap
-of every separating line. And where a surface counts from both sides, a touching vertex lies on the side of its body.
+of every separating line. In a notch no line separates them: there no side of the notch may close in. And where a
+surface counts from both sides, a touching vertex lies on the side of its body.
 """
 
 from __future__ import annotations
@@ -85,6 +86,87 @@ def object_below(
 
 
 @inner_kernel
+def leaves_notch(
+    outline: Outline,
+    segments: Floats,
+    count: int,
+    px: float,
+    pz: float,
+    mirror: float,
+    closed: bool,
+    vx: float,
+    vz: float,
+    x: float,
+    z: float,
+    chain: Floats,
+    terms: Floats,
+    joints: int,
+    touch: float,
+    side: Floats,
+) -> bool:
+    """Say whether the link's corner is in a notch of the object and closes in on no side of it; see `corner_blocks`."""
+    near, sides = NEAR * touch, 0
+    for i in range(count):
+        ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
+        bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
+        if math.hypot(ax - x, az - z) > near and math.hypot(bx - x, bz - z) > near:
+            continue
+        nx, nz, free = segments[i, 4], segments[i, 5] * mirror, False
+        for flip in range(1 if closed else 2):
+            if flip:
+                nx, nz = -nx, -nz
+            free = free or (
+                body_above(outline, side, vx, vz, nx, nz, near)
+                and not object_below(segments, count, px, pz, mirror, x, z, nx, nz, near)
+                and line_permits(chain, terms, joints, vx, vz, nx, nz, touch)
+            )
+        if not free:
+            return False
+        sides += 1
+    return sides > 1
+
+
+@inner_kernel
+def notch_leaves(
+    outline: Outline,
+    segments: Floats,
+    count: int,
+    px: float,
+    pz: float,
+    mirror: float,
+    vx: float,
+    vz: float,
+    x: float,
+    z: float,
+    chain: Floats,
+    terms: Floats,
+    joints: int,
+    touch: float,
+    side: Floats,
+) -> bool:
+    """Say whether the object's corner is in a notch of the link, no side of which closes in; see `corner_blocks`."""
+    near, sides = NEAR * touch, 0
+    for k in range(outline.s0, outline.s1):
+        mx, mz, g = side[k, 0], side[k, 1], side[k, 2]
+        for end in range(2):
+            t = side[k, 3 + end]
+            if abs(g * mx - t * mz - vx) > near or abs(g * mz + t * mx - vz) > near:
+                continue
+            free = False
+            for flip in range(2 if outline.both else 1):
+                nx, nz = (mx, mz) if flip else (-mx, -mz)
+                free = free or (
+                    object_below(segments, count, px, pz, mirror, x, z, nx, nz, near)
+                    and not body_above(outline, side, vx, vz, nx, nz, near)
+                    and side_permits(chain, terms, joints, -nx, -nz, x, z, touch)
+                )
+            if not free:
+                return False
+            sides += 1
+    return sides > 1
+
+
+@inner_kernel
 def corner_blocks(
     outline: Outline,
     segments: Floats,
@@ -112,6 +194,10 @@ def corner_blocks(
         chain, joints: what moves the link.
     """
     near = NEAR * touch
+    if leaves_notch(
+        outline, segments, count, px, pz, mirror, closed, vx, vz, x, z, chain, terms, joints, touch, side
+    ) or notch_leaves(outline, segments, count, px, pz, mirror, vx, vz, x, z, chain, terms, joints, touch, side):
+        return False
     for i in range(count):
         ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
         bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
