@@ -1,12 +1,14 @@
 """All candidates of all fingers in one call: items, arenas that grow, and independence of each other."""
 
+import threading
+
 import numpy as np
 import pytest
 from small_chain import CLOSING, POSTURE, chain
 
 from clench.base.pose import Pose
 from clench.grasp import closing
-from clench.grasp.closing import close_hand, make_hand_plan
+from clench.grasp.closing import close_hand, kernel_threads, make_hand_plan, share_out
 from clench.grasp.plan import plan_finger
 from clench.grasp.scene import pack_object
 from clench.kernels.exact import planes_only
@@ -85,3 +87,44 @@ def test_overlap_at_the_start_is_noted_for_the_finger_it_concerns():
     plan, closed = close(plans(hand), inside)
     assert (closed.overlaps >= 0).all()
     assert plan.arrays.outlines.link[closed.overlaps].tolist() == [1, 2]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_every_part_is_done_once_whoever_does_it(threads, count):
+    done = []
+    share_out(done.append, range(count), threads)
+    assert sorted(done) == list(range(count))
+
+
+def test_threads_work_at_the_same_time():
+    both = threading.Barrier(2, timeout=20.0)
+    share_out(lambda part: both.wait(), range(2), 2)
+
+
+def test_threads_that_have_not_begun_are_not_waited_for():
+    free, begun = threading.Event(), threading.Event()
+    busy = kernel_threads(1).submit(lambda: begun.set() or free.wait(20.0))
+    assert begun.wait(20.0)
+    done = []
+    share_out(done.append, range(4), 2)
+    assert done == [0, 1, 2, 3]
+    assert not busy.done()
+    free.set()
+    assert busy.result()
+
+
+@pytest.mark.parametrize("where", ["here", "there"])
+def test_what_fails_is_told_and_the_rest_is_left(where):
+    here, both, done = threading.get_ident(), threading.Barrier(2, timeout=20.0), []
+
+    def work(part):
+        if part < 2:
+            both.wait()  # one part in either thread
+            if (threading.get_ident() == here) == (where == "here"):
+                raise ZeroDivisionError
+        done.append(part)
+
+    with pytest.raises(ZeroDivisionError):
+        share_out(work, range(2), 2)
+    assert len(done) == 1

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from clench.kernels.frames import FrameArrays
     from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
     from clench.kernels.tree import MeshTree
+
+Part = TypeVar("Part")
 
 #: Segments per plane that an arena holds before it has to grow, and for how many objects it is known what suffices.
 CAPACITY = 512
@@ -194,7 +196,7 @@ def _close_plan(
     while True:
         answer = empty_answer(plan)
         close = partial(_close_range, plan, exact, obj, T, shared, arena.capacity, rounds, answer)
-        deque(map(close, ranges) if len(ranges) == 1 else kernel_threads(core_count()).map(close, ranges), maxlen=0)
+        share_out(close, ranges, core_count())
         wanted = int(answer.overflow.max(initial=0))
         if not wanted:
             return answer
@@ -210,6 +212,32 @@ def core_count() -> int:
 def kernel_threads(count: int) -> ThreadPoolExecutor:
     """Return so many threads for kernels to run in."""
     return ThreadPoolExecutor(count, thread_name_prefix="clench")
+
+
+def share_out(work: Callable[[Part], None], parts: Iterable[Part], threads: int) -> None:
+    """Do parts of a work in this thread and others; whichever is free takes the next part.
+
+    Others that have not begun when nothing is left, as on a busy machine, are not waited for.
+    """
+    waiting = deque(parts)
+
+    def take_parts() -> None:
+        while waiting:
+            try:
+                part = waiting.popleft()
+            except IndexError:  # another thread took the last one in the meantime
+                return
+            work(part)
+
+    others = min(threads, len(waiting)) - 1
+    helpers = [kernel_threads(others).submit(take_parts) for _ in range(others)]
+    try:
+        take_parts()
+    finally:
+        waiting.clear()
+        for helper in helpers:
+            if not helper.cancel():
+                helper.result()
 
 
 # A forked process has none of its parent's threads.
