@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,21 @@ def test_only_what_may_be_chosen_is_closed(asked: dict[str, Any], closed: str, m
         assert all(solution.joint_angles[name] == angle for name, angle in angles.items())
     assert solution.choice is not None
     assert items == ([every] if closed == "all" else [len(hand.fingers), every - len(hand.fingers)])
+
+
+def test_threads_that_read_at_once_get_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
+    command = commands(hand, obj, planes=2, criteria="steady")[0]
+    alone = documents(hand, obj, [command])[0]
+    calls = []
+    choose = alternatives.choose
+    monkeypatch.setattr(alternatives, "choose", lambda *given: calls.append(1) or choose(*given))
+    solution = clench.solve(hand, obj, command)
+    assert calls == []
+    with ThreadPoolExecutor(4) as threads:
+        read = list(threads.map(lambda _: {**solution.to_dict(), "timing": {}}, range(8)))
+    assert read == [alone] * 8
+    assert calls == [1]
 
 
 @pytest.mark.parametrize("name", ["own", "range_of_motion"])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from clench.grasp.blocking import start_overlaps
@@ -94,7 +94,7 @@ def decided(problem: Problem, calibration: Calibration) -> Planned | None:
     return planned(problem).full_width
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Alternatives:
     """Hold the sets that every finger has, and the choice among them; both are made when they are first read.
 
@@ -106,20 +106,25 @@ class Alternatives:
     calibration: Calibration
     setting: Setting
     close: Callable[[], Groups]
+    _made: tuple[Groups, HandChoice] | None = field(default=None, init=False)
+    #: Threads that read at once for the first time get the same: the criteria keep what they found in the setting.
+    _lock: Lock = field(default_factory=Lock, init=False)
 
-    @cached_property
     def _scored(self) -> tuple[Groups, HandChoice]:
-        groups = self.close()
-        return groups, choose(groups, self.calibration, self.setting)
+        with self._lock:
+            if self._made is None:
+                groups = self.close()
+                self._made = groups, choose(groups, self.calibration, self.setting)
+            return self._made
 
     @property
     def choice(self) -> HandChoice:
         """The choice among the sets."""
-        return self._scored[1]
+        return self._scored()[1]
 
     def of_finger(self, k: int) -> Sequence[FingerCandidate]:
         """Return the sets of a finger, as closed without the other fingers, with their scores."""
-        return self._scored[0][k]
+        return self._scored()[0][k]
 
     def explained(self, best: Sequence[FingerCandidate], changed: Sequence[int]) -> dict[str, Any]:
         """Return the choice as plain values; see `explain_choice`.
@@ -127,7 +132,7 @@ class Alternatives:
         Args:
             best: the chosen sets. changed: numbers of those fingers that the others made close again.
         """
-        groups, choice = self._scored
+        groups, choice = self._scored()
         explained = explain_choice(choice, groups)
         for k in changed:
             explained["fingers"][best[k].plan.finger.name]["closed_again"] = True
