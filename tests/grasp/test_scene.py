@@ -1,13 +1,16 @@
 """An object is packed once, in its own frame, with every body's number, role and hash."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from block_hands import block_hand
 
+import clench
 from clench.base.pose import Pose
-from clench.grasp.scene import ROUND_KINDS, hash_hand, pack_object, shape_mesh, tessellation_deviation
+from clench.grasp.scene import KEPT_OBJECTS, ROUND_KINDS, hash_hand, pack_object, shape_mesh, tessellation_deviation
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
@@ -160,3 +163,16 @@ def test_object_of_round_shapes_only_has_no_triangles_but_a_full_tree():
     assert len(packed.tree.triangles) == 0
     assert packed.radius == pytest.approx(0.03, rel=1e-9)
     np.testing.assert_allclose(packed.center, 0.0, atol=1e-12)
+
+
+def test_only_a_few_objects_stay_packed():
+    """A program that goes through many objects holds a few of them: one of a million triangles takes a gigabyte."""
+    packed = []
+    for k in range(3 * KEPT_OBJECTS):
+        obj = GraspObject.load(f"box:x=0.0{k + 1},y=0.02,z=0.02")
+        command = clench.GraspCommand(hand_pose=Pose([0, 0, -0.3]), full_width=False, planes=1)
+        clench.solve(block_hand(), obj, command)
+        packed.append(weakref.ref(pack_object(obj)))
+    del obj
+    gc.collect()
+    assert sum(found() is not None for found in packed) <= KEPT_OBJECTS

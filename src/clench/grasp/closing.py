@@ -20,7 +20,7 @@ from clench.models.hand.hand import Hand
 from .linkage import plan_frames
 from .packing import pack_plans
 from .plan import FingerPlan
-from .scene import PackedObject
+from .scene import KEPT_OBJECTS, PackedObject
 from .surface import round_arrays
 
 if TYPE_CHECKING:
@@ -32,9 +32,8 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: Segments per plane that an arena holds before it has to grow, and for how many objects it is known what suffices.
+#: Segments per plane that an arena holds before it has to grow.
 CAPACITY = 512
-_KEPT_OBJECTS = 16
 #: Around objects of fewer triangles, waking threads takes longer than the work.
 THREADED = 1000
 
@@ -149,7 +148,7 @@ class Arena:
         self.capacity = max(self.capacity, 2 * wanted)
 
 
-@kept_by_identity(_KEPT_OBJECTS)
+@kept_by_identity(KEPT_OBJECTS)
 def arena_of(tree: MeshTree) -> Arena:
     """Return the arena's size for the triangles of an object; no answer depends on it."""
     return Arena(CAPACITY)

@@ -30,6 +30,8 @@ TESSELLATION_DEVIATION: Final = 2e-5
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
 _KEPT_HANDS: Final = 16
+#: Objects that stay packed: one of a million triangles takes a gigabyte.
+KEPT_OBJECTS: Final = 8
 ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
 #: Number of each kind of round shape in `RoundShapes.kind`.
 ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
@@ -160,7 +162,7 @@ def hash_hand(hand: Hand, source: CollisionSource) -> str:
 _latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", None)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT_OBJECTS)
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     from clench.kernels.bodies import join_elements, pack_bodies
     from clench.kernels.tree import feature_owners

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,16 +10,14 @@ from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.objects.grasp_object import BodyRole
 
-from .scene import PackedObject
+from .scene import KEPT_OBJECTS, PackedObject
 
 if TYPE_CHECKING:
     from clench.kernels.layout import RoundArrays
     from clench.kernels.touches import SurfaceArrays
 
-_KEPT_OBJECTS: Final = 16
 
-
-@kept_by_identity(_KEPT_OBJECTS)
+@kept_by_identity(KEPT_OBJECTS)
 def round_arrays(packed: PackedObject) -> RoundArrays:
     """Return an object's round shapes as the kernels take them."""
     from clench.kernels.layout import RoundArrays
@@ -28,7 +26,7 @@ def round_arrays(packed: PackedObject) -> RoundArrays:
     return RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)
 
 
-@kept_by_identity(_KEPT_OBJECTS)
+@kept_by_identity(KEPT_OBJECTS)
 def object_surface(packed: PackedObject) -> SurfaceArrays:
     """Return what reading touches needs of an object."""
     from clench.kernels.touches import SurfaceArrays

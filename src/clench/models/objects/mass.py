@@ -35,7 +35,7 @@ def mass_properties(obj: GraspObject) -> MassProperties:
     return _of_bodies(tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=8)
 def _of_bodies(bodies: tuple[Body, ...]) -> MassProperties:
     solids = [_solid(shape.to_mesh(), body.closed) for body in bodies for shape in body.shapes]
     volumes = np.array([volume for _, volume, _ in solids])
