@@ -98,6 +98,8 @@ def test_bad_input_is_named():
         approach_poses(hand, BALL, 1, 0, preshape={"bent": 0.0})
     with pytest.raises(CommandError, match=r"preshape\.bend: expected a finite angle"):
         approach_poses(hand, BALL, 1, 0, preshape={"bend": np.nan})
+    with pytest.raises(CommandError, match=r"preshape\.bend: expected a finite angle"):
+        approach_poses(hand, BALL, 1, 0, preshape={"bend": 10**400})
     with pytest.raises(CommandError, match=r"count of 0 or more, got -1\."):
         approach_poses(hand, BALL, -1, 0)
     with pytest.raises(CommandError, match=r"seed of 0 or more, got -1\."):

@@ -245,6 +245,7 @@ def with_chosen(**changes: object) -> dict[str, Any]:
         ({"contacts": (make_contact(gap=-2e-9),)}, r"Contact 0 \(index, index_distal\) overlaps the object by 2e-09 m"),
         ({"contacts": (make_contact(gap=2e-6),)}, "2e-06 m away from the object but not marked as passed"),
         ({"contacts": (make_contact(normal=np.array([0.0, 0.0, 2.0])),)}, "normal of length 2, expected 1"),
+        ({"contacts": (make_contact(normal=np.array([0.0, 3e200, 4e200])),)}, r"normal of length 5e\+200, expected 1"),
         ({"contacts": (make_contact(position=np.array([0, np.nan, 0])),)}, r"contacts\[0\]\.position is not a finite"),
         ({"contacts": (make_contact(finger="toe"),)}, "belongs to a finger that the solution does not have"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from numbers import Real
@@ -97,7 +98,7 @@ def _open_posture(hand: Hand, preshape: Mapping[str, float]) -> FloatArray:
     if not isinstance(preshape, Mapping):
         raise CommandError(f"preshape: expected angles in radians by joint name, got {type(preshape).__name__}.")
     for name, angle in preshape.items():
-        if not (isinstance(angle, Real) and np.isfinite(angle)):
+        if not (isinstance(angle, Real) and abs(angle) <= sys.float_info.max):
             raise CommandError(f"preshape.{name}: expected a finite angle in radians, got {angle!r}.")
         index = hand.joint_index(name)
         joints[index] = replace(joints[index], open_value=float(angle))

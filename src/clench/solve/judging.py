@@ -84,8 +84,9 @@ def _contact(index: int, contact: Contact, solution: GraspSolution) -> Iterator[
         yield f"{where} overlaps the object by {-contact.gap:.3g} m."
     if not contact.passed and contact.gap > PASSED_GAP:
         yield f"{where} is {contact.gap:.3g} m away from the object but not marked as passed."
-    if abs(float(np.linalg.norm(contact.normal)) - 1.0) > UNIT_SLACK:
-        yield f"{where} has a normal of length {np.linalg.norm(contact.normal):.6g}, expected 1."
+    length = math.hypot(*contact.normal)
+    if abs(length - 1.0) > UNIT_SLACK:
+        yield f"{where} has a normal of length {length:.6g}, expected 1."
 
 
 def _non_finite(solution: GraspSolution) -> Iterator[str]:

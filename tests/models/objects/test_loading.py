@@ -228,6 +228,18 @@ def test_vertices_of_a_mesh_of_any_size_are_merged(tmp_path, size):
     assert vertices[triangles].reshape(-1, 3) == pytest.approx(soup, rel=1e-15)
 
 
+def test_a_vertex_far_away_from_all_others_is_no_hindrance(tmp_path):
+    """Beside a coordinate of 1e6 the others round to a few whole numbers; what is at one place is merged."""
+    corners = [(0.0, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 1e6)]
+    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    lines = [f"v {x:.17g} {y:.17g} {z:.17g}" for face in faces for x, y, z in (corners[k] for k in face)]
+    lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, 12, 3)]
+    (tmp_path / "far.obj").write_text("\n".join(lines))
+    vertices, triangles = read_mesh(tmp_path / "far.obj")
+    assert len(vertices) == 4
+    assert np.abs(vertices[triangles] - np.array(corners)[np.array(faces)]).max() <= 1e-8 * 1e6
+
+
 def test_vertices_of_a_soup_are_merged():
     mesh = box()
     soup = mesh.vertices[mesh.triangles].reshape(-1, 3)

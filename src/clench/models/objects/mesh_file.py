@@ -56,8 +56,15 @@ def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntAr
         return points, faces
     # Powers of two scale exactly; coordinates far from 1 overflow the rounding to whole numbers.
     exponent = int(np.frexp(largest)[1])
-    mesh = trimesh.Trimesh(np.ldexp(points, -exponent), faces, process=False, validate=False)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=8)
+    scaled = np.ldexp(points, -exponent)
+    mesh = trimesh.Trimesh(scaled, faces, process=False, validate=False)
+    try:
+        mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=8)
+    except OverflowError:
+        # One coordinate far larger than all others overflows trimesh's packing of rows into whole numbers.
+        rounded = np.round(scaled * 1e8).astype(np.int64)
+        _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        return points[first], place.reshape(-1)[faces]
     return np.ldexp(np.array(mesh.vertices, dtype=np.float64), exponent), np.array(mesh.faces, dtype=np.int64)
 
 
