@@ -10,7 +10,8 @@ from .planar import StageAnswer, gap_at, overlaps_at_start, walk_stage
 from .scene import PlanarCurve, PlanarFinger
 
 BEYOND = 1e-3
-PROBES = np.geomspace(1e-8, BEYOND, 26)
+#: From turns that move nothing by more than rounding: a touch near the end of a segment dips before it opens.
+PROBES = np.geomspace(1e-12, BEYOND, 46)
 
 
 @dataclass(frozen=True)
