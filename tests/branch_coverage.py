@@ -19,7 +19,8 @@ PACKAGES = ("kernels", "grasp")
 #: What holds the kernels in short tests; and the steps.
 KERNEL_TESTS = (
     "kernels",
-    "oracle/test_against_oracle.py",
+    "mutation/few_planar.py",
+    "mutation/few_width.py",
     "solve/test_batch_of_small_hands.py",
     "solve/test_closed_forms.py",
     "solve/test_orders.py",
@@ -28,6 +29,7 @@ KERNEL_TESTS = (
     "solve/test_thin_things.py",
     "grasp/test_boxes.py",
     "grasp/test_closing.py",
+    "grasp/test_containment.py",
     "grasp/test_depths.py",
     "apps/test_bench_peers.py",
 )

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Generator
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 
 from clench.kernels import compiling
@@ -29,8 +30,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
+    """End what a test needs where that takes too long."""
+    return (yield from _ended(item))
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     """End a test that takes too long."""
+    return (yield from _ended(item))
+
+
+def _ended(item: pytest.Item) -> Generator[None, Any, Any]:
     seconds = item.config.getoption("--at-most")
     sentence = f"takes more than {seconds:g} s with kernels as Python"
     ended = []
@@ -42,7 +53,9 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     before = signal.signal(signal.SIGPROF, end)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
-        return (yield)
+        # Compiled kernels say nothing of numbers that are not finite.
+        with np.errstate(all="ignore"):
+            return (yield)
     except BaseException:
         # What generates examples makes an error of its own of it.
         if ended:

@@ -38,6 +38,21 @@ def test_a_link_in_a_large_ball():
     assert contained_link(hand, np.zeros(1), pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, (1,)) == 1
 
 
+@pytest.mark.parametrize(
+    ("place", "inside"),
+    [([0.025, 0.0, 0.0], True), ([0.025, 0.04, 0.0], False), ([0.1, 0.0, 0.0], False)],
+)
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_link_of_boxes_in_a_large_box(place, inside, parts):
+    """Of two boxes, one far away, the one that lies inside tells."""
+    near = Shape(ShapeKind.BOX, (0.02, 0.004, 0.004), Pose([0.025, 0.0, 0.0]))
+    far = Shape(ShapeKind.BOX, (0.002, 0.004, 0.004), Pose([0.3, 0.0, 0.0]))
+    hand = HandBuilder().finger("index", [(near, far)[:parts]], [0.05]).hand()
+    obj = GraspObject.load("box:x=0.06,y=0.03,z=0.03", pose=Pose(place))
+    found = contained_link(hand, np.zeros(1), pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, (1,))
+    assert (found == 1) == inside
+
+
 def test_a_ball_inside_a_link_between_the_planes_blocks_it():
     obj = GraspObject.from_shape(Shape(ShapeKind.SPHERE, SPHERE), pose=Pose([0.04, 0.006, 0.0]), name="ball")
     solution = clench.solve(thick(), obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))

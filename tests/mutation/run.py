@@ -28,11 +28,12 @@ PLANAR = "mutation/few_planar.py"
 WIDTH = "mutation/few_width.py"
 TWO_SIDED = "kernels/test_two_sided_outlines.py"
 ROUND = "kernels/test_round_sections_stop.py"
+RATES = "kernels/test_rates_and_starts.py"
 TOUCHING = "kernels/test_touching.py"
 #: The tests that hold each kernel, the quickest first.
 TESTS = {
     "turning": ["kernels/test_turning.py", PLANAR],
-    "turning_pairs": [PLANAR, TWO_SIDED],
+    "turning_pairs": [RATES, PLANAR, TWO_SIDED],
     "coupled": ["kernels/test_coupled.py", PLANAR],
     "coupled_pairs": [PLANAR, TWO_SIDED],
     "outline_sweep": ["kernels/test_outline_sweep.py", PLANAR, ROUND],
