@@ -155,3 +155,9 @@ def test_what_takes_too_many_steps_ends_before_a_root_not_behind_it():
     root = next_root(terms, 1, constant, 0.0, 1.0, 1e6, 1e-12, 1e3)
     assert 0.0 < root < 1e3
     assert evaluate(terms, 1, constant, root)[0] > 0.0
+
+
+def test_what_stays_in_touch_is_no_root():
+    """Two turns that cancel: the gap is 0 all along, and never less."""
+    terms = np.array([[1.0, 0.3, 0.1], [1.0, -0.3, -0.1]])
+    assert next_root(terms, 2, 0.0, 0.0, 1.0, 0.7, TOUCH, 5e-4) == 5e-4

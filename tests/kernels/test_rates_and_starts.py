@@ -7,6 +7,7 @@ from clench.kernels.layout import HIT_NX, HIT_X
 from oracle.adapter import pack_finger, solve_planar
 from oracle.cases import random_curve, random_finger
 from oracle.planar import gap_at
+from oracle.scene import PlanarCurve
 
 
 def thrown(seed):
@@ -14,7 +15,8 @@ def thrown(seed):
     rng = np.random.default_rng([9, seed])
     finger = random_finger(rng, joints=1)
     while True:
-        curve = random_curve(rng).moved(finger.pivots[0] + rng.uniform(-1.0, 1.0, 2) * finger.length)
+        thing = PlanarCurve(disks=np.array([[0.0, 0.0, 0.01]])) if seed % 3 == 0 else random_curve(rng)
+        curve = thing.moved(finger.pivots[0] + rng.uniform(-1.0, 1.0, 2) * finger.length)
         if gap_at(finger, curve, np.zeros(1)) > 1e-5:
             return finger, curve
 

@@ -20,7 +20,7 @@ def looking_inwards(hand, both):
 def test_sides_that_look_inwards_stop_as_well_when_both_faces_count(together):
     missed = 0
     for case in cases(3, 300):
-        if case.name != "anywhere" or overlaps_at_start(case.finger, case.curve):
+        if case.name not in ("anywhere", "touching", "vertex_on_vertex") or overlaps_at_start(case.finger, case.curve):
             continue
         plain = pack_finger(case.finger)
         expected, found, through = (
