@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.keeping import kept_by_identity
+from clench.base.memory import expect
 from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
@@ -168,6 +169,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     from clench.kernels.tree import feature_owners
 
     placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
+    expect(sum(shape.mesh.triangles.nbytes for _, shape in placed if shape.mesh is not None))
     flat = [(n, shape_mesh(s, source)) for n, s in placed if s.kind not in ROUND_KINDS]
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
     elements = [(n, shape_elements(s, source)) for n, s in placed]

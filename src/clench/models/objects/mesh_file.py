@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from clench.base.errors import FileError
 from clench.base.files import read_file
+from clench.base.memory import expect
 from clench.base.pose import FloatArray
 from clench.models.mesh import IntArray
 
@@ -30,10 +31,11 @@ def read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
     suffix = path.suffix.lower()
     if os.path.exists(path) and not os.path.isdir(path) and suffix not in SUFFIXES:
         raise FileError(path, f"cannot read '{suffix or path.name}'; expected one of {', '.join(SUFFIXES)}.")
-    if not read_file(path):
+    size = len(read_file(path))
+    if size == 0:
         raise FileError(path, "the file is empty.")
-    loaded = _parse(path, suffix[1:])
-    vertices, triangles = np.asarray(loaded.vertices), np.asarray(getattr(loaded, "faces", ()))
+    expect(size)
+    vertices, triangles = _parse(path, suffix[1:])
     if len(vertices) == 0:
         raise FileError(path, f"not a mesh, nothing in it reads as {suffix[1:].upper()}.")
     if len(triangles) == 0:
@@ -68,14 +70,15 @@ def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntAr
     return np.ldexp(np.array(mesh.vertices, dtype=np.float64), exponent), np.array(mesh.faces, dtype=np.int64)
 
 
-def _parse(path: Path, file_type: str) -> Any:
-    """Return trimesh's mesh or point cloud; whatever its readers raise on garbage becomes one sentence."""
+def _parse(path: Path, file_type: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices and triangles that trimesh reads; what its readers raise on garbage becomes one sentence."""
     import trimesh
 
     options: dict[str, Any] = {"skip_materials": True} if file_type == "obj" else {}
     try:
-        loaded = trimesh.load(path, file_type=file_type, process=False, **options)
-        return loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        loaded: Any = trimesh.load(path, file_type=file_type, process=False, **options)
+        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        return np.asarray(mesh.vertices), np.asarray(getattr(mesh, "faces", ()))
     except OSError as error:
         raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
     except Exception as error:

@@ -1,0 +1,32 @@
+"""Memory for large meshes."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import Final
+
+#: What is smaller leaves too little behind to be worth a setting [bytes].
+LARGE: Final = 4_000_000
+#: Blocks from this size on go back to the system when they are freed [bytes].
+BLOCK: Final = 1 << 20
+#: glibc's name for that size.
+_M_MMAP_THRESHOLD: Final = -3
+
+
+def expect(size: int) -> None:
+    """Prepare for a mesh that takes so many bytes: what is freed after work on it goes back to the system.
+
+    glibc raises the size of what it gives back to 32 MB by itself, and so keeps half a gigabyte after a mesh of a
+    million triangles. Other C libraries are left alone.
+    """
+    if size >= LARGE:
+        _give_back_blocks()
+
+
+@cache
+def _give_back_blocks() -> bool:
+    try:
+        return bool(ctypes.CDLL("libc.so.6").mallopt(_M_MMAP_THRESHOLD, BLOCK))
+    except (OSError, AttributeError):
+        return False
