@@ -156,3 +156,15 @@ def test_events_later_than_the_best_are_of_no_interest():
 @given(st.floats(0.01, 1.0), st.floats(-1.0, 1.0).map(lambda s: s * TOUCH))
 def test_the_grazing_band_is_what_moving_by_the_tolerance_changes(u, shift):
     assert abs((u + shift) ** 2 - u**2) <= grazing_band(u, TOUCH) * (1 + 1e-6) + 1e-30
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_touching_point_at_the_pivot_blocks_nothing(swapped):
+    """It moves by less than the touch tolerance, whichever of the two it is and whichever way it goes."""
+    w, near = 0.01, 0.5 * TOUCH
+    for side in (-near, near):
+        link, thing = (0.0, side), (w, 0.0)
+        if swapped:
+            link, thing = (w, 0.0), (0.0, side)
+        found = disk_on_vertex(*link, math.hypot(*link), *thing, math.hypot(*thing), w, TOUCH, 1.0)
+        assert found != 0.0
