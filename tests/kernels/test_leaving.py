@@ -141,3 +141,24 @@ def test_what_slides_on_a_wall_stops_at_a_step_of_it():
     step = np.array([[0.0, -0.01, 0.03], [0.1, -0.01, 0.03], [0.05, 0.01, 0.03]])
     found = sweep(core, step, best=2.0)
     assert found == pytest.approx(np.arcsin(0.6), abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_corner_that_comes_down_stops_what_another_corner_lets_go(seed):
+    """One corner lies on a wide face and leaves it or slides; on two joints, another comes down as the core tilts."""
+    rng = np.random.default_rng(seed)
+    tilting = 0
+    for _ in range(300):
+        chain = np.array([[rng.uniform(-1.0, 1.0), *rng.normal(size=2) * 0.03], [rng.uniform(-1.0, 1.0), 0.0, 0.0]])
+        at = rng.normal(size=2) * 0.03
+        rise = [0.0, rng.uniform(1e-4, 0.01), 0.03]
+        core = np.array([[at[0] + rng.uniform(-0.03, 0.03) * (k > 0), 0.01 * k, at[1] + rise[k]] for k in range(3)])
+        below = chain[0, 2] + core[0, 2]
+        face = np.array([[-1.0, -1.0, below], [1.0, -1.0, below], [0.0, 2.0, below]])
+        found = sweep_pair(core, 3, face, 3, 0.0, chain, 2, TOUCH, 1.5, False, np.zeros((6, 3)))
+        s = np.linspace(0.0, found, 300)[:, None]
+        base = np.sin(chain[0, 0] * s) * chain[0, 1] + np.cos(chain[0, 0] * s) * chain[0, 2]
+        heights = base + np.sin(chain[1, 0] * s) * core[:, 0] + np.cos(chain[1, 0] * s) * core[:, 2] - below
+        assert heights.min() > -1e-10
+        tilting += 0.0 < found < 1.5 and heights[-1].argmin() > 0
+    assert tilting > 5

@@ -91,9 +91,11 @@ def leave_plane(
                 turn = turn_to_plane(gap, slope / rate, curvature / (rate * rate), limit)
             if turn < limit:
                 step = turn / rate
-        else:
+        elif gap <= touch:
             least = math.sqrt(2.0 * touch / bound)
             step = min(step, max(safe_step(max(gap, 0.0), max(slope, 0.0), bound), least))
+        else:
+            step = min(step, safe_step(gap, slope, bound))
     return step
 
 
