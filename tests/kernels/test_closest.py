@@ -81,6 +81,16 @@ def test_an_edge_crosses_a_face_that_it_goes_through():
     assert crosses(pierced, 3, FACE, 3)
 
 
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.8])
+def test_where_an_edge_goes_through_the_plane_of_a_face_tells(part):
+    """It goes through there after some part of its length; the rest of it is above or below what is beside the face."""
+    run = np.array([0.6, 0.9, -0.4])
+    for x, y, through in ((0.3, 0.3, True), (0.6, 0.6, False), (-0.1, 0.5, False), (0.5, -0.1, False)):
+        at = np.array([x, y, 0.0])
+        edge = np.array([at - part * run, at + (1.0 - part) * run, at])
+        assert crosses(edge, 2, FACE, 3) == crosses(FACE, 3, edge, 2) == through
+
+
 def test_points_edges_and_triangles_without_area_have_no_face_to_go_through():
     edge = np.array([[0.5, 0.0, -0.5], [0.5, 0.0, 0.5], [0.0, 0.0, 0.0]])
     assert not crosses(edge, 2, LINE, 3)

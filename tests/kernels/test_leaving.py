@@ -58,7 +58,8 @@ def edge_on_edge(rng):
     third -= np.outer(third @ n, n)
     a = at + np.array([u * rng.uniform(0.2, 1), -u * rng.uniform(0.2, 1), third[0] + n * rng.uniform(0.002, 0.02)])
     b = at + np.array([v * rng.uniform(0.2, 1), -v * rng.uniform(0.2, 1), third[1] - n * rng.uniform(0.002, 0.02)])
-    return a, b
+    # The edges' cross product looks from one to the other, or back.
+    return (a, b) if rng.random() < 0.5 else (a[[1, 0, 2]], b)
 
 
 def corner_on_corner(rng):

@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from clench.base.pose import rotation_about
+from clench.kernels import sweeping
 from clench.kernels.bodies import Elements, pack_bodies
-from clench.kernels.nearness import smallest_gap
+from clench.kernels.closest import separation
+from clench.kernels.nearness import link_gap, smallest_gap
+from kernels.kernel_entries import entry
+
+make_sweep_work, bodies_overlap = entry(sweeping.make_sweep_work), entry(sweeping.bodies_overlap)
 
 
 def blob(rng: np.random.Generator, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -64,3 +69,42 @@ def test_nothing_to_measure() -> None:
     empty = pack_bodies([Elements(np.empty((0, 3)), np.empty((0, 3), np.int32), np.empty(0))])
     still = np.ascontiguousarray(np.eye(4)[:3])
     assert smallest_gap(empty, np.array([0]), still[None], empty, still) == (np.inf, -1)
+
+
+def to_mesh(point, points, faces, T) -> float:
+    """Return how far a point is from the triangles of a placed mesh."""
+    at = np.tile(point, (3, 1))
+    return min(separation(at, 1, points[f] @ T[:, :3].T + T[:, 3], 3)[0] for f in faces)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_two_meshes_are_nearest(seed: int) -> None:
+    """The point lies on the second one, and across the gap from it there is the first one."""
+    rng = np.random.default_rng(seed)
+    shapes = [blob(rng, 0.02) for _ in range(2)]
+    poses = np.stack([pose(rng, np.array([0.3, 0.1, 0.0])), pose(rng, np.zeros(3))])
+    links = pack_bodies([Elements(points, faces, np.zeros(len(faces))) for points, faces in shapes])
+    out = np.empty(6)
+    gap = link_gap(links, 0, 1, poses, 1e9, 1.0, out)
+    assert gap > 0.0
+    assert to_mesh(out[:3], *shapes[1], poses[1]) == pytest.approx(0.0, abs=1e-12)
+    assert to_mesh(out[:3] + gap * out[3:], *shapes[0], poses[0]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("triangles", [1, 20])
+def test_meshes_that_cross_against_the_other_engine(triangles: int) -> None:
+    """One large triangle is an element before the other mesh is down to its own."""
+    said = {True: 0, False: 0}
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        points, faces = blob(rng, 0.02)
+        shapes = [(points * (1.0 if triangles > 1 else 5.0), faces[:triangles]), blob(rng, 0.02)]
+        poses = np.stack([pose(rng, 0.06 * rng.normal(size=3)), pose(rng, np.zeros(3))])
+        links = pack_bodies([Elements(p, f, np.zeros(len(f))) for p, f in shapes])
+        work = make_sweep_work(np.empty((1, 3)), 0)
+        work.moving[:], work.resting[:] = poses
+        engines = [engine(*shapes[k], poses[k]) for k in (0, 1)]
+        crossing = fcl.collide(*engines, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+        assert bodies_overlap(links, 0, links, 1, 0.0, work) == crossing
+        said[crossing] += 1
+    assert min(said.values()) > 5

@@ -7,10 +7,12 @@ from hypothesis import strategies as st
 from clench.grasp.outlines import RoundedOutline
 from clench.grasp.packing import enclosing
 from clench.kernels import outline_sweep
+from clench.kernels.layout import Outline, SectionArrays, Work
 from kernels.kernel_entries import entry
 
-put_stadium, stadium_gap, farthest = (
-    entry(f) for f in (outline_sweep.put_stadium, outline_sweep.stadium_gap, outline_sweep.farthest)
+put_stadium, stadium_gap, farthest, first_near = (
+    entry(f)
+    for f in (outline_sweep.put_stadium, outline_sweep.stadium_gap, outline_sweep.farthest, outline_sweep.first_near)
 )
 
 number = st.floats(-0.05, 0.05)
@@ -53,3 +55,26 @@ def test_the_gap_of_a_stadium_is_that_of_its_middle_line(ax, az, bx, bz, radius,
     step = np.hypot(bx - ax, bz - az) / 4000
     assert stadium_gap(placed, 0, x, z) <= nearest + 1e-12
     assert stadium_gap(placed, 0, x, z) >= nearest - step
+
+
+@settings(max_examples=200, deadline=None)
+@given(number, number, number, number, number, number, st.floats(0.1, 3.0))
+def test_a_travel_that_is_said_to_be_free_reaches_no_point_of_a_segment(ax, az, bx, bz, x, z, speed):
+    """The outline is a disk about a point; no point of it is faster than `speed`."""
+    radius, touch = 0.002, 1e-9
+    flat, line, whole = np.zeros((1, 3)), np.zeros(1), np.zeros(13, dtype=np.int64)
+    stadium = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, radius]])
+    pose = np.zeros((2, 3, 4))
+    work = Work(flat, flat, line, flat, flat, stadium, flat, flat, line, line, line, whole, pose, whole)
+    segment = np.array([[[ax, az, bx, bz, 0.0, 1.0]]])
+    none, rows = np.zeros((1, 0, 3)), np.zeros((1, 1), dtype=np.int64)
+    counts = np.array([[1, 0, 0]])
+    sections = SectionArrays(segment, rows, none, rows, np.zeros((1, 0, 8)), rows, counts)
+    free, nearest = first_near(Outline(0, 0, 0, 0, 0, radius, False, 1), sections, 0, x, z, speed, touch, work)
+    t = np.linspace(0.0, 1.0, 1001)
+    away = np.hypot(ax + t * (bx - ax) - x, az + t * (bz - az) - z).min()
+    assert nearest == 0
+    assert 0.0 <= free * speed <= max(away - radius - touch, 0.0) + 1e-12
+    # Not less than the circle around the segment leaves.
+    middle = np.hypot(0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) - 0.5 * np.hypot(bx - ax, bz - az)
+    assert free * speed >= middle - radius - touch - 1e-12

@@ -55,6 +55,27 @@ def test_an_edge_that_comes_down_on_another_touches_or_passes(away, part):
         assert 0.0 <= left <= 2.0 * TOUCH
 
 
+@pytest.mark.parametrize(
+    ("middle", "run", "w"),
+    [
+        ((-0.0088, 0.0025, 0.044), (-0.0037, 0.0364, -0.0079), 0.005),
+        ((-0.0069, 0.00095, 0.049), (0.007, 0.01575, 0.005), 0.001),
+        ((-0.012, 0.0, 0.0435), (-0.004, 0.03, -0.008), 0.006),
+    ],
+)
+def test_round_edges_that_slide_along_each_other_touch(middle, run, w):
+    """The distance of the lines along them is a closed form; their closest points run, and no plane at rest lasts."""
+    height, middle, run = 0.05, np.array(middle), np.array(run)
+
+    def left(s):
+        n = np.cross((np.cos(s), 0.0, np.sin(s)), run)
+        return abs((middle - np.array((-height * np.sin(s), 0.0, height * np.cos(s)))) @ n) / np.linalg.norm(n) - w
+
+    found = swept([(-0.03, 0.0, height), (0.03, 0.0, height)], [middle - run, middle + run], w=w)
+    assert found == pytest.approx(brentq(left, 0.0, 0.06, xtol=1e-15), abs=1e-8)
+    assert 0.0 <= left(found) <= 2.0 * TOUCH
+
+
 @pytest.mark.parametrize("rates", [(1.0, 1.7), (1.0, 0.0), (1.0, -0.4)])
 def test_a_point_on_two_turning_joints_meets_a_face(rates):
     """The point is at `R(a s) e + R(b s) c`; the face lies across z."""

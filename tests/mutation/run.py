@@ -33,7 +33,7 @@ TOUCHING = "kernels/test_touching.py"
 #: The tests that hold each kernel, the quickest first.
 TESTS = {
     "turning": ["kernels/test_turning.py", PLANAR],
-    "turning_pairs": [RATES, PLANAR, TWO_SIDED],
+    "turning_pairs": ["kernels/test_turning_pairs.py", RATES, PLANAR, TWO_SIDED],
     "coupled": ["kernels/test_coupled.py", PLANAR],
     "coupled_pairs": [PLANAR, TWO_SIDED],
     "outline_sweep": ["kernels/test_outline_sweep.py", PLANAR, ROUND],
