@@ -95,3 +95,19 @@ def test_a_hundred_thousand() -> None:
     wrong = [sentence for _, sentences in found for sentence in sentences]
     assert not wrong, "\n".join(wrong)
     assert_a_fair_sample(counted, count)
+
+
+@pytest.mark.parametrize("lean", [0.0, 1e-12, 1e-10, 3e-9, 3e-8])
+@pytest.mark.parametrize("rate", [1.0, -1.0])
+def test_a_corner_that_almost_fills_a_notch_presses_into_a_side_of_it(lean: float, rate: float) -> None:
+    """The corner's sides lean off the notch's by next to nothing: either way one of them goes in at once."""
+    corner = np.array([0.03, 0.003])
+    notch = [corner, (0.032, -0.016), (0.063, -0.02), (0.07, 0.011), (0.052, 0.037), (0.0255, 0.021)]
+    first, last = (np.arctan2(*(np.array(notch[k]) - corner)[::-1]) for k in (1, -1))
+    ends = [corner + 0.008 * np.array([np.cos(a), np.sin(a)]) for a in (first - lean, last + lean)]
+    link = PlanarOutline(0, np.array([corner, ends[1], ends[0]]), ring_of_sides(3), 0.0)
+    finger = PlanarFinger(np.zeros((1, 2)), np.array([rate]), np.zeros(1, dtype=np.int64), np.array([0.3]), (link,))
+    curve = PlanarCurve((np.array(notch),))
+    (stage,), _ = solve_planar(finger, curve)
+    assert stage.parameter < 1e-6
+    assert check_answer(finger, curve, (stage,)).failures == ()

@@ -15,7 +15,8 @@ from .coupled import bounds, evaluate, line_on_point, point_on_line
 from .layout import Floats, Outline
 from .turning import is_blocking
 
-#: Directions that lean over a line by less than this count as on it [-].
+#: Directions that lean over a line by less than this count as on it [-]; so do sides whose far end is near it: a corner
+#: there touches the line itself.
 LEAN = 1e-9
 #: Corners meet when they are closer than this many touch tolerances [-].
 NEAR = 4.0
@@ -52,8 +53,9 @@ def body_above(outline: Outline, side: Floats, x: float, z: float, nx: float, nz
         for end in range(2):
             t = side[k, 3 + end]
             if abs(g * mx - t * mz - x) <= near and abs(g * mz + t * mx - z) <= near:
-                away = -1.0 if end == 1 else 1.0
-                if away * (-mz * nx + mx * nz) < -LEAN:
+                length = side[k, 4] - side[k, 3]
+                far = length * (-mz * nx + mx * nz)
+                if (far if end == 1 else -far) > max(LEAN * length, near):
                     return False
     return True
 
@@ -77,10 +79,10 @@ def object_below(
         bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
         size = math.hypot(bx - ax, bz - az)
         if size > near:
-            lean = ((bx - ax) * nx + (bz - az) * nz) / size
-            if math.hypot(ax - x, az - z) <= near and lean > LEAN:
+            far, slack = (bx - ax) * nx + (bz - az) * nz, max(LEAN * size, near)
+            if math.hypot(ax - x, az - z) <= near and far > slack:
                 return False
-            if math.hypot(bx - x, bz - z) <= near and -lean > LEAN:
+            if math.hypot(bx - x, bz - z) <= near and -far > slack:
                 return False
     return True
 
