@@ -241,7 +241,9 @@ def test_names_that_lead_elsewhere_are_refused(
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_being_told_to_end_stops_the_hand(tmp_path: Path, number: int) -> None:
     program = (
-        "import sys, time\n"
+        "import signal, time\n"
+        # A shell that runs the tests in the background has interrupts ignored.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from clench.apps.cli.interrupts import stopped_by_signals\n"
         "try:\n"
         "    with stopped_by_signals():\n"
