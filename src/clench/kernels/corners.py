@@ -88,87 +88,6 @@ def object_below(
 
 
 @inner_kernel
-def leaves_notch(
-    outline: Outline,
-    segments: Floats,
-    count: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    closed: bool,
-    vx: float,
-    vz: float,
-    x: float,
-    z: float,
-    chain: Floats,
-    terms: Floats,
-    joints: int,
-    touch: float,
-    side: Floats,
-) -> bool:
-    """Say whether the link's corner is in a notch of the object and closes in on no side of it; see `corner_blocks`."""
-    near, sides = NEAR * touch, 0
-    for i in range(count):
-        ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
-        bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
-        if math.hypot(ax - x, az - z) > near and math.hypot(bx - x, bz - z) > near:
-            continue
-        nx, nz, free = segments[i, 4], segments[i, 5] * mirror, False
-        for flip in range(1 if closed else 2):
-            if flip:
-                nx, nz = -nx, -nz
-            free = free or (
-                body_above(outline, side, vx, vz, nx, nz, near)
-                and not object_below(segments, count, px, pz, mirror, x, z, nx, nz, near)
-                and line_permits(chain, terms, joints, vx, vz, nx, nz, touch)
-            )
-        if not free:
-            return False
-        sides += 1
-    return sides > 1
-
-
-@inner_kernel
-def notch_leaves(
-    outline: Outline,
-    segments: Floats,
-    count: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    vx: float,
-    vz: float,
-    x: float,
-    z: float,
-    chain: Floats,
-    terms: Floats,
-    joints: int,
-    touch: float,
-    side: Floats,
-) -> bool:
-    """Say whether the object's corner is in a notch of the link, no side of which closes in; see `corner_blocks`."""
-    near, sides = NEAR * touch, 0
-    for k in range(outline.s0, outline.s1):
-        mx, mz, g = side[k, 0], side[k, 1], side[k, 2]
-        for end in range(2):
-            t = side[k, 3 + end]
-            if abs(g * mx - t * mz - vx) > near or abs(g * mz + t * mx - vz) > near:
-                continue
-            free = False
-            for flip in range(2 if outline.both else 1):
-                nx, nz = (mx, mz) if flip else (-mx, -mz)
-                free = free or (
-                    object_below(segments, count, px, pz, mirror, x, z, nx, nz, near)
-                    and not body_above(outline, side, vx, vz, nx, nz, near)
-                    and side_permits(chain, terms, joints, -nx, -nz, x, z, touch)
-                )
-            if not free:
-                return False
-            sides += 1
-    return sides > 1
-
-
-@inner_kernel
 def corner_blocks(
     outline: Outline,
     segments: Floats,
@@ -187,7 +106,7 @@ def corner_blocks(
     touch: float,
     side: Floats,
 ) -> bool:
-    """Say whether no separating line of two touching corners lets the motion pass.
+    """Say whether no separating line of two touching corners lets the motion pass, nor all sides of a notch.
 
     Args:
         outline, side: the link, relative to its last pivot.
@@ -195,39 +114,41 @@ def corner_blocks(
         vx, vz: the link's corner from the last pivot. x, z: the object's from the first.
         chain, joints: what moves the link.
     """
-    near = NEAR * touch
-    if leaves_notch(
-        outline, segments, count, px, pz, mirror, closed, vx, vz, x, z, chain, terms, joints, touch, side
-    ) or notch_leaves(outline, segments, count, px, pz, mirror, vx, vz, x, z, chain, terms, joints, touch, side):
-        return False
+    near, sides, left = NEAR * touch, 0, 0
     for i in range(count):
         ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
         bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
         if math.hypot(ax - x, az - z) <= near or math.hypot(bx - x, bz - z) <= near:
-            nx, nz = segments[i, 4], segments[i, 5] * mirror
+            nx, nz, leaves = segments[i, 4], segments[i, 5] * mirror, False
             for flip in range(1 if closed else 2):
                 if flip:
                     nx, nz = -nx, -nz
-                if (
-                    body_above(outline, side, vx, vz, nx, nz, near)
-                    and object_below(segments, count, px, pz, mirror, x, z, nx, nz, near)
-                    and line_permits(chain, terms, joints, vx, vz, nx, nz, touch)
+                if body_above(outline, side, vx, vz, nx, nz, near) and line_permits(
+                    chain, terms, joints, vx, vz, nx, nz, touch
                 ):
-                    return False
+                    if object_below(segments, count, px, pz, mirror, x, z, nx, nz, near):
+                        return False
+                    leaves = True
+            sides, left = sides + 1, left + (1 if leaves else 0)
+    if sides > 1 and left == sides:
+        return False
+    sides, left = 0, 0
     for k in range(outline.s0, outline.s1):
         mx, mz, g = side[k, 0], side[k, 1], side[k, 2]
         for end in range(2):
             t = side[k, 3 + end]
             if abs(g * mx - t * mz - vx) <= near and abs(g * mz + t * mx - vz) <= near:
+                leaves = False
                 for flip in range(2 if outline.both else 1):
                     nx, nz = (mx, mz) if flip else (-mx, -mz)
-                    if (
-                        object_below(segments, count, px, pz, mirror, x, z, nx, nz, near)
-                        and body_above(outline, side, vx, vz, nx, nz, near)
-                        and side_permits(chain, terms, joints, -nx, -nz, x, z, touch)
+                    if object_below(segments, count, px, pz, mirror, x, z, nx, nz, near) and side_permits(
+                        chain, terms, joints, -nx, -nz, x, z, touch
                     ):
-                        return False
-    return True
+                        if body_above(outline, side, vx, vz, nx, nz, near):
+                            return False
+                        leaves = True
+                sides, left = sides + 1, left + (1 if leaves else 0)
+    return not (sides > 1 and left == sides)
 
 
 @inner_kernel
