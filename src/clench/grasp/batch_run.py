@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from itertools import pairwise
 from threading import Lock
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from clench.base.pose import FloatArray
 
 from .batching import PackedProblem
-from .closing import KernelObject, arena_of, kernel_threads, nothing_to_close
+from .closing import KernelObject, arena_of, nothing_to_close, share_out
 
 if TYPE_CHECKING:
     from clench.kernels.batch_layout import Solved
@@ -46,7 +45,7 @@ def solve_packed(problem: PackedProblem, T_palm_object: FloatArray, threads: int
         columns: list[Any] = [column[slice(*span)] for column in solved]
         _Range(problem, T_palm_object[slice(*span)], on_device).solve(type(solved)(*columns))
 
-    deque(kernel_threads(threads).map(run, pairwise(ends)), maxlen=0)
+    share_out(run, pairwise(ends), threads)
     return solved
 
 
