@@ -7,7 +7,7 @@ import clench
 from chain_hands import HandBuilder
 from clench.base.pose import Pose
 from clench.models.mesh import TriangleMesh
-from clench.models.objects.grasp_object import GraspObject
+from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import Shape, ShapeKind
 
 LENGTH, HALF_WIDTH, HALF_THICK = 0.06, 0.01, 0.004
@@ -82,3 +82,34 @@ def test_a_needle_that_reaches_into_the_circle_of_the_tip_is_hit_and_one_outside
             assert tip - 0.004 * deep / radius - 1e-8 <= q <= tip + 1e-8
         else:
             assert q == 2.5
+
+
+@pytest.mark.parametrize("y", ASIDE)
+def test_a_link_that_touches_something_else_by_now_does_not_say_that_it_holds_what_was_stopped(y):
+    """A heel stops the base joint, and leaves when the toe curls back to a needle that the base would leave."""
+    knuckle, toe, heel = 0.05, 0.03, 0.02
+    box = ((toe + heel) / 2, HALF_WIDTH, HALF_THICK)
+    shape = Shape(ShapeKind.BOX, box, Pose([(toe - heel) / 2, 0.0, 0.0]))
+    hand = HandBuilder().finger("index", [None, shape], [knuckle, toe], upper=2.5).hand()
+    first, second = np.array([0.035, y, 0.02]), np.array([0.0252, y, 0.0274])
+    tips = [(first, [-1.0, 0.0, 0.0]), (second, [-1.0, 0.0, -0.2])]
+    shapes = [needle(apex, away).bodies[0].shapes[0] for apex, away in tips]
+    needles = GraspObject("needles", (Body("needles", tuple(shapes), closed=True),))
+    solution = clench.solve(hand, needles, clench.GraspCommand(hand_pose=Pose.identity(), planes=3))
+
+    def seen(point, turn, pivot):
+        c, s = np.cos(turn), np.sin(turn)
+        return c * point[0] + s * point[2] - pivot, c * point[2] - s * point[0]
+
+    base = touch_of(first[0], first[2])
+    tip = touch_of(*seen(second, base, knuckle))
+    x, z = seen(first, base, knuckle)
+    assert tip > 2.0
+    assert solution.joint_angles["index_0"] == pytest.approx(base, abs=1e-8)
+    assert solution.joint_angles["index_1"] == pytest.approx(tip, abs=1e-8)
+    left, held = (next(c for c in solution.contacts if c.stops_joint == f"index_{k}") for k in (0, 1))
+    assert left.passed
+    assert left.gap == pytest.approx(seen((x, 0.0, z), tip, 0.0)[1] - HALF_THICK, abs=1e-8)
+    assert left.position == pytest.approx(first, abs=1e-8)
+    assert not held.passed
+    assert held.position == pytest.approx(second, abs=1e-8)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .advance import advance, make_work
+from .advance import advance, make_work, place_joints
 from .compiling import allocating_kernel, inner_kernel, kernel
 from .exact import ExactArrays, describe_pair, last_mover, pose_movers, settle_pair, sweep_stage
 from .family_pose import compose_inverse, copy_pose, pose_family
 from .family_section import cut_planes
 from .layout import (
+    HIT_FAMILY,
     HIT_GAP,
     HIT_GROUP,
     HIT_JOINT,
@@ -187,7 +188,9 @@ def settle(
     for n in range(answer.contacts[i]):
         hit, point = answer.hit[i, n], answer.point[i, n]
         if hit[HIT_PLANE] < 0:
-            settle_pair(exact, T_palm_object, hit, point, touch, sweep)
+            T, place = answer.pose[i, hit[HIT_FAMILY]], work.place
+            place_joints(hand.chain, hit[HIT_FAMILY], answer.turn[i], place)
+            settle_pair(exact, hand.chain, T_palm_object, T, hit, point, touch, place, sweep)
         else:
             settle_hit(hand, start, shared, own, answer.turn[i], hit, point, work)
 

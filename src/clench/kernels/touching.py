@@ -16,6 +16,7 @@ from .layout import (
     HIT_FEATURE,
     HIT_GAP,
     HIT_GROUP,
+    HIT_JOINT,
     HIT_KIND,
     HIT_NX,
     HIT_NZ,
@@ -26,6 +27,7 @@ from .layout import (
     HIT_X,
     HIT_Z,
     KIND_SIDE,
+    ChainArrays,
     Floats,
     HandArrays,
     Ints,
@@ -35,6 +37,7 @@ from .layout import (
     Work,
 )
 from .outline_gap import core_distance, outline_distance, point_segment
+from .turning import STILL
 
 
 @inner_kernel
@@ -134,6 +137,17 @@ def describe_hit(
 
 
 @inner_kernel
+def touch_found(
+    hand: HandArrays, sections: SectionArrays, row: int, work: Work
+) -> tuple[float, float, float, float, float, float]:
+    """Return where the pair in `work.best` touches with the joints where they are placed; see `touch_segment`."""
+    if work.best[5] == 0:
+        return touch_segment(hand.outlines, sections.segments[row, work.best[3]], work)
+    x, z, nx, nz = touch_round(hand.outlines, sections, row, work)
+    return x, z, nx, nz, nx, nz
+
+
+@inner_kernel
 def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Work, hit: Ints, point: Floats) -> None:
     """Write where and how the pair in `work.best` touches with the joints where they are placed."""
     source, shape = work.best[3], work.best[5]
@@ -141,11 +155,9 @@ def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Wo
     hit[HIT_FEATURE], hit[HIT_WHICH] = work.best[2], work.best[4]
     if shape == 0:
         hit[HIT_SOURCE] = sections.sources[row, source]
-        x, z, nx, nz, cx, cz = touch_segment(hand.outlines, sections.segments[row, source], work)
     else:
         hit[HIT_SOURCE] = sections.disk_sources[row, source] if shape == 1 else sections.ellipse_sources[row, source]
-        x, z, nx, nz = touch_round(hand.outlines, sections, row, work)
-        cx, cz = nx, nz
+    x, z, nx, nz, cx, cz = touch_found(hand, sections, row, work)
     point[HIT_X], point[HIT_Z], point[HIT_NX], point[HIT_NZ] = x, z, nx, nz
     point[HIT_CURVE_X], point[HIT_CURVE_Z] = cx, cz
 
@@ -165,6 +177,18 @@ def still_touches(outline: Outline, hit: Ints, point: Floats, work: Work) -> boo
 
 
 @inner_kernel
+def holds(chain: ChainArrays, hit: Ints, x: float, z: float, nx: float, nz: float, place: Floats) -> bool:
+    """Say whether a touch with this outward normal holds what a contact stopped: it would not be left by going on."""
+    slope, lever = 0.0, 0.0
+    for j in range(hit[HIT_JOINT] + 1):
+        if chain.joint_group[j] == hit[HIT_GROUP] and chain.joint_family[j] == hit[HIT_FAMILY]:
+            dx, dz = x - place[j, 0], z - place[j, 1]
+            slope += chain.rate[j] * (dx * nz - dz * nx)
+            lever += abs(chain.rate[j]) * math.hypot(dx, dz)
+    return slope <= STILL * lever
+
+
+@inner_kernel
 def settle_hit(
     hand: HandArrays,
     start: int,
@@ -175,7 +199,10 @@ def settle_hit(
     point: Floats,
     work: Work,
 ) -> None:
-    """Evaluate a contact again at the final posture; what later motions carried along gets its new place and pair."""
+    """Evaluate a contact again at the final posture; what later motions carried along gets its new place and pair.
+
+    Where the link only touches something else by now, which does not hold what was stopped, the contact is left behind.
+    """
     family, plane, o = hit[HIT_FAMILY], hit[HIT_PLANE], hit[HIT_OUTLINE]
     sections, row = shared, plane
     if family > start:
@@ -186,6 +213,10 @@ def settle_hit(
     gap, _, _ = core_distance(outline, point[HIT_X], point[HIT_Z], work)
     point[HIT_GAP] = gap - outline.radius
     if abs(point[HIT_GAP]) > touch or not still_touches(outline, hit, point, work):
-        point[HIT_GAP] = outline_distance(outline, sections, row, touch, work)
+        left, point[HIT_GAP] = point[HIT_GAP], outline_distance(outline, sections, row, touch, work)
         if point[HIT_GAP] <= PASSED_GAP:
-            describe_touch(hand, sections, row, work, hit, point)
+            x, z, nx, nz, _, _ = touch_found(hand, sections, row, work)
+            if holds(hand.chain, hit, x, z, nx, nz, work.place):
+                describe_touch(hand, sections, row, work, hit, point)
+            else:
+                point[HIT_GAP] = left
