@@ -123,3 +123,19 @@ def test_a_pair_that_takes_too_many_planes_ends_where_it_is_free():
     found = swept([(0.03, 0.0, 0.0)], [(-0.05 - 1e-6, 0.0, 0.0)], chain=chain, best=2000.0)
     assert 0.0 < found < 2000.0
     assert np.hypot(0.05 * np.cos(found) + 0.05 + 1e-6, 0.05 * np.sin(found)) >= 1e-6
+
+
+@pytest.mark.parametrize("sine", [1.2e-8, 3e-8, 5e-7])
+def test_round_edges_that_touch_and_are_all_but_parallel_do_not_overlap(sine):
+    """The plane across such edges is known to 1e-16 / sine only, their distance to the last digit."""
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        at, u = rng.normal(size=3) * 0.04, rng.normal(size=3) * 0.02
+        across = np.cross(u, rng.normal(size=3))
+        across /= np.linalg.norm(across)
+        up = np.cross(u, across) / np.linalg.norm(u)
+        v = u + sine * np.linalg.norm(u) * across
+        w = 10 ** rng.uniform(-6, -2)
+        face = [at + 0.5 * u, at - 0.7 * u, at + 0.1 * across]
+        edge = [at + 0.4 * v - w * up, at - 0.6 * v - w * up]
+        assert swept(face, edge, w) != OVERLAP

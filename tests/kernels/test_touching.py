@@ -31,8 +31,8 @@ def gap(case, curve, outline, angles):
 def test_a_contact_lies_on_both_and_looks_out_of_the_object():
     """The normal is the direction in which the gap grows as fast as the object is moved away.
 
-    What is told as touching holds the joints that it stopped. A link that has left what stopped them may touch elsewhere
-    since, where going on would lead away: that is no contact of theirs.
+    What is told as touching holds the joints that it stopped. A link that has left what stopped them may touch
+    elsewhere since, where going on would lead away: that is no contact of theirs.
     """
     seen, corners, opened, elsewhere = 0, 0, 0, 0
     for case, answer, hit, point in contacts():

@@ -16,7 +16,7 @@ from .compiling import inner_kernel, kernel
 from .core_motion import base_motion, corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
-from .leaving import FLAT, OVERLAP, move_on
+from .leaving import FLAT, OVERLAP, OVERLAPPING, move_on
 
 #: Planes that are laid for one pair at most; a pair that needs more stops there, which is safe.
 PLANES = 400
@@ -159,7 +159,9 @@ def sweep_pair(
                 nx, ny, nz = 0.0, 0.0, 0.0
             free = move_on(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, touch, best - s)
             if free <= 0.0:
-                return OVERLAP if flat and free == OVERLAP else s
+                # Round cores are apart: their distance says whether they overlap; a plane may not be known to 1e-10.
+                apart = w > 0.0 and gap >= -OVERLAPPING * touch
+                return OVERLAP if flat and free == OVERLAP and not apart else s
             level, step = -1.0, free if s + free >= best else 0.5 * free
         elif turn >= PLAIN:
             # Edges that slide along each other: the closest points run, and no plane that rests lasts.

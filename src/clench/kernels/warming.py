@@ -130,7 +130,7 @@ def sample_values() -> dict[str, Any]:
     values |= dict.fromkeys(("family", "start", "base", "low", "high", "i", "times", "group", "plane", "entry"), 0)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
-        "f2": ("T_palm_object", "T_palm_family", "first", "second", "out", "postures"),
+        "f2": ("T_palm_object", "T_palm_family", "first", "second", "out", "postures", "place"),
         "i1": ("overlaps", "hit", "wanted"),
         "f3": ("poses", "placed", "scratch"),
     }
