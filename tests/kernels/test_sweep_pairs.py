@@ -139,3 +139,19 @@ def test_round_edges_that_touch_and_are_all_but_parallel_do_not_overlap(sine):
         face = [at + 0.5 * u, at - 0.7 * u, at + 0.1 * across]
         edge = [at + 0.4 * v - w * up, at - 0.6 * v - w * up]
         assert swept(face, edge, w) != OVERLAP
+
+
+@pytest.mark.parametrize("sine", [3e-9, 1e-8, 1e-7])
+def test_sharp_edges_that_touch_and_are_all_but_parallel_do_not_overlap(sine):
+    """A face stands on an edge of another; in height they overlap by less than the touch tolerance."""
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        at, u = rng.normal(size=3) * 0.04, rng.normal(size=3) * 0.02
+        across = np.cross(u, rng.normal(size=3))
+        across /= np.linalg.norm(across)
+        up = np.cross(u, across) / np.linalg.norm(u)
+        v = u + sine * np.linalg.norm(u) * across
+        deep = rng.uniform(0.0, 1e-12)
+        above = [at + 0.5 * u, at - 0.7 * u, at + rng.uniform(-0.02, 0.02) * across + rng.uniform(1e-6, 0.02) * up]
+        below = [at + 0.4 * v, at - 0.6 * v, at + rng.uniform(-0.02, 0.02) * across - rng.uniform(1e-6, 0.02) * up]
+        assert swept(np.array(above) - deep * up, below) != OVERLAP

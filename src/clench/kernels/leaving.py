@@ -23,8 +23,8 @@ FLAT = 1.0 / 256.0
 OVERLAPPING = 10.0
 #: Answers for a touching pair: no plane permits the motion; no plane separates it.
 BLOCKED, OVERLAP = 0.0, -1.0
-#: Edges with a smaller sine between them give no plane [-].
-ALONG = 1e-6
+#: Edges with a smaller sine between them give no plane; with one below the second it is made square to them [-].
+ALONG, BARELY = 1e-9, 1e-4
 #: A plane across which the cores are known to lie the other way round does not separate them: the cosine [-].
 OPPOSED = -0.5
 #: A plane that separates a touching pair may turn this many times as fast as the moving core [-].
@@ -180,10 +180,16 @@ def try_across(
 ) -> float:
     """Return the better answer of `try_direction` for the two directions across u and v (none where parallel)."""
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    scale = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    if size * size <= ALONG * ALONG * scale:
+    square, uu = nx * nx + ny * ny + nz * nz, u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    scale = uu * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    if square <= ALONG * ALONG * scale:
         return OVERLAP
+    if square <= BARELY * BARELY * scale:
+        # Rounding leaves a part along the edges, over whose length the plane would cut into what it keeps apart.
+        along = (nx * u[0] + ny * u[1] + nz * u[2]) / uu
+        nx, ny, nz = nx - along * u[0], ny - along * u[1], nz - along * u[2]
+        square = nx * nx + ny * ny + nz * nz
+    size = math.sqrt(square)
     nx, ny, nz = nx / size, ny / size, nz / size
     one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
     other = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, -nx, -ny, -nz, known, s, touch, best)
