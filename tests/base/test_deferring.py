@@ -1,11 +1,11 @@
-"""Mappings that are made when they are first read."""
+"""Mappings and sequences that are made when they are first read."""
 
 import copy
 import pickle
 
 import pytest
 
-from clench.base.deferring import DeferredMapping
+from clench.base.deferring import DeferredMapping, DeferredSequence
 
 MADE = {"code": "limit", "angles": [0.1, 0.2]}
 
@@ -45,3 +45,16 @@ def test_what_fails_fails_again():
     for _ in range(2):
         with pytest.raises(ZeroDivisionError):
             deferred["a"]
+
+
+def test_a_sequence_is_made_once_when_it_is_read():
+    calls = []
+    deferred = DeferredSequence(lambda: calls.append(1) or [3, 1, 2])
+    assert not deferred.is_made
+    assert bool(deferred)
+    assert list(deferred) == [3, 1, 2]
+    assert (len(deferred), deferred[1], deferred[1:]) == (3, 1, (1, 2))
+    assert repr(deferred) == "(3, 1, 2)"
+    assert deferred.is_made
+    assert calls == [1]
+    assert pickle.loads(pickle.dumps(deferred)) == (3, 1, 2)

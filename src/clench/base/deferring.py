@@ -1,8 +1,8 @@
-"""Mappings that are made when they are first read."""
+"""Mappings and sequences that are made when they are first read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 
@@ -44,3 +44,40 @@ class DeferredMapping(Mapping[str, Any]):
     def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
         """Be copied and pickled as the plain mapping."""
         return dict, (self._all(),)
+
+
+class DeferredSequence(Sequence[Any]):
+    """Hold a sequence that costs more to make than most readers want to wait for.
+
+    Args:
+        make: returns the sequence; called once at most, unless two threads read it at once for the first time.
+    """
+
+    def __init__(self, make: Callable[[], Sequence[Any]]) -> None:
+        self._make: Callable[[], Sequence[Any]] | None = make
+        self._made: tuple[Any, ...] = ()
+
+    @property
+    def is_made(self) -> bool:
+        """Whether it has been read."""
+        return self._make is None
+
+    def _all(self) -> tuple[Any, ...]:
+        make = self._make
+        if make is not None:
+            self._made = tuple(make())
+            self._make = None
+        return self._made
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._all()[index]
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def __reduce__(self) -> tuple[type[tuple[Any, ...]], tuple[tuple[Any, ...]]]:
+        """Be copied and pickled as the plain tuple."""
+        return tuple, (self._all(),)

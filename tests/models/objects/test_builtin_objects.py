@@ -111,3 +111,11 @@ def test_a_profile_with_steps_and_hollows_is_split_where_it_must():
     pieces = convex_pieces(profile, circle(12))
     assert [(p.vertices[:, 2].min(), p.vertices[:, 2].max()) for p in pieces] == [(0.0, 0.3), (0.3, 0.4), (0.4, 0.5)]
     assert all(volume(p) == pytest.approx(volume(convex_hull(TriangleMesh(p.vertices, []))), rel=1e-9) for p in pieces)
+
+
+def test_the_mug_makes_its_pieces_when_they_are_asked_for():
+    """Whoever closes a hand around it does not wait for them."""
+    mug = GraspObject.load("mug")
+    assert not mug.bodies[0].pieces.is_made
+    assert len(mug.bodies[0].pieces) > 40
+    assert mug.bodies[0].pieces.is_made

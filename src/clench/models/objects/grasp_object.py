@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -42,7 +42,7 @@ class Body:
     name: str
     shapes: tuple[Shape, ...]
     role: BodyRole = BodyRole.GRASPABLE
-    pieces: tuple[TriangleMesh, ...] = ()
+    pieces: Sequence[TriangleMesh] = ()
     closed: bool = True
     friction: float | None = None
 
