@@ -71,6 +71,25 @@ def test_the_loose_end_of_a_sheet_in_the_round_side_of_a_link(turned_round):
         assert found_overlap(finger, curve) == expected
 
 
+@pytest.mark.parametrize("slant", [0.0, 0.4, 0.8, 2.0])
+@pytest.mark.parametrize("below", [False, True])
+def test_the_round_side_of_a_link_and_a_slanting_ellipse(slant, below):
+    """They overlap where the side is nearer to the middle than the ellipse's height there and the radius."""
+    radius, a, b = 0.008, 0.02, 0.006
+    height = np.hypot(a * np.sin(slant), b * np.cos(slant)) + radius
+    link = PlanarOutline(0, np.array([[-0.05, 0.0], [0.05, 0.0]]), np.array([[0, 1], [1, 0]]), radius)
+    one = np.ones(1)
+    finger = PlanarFinger(np.zeros((1, 2)), one, np.zeros(1, dtype=np.int64), one, (link,))
+    for gap, expected in ((1e-5, -1), (-1e-5, 0), (-2e-3, 0)):
+        at = (height + gap) * (-1.0 if below else 1.0)
+        section = pack_curve(PlanarCurve(disks=np.zeros((1, 3))))
+        section.counts[0] = 0, 0, 1
+        section.ellipses[0, 0] = 0.0, at, np.cos(slant), np.sin(slant), a, b, -a, a
+        overlaps = np.full(1, -9, dtype=np.int64)
+        find_overlaps(pack_finger(finger), EMPTY_TREE, no_rounds(), True, STILL, section, overlaps)
+        assert overlaps[0] == expected
+
+
 def turned(angle):
     """Turn from x towards z about the y axis."""
     c, s = np.cos(angle), np.sin(angle)

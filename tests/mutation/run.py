@@ -37,7 +37,7 @@ TESTS = {
     "coupled": ["kernels/test_coupled.py", PLANAR],
     "coupled_pairs": [PLANAR, TWO_SIDED],
     "outline_sweep": ["kernels/test_outline_sweep.py", PLANAR, ROUND],
-    "outline_gap": [ROUND, TOUCHING, "kernels/test_overlap.py"],
+    "outline_gap": ["kernels/test_outline_gap.py", ROUND, TOUCHING, "kernels/test_overlap.py"],
     "touching": [ROUND, TOUCHING],
     "segments": ["kernels/test_segments.py"],
     "closest": ["kernels/test_closest.py", "kernels/test_sweep_pairs.py"],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .compiling import inner_kernel
-from .conics import region_gap
+from .conics import region_gap, support
 from .layout import KIND_SIDE, Floats, Outline, SectionArrays, Work
 from .turning_pairs import note
 
@@ -95,7 +95,7 @@ def round_distance(outline: Outline, sections: SectionArrays, row: int, best: fl
                 best = d
                 note(work.best, outline.tip, outline.number, v, i, 0, 2)
         for s in range(outline.s0, outline.s1):
-            px, pz, inside = nearest_scaled(e, work.side, s)
+            px, pz, inside = nearest_on_side(e, work.side, s)
             d = region_gap(e, px, pz)[0] - outline.radius
             if inside and d < best:
                 best = d
@@ -122,12 +122,16 @@ def core_distance(outline: Outline, qx: float, qz: float, work: Work) -> tuple[f
 
 
 @inner_kernel
-def nearest_scaled(e: Floats, side: Floats, s: int) -> tuple[float, float, bool]:
-    """Return the point of a side nearest to an ellipse's centre where the ellipse is a unit circle; whether no end."""
-    ax, az, bx, bz = side_ends(side, s)
-    px, pz = ((ax - e[0]) * e[2] + (az - e[1]) * e[3]) / e[4], ((az - e[1]) * e[2] - (ax - e[0]) * e[3]) / e[5]
-    qx, qz = ((bx - e[0]) * e[2] + (bz - e[1]) * e[3]) / e[4], ((bz - e[1]) * e[2] - (bx - e[0]) * e[3]) / e[5]
-    dx, dz = qx - px, qz - pz
-    square = dx * dx + dz * dz
-    t = min(max(-(px * dx + pz * dz) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    return ax + t * (bx - ax), az + t * (bz - az), 0.0 < t < 1.0
+def nearest_on_side(e: Floats, side: Floats, s: int) -> tuple[float, float, bool]:
+    """Return the point of a side's line that is nearest to a whole ellipse; whether it lies on the side, at no end.
+
+    Beside the ellipse that is above the point whose normal is the side's; where the line goes through the ellipse, it
+    is the middle of the chord.
+    """
+    nx, nz, g = side[s, 0], side[s, 1], side[s, 2]
+    size, _, t = support(e, nx, nz)
+    y = e[5] * e[5] * (-nx * e[3] + nz * e[2]) / size
+    part = min(max((g - nx * e[0] - nz * e[1]) / size, -1.0), 1.0)
+    x, z = e[0] + part * (t * e[2] - y * e[3]), e[1] + part * (t * e[3] + y * e[2])
+    along = nx * z - nz * x
+    return g * nx - along * nz, g * nz + along * nx, side[s, 3] < along < side[s, 4]
