@@ -159,6 +159,8 @@ def test_the_nearest_pair_of_an_outline_and_segments(radius, both):
             continue
         p = points[feature]
         assert kind == outline.tip
+        # A round tip beside the end of a segment touches the end; a sharp one touches the segment.
+        assert (which < 2) == (radius == 0.0 or 0.0 < (p - a) @ (b - a) < (b - a) @ (b - a))
         if which < 2:
             assert to_line(p, a, b) == pytest.approx(found, abs=1e-12)
             foot = p - n * (n @ (p - a))
@@ -169,6 +171,15 @@ def test_the_nearest_pair_of_an_outline_and_segments(radius, both):
     expected = {("side", w) for w in (range(4) if both else range(2))}
     expected |= {("corner", w) for w in (range(4) if radius > 0.0 else range(2))}
     assert seen == expected
+
+
+@pytest.mark.parametrize(("height", "behind"), [(0.5, 0), (0.0, 0), (-0.5, 0), (-3.0, 1)])
+def test_a_corner_that_touches_a_segment_is_in_front_of_it(height, behind):
+    up = np.array([0.0, height * TOUCH])
+    outline, work = placed(np.array([[0.01, 0.0], [0.02, 0.01], [0.0, 0.01]]) + up, 0.0)
+    found = outline_distance(outline, sections([[0.05, 0.0, -0.05, 0.0, 0.0, 1.0]]), 0, TOUCH, work)
+    assert found == pytest.approx(abs(height) * TOUCH, abs=1e-3 * TOUCH)
+    assert work.best[:6].tolist() == [KIND_EDGE, 0, 0, 0, behind, 0]
 
 
 @pytest.mark.parametrize("both", [False, True])

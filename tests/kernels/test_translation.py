@@ -26,6 +26,41 @@ def travel(moving, rest, T, direction, limit=np.inf):
     )
 
 
+def first_event(moving, rest, T, direction):
+    """Return the least way after which two meshes touch, infinite for none: every corner, face and edge in turn.
+
+    The corners and edges of the one are followed to the faces and edges of the other; each pair is a system of three
+    equations.
+    """
+    one, two = moved(moving, T).vertices[moving.triangles], rest.vertices[rest.triangles]
+    ways = [corners_to_faces(one.reshape(-1, 3), two, direction), corners_to_faces(two.reshape(-1, 3), one, -direction)]
+    a, u = one.reshape(-1, 3), (np.roll(one, -1, axis=1) - one).reshape(-1, 3)
+    c, v = two.reshape(-1, 3), (np.roll(two, -1, axis=1) - two).reshape(-1, 3)
+    # a + s u + way d = c + r v
+    s, r, way = solved(u[:, None], -v[None], direction, c[None] - a[:, None])
+    ways.append(way[(s >= 0.0) & (s <= 1.0) & (r >= 0.0) & (r <= 1.0) & (way >= 0.0)])
+    return min((w.min() for w in ways if w.size), default=np.inf)
+
+
+def corners_to_faces(corners, faces, d):
+    """Return the ways at which corners that move along d meet faces."""
+    a, b, c = (faces[None, :, k] for k in range(3))
+    # p + way d = a + s (b - a) + r (c - a)
+    s, r, way = solved(b - a, c - a, -np.asarray(d), corners[:, None] - a)
+    return way[(s >= 0.0) & (r >= 0.0) & (s + r <= 1.0) & (way >= 0.0)]
+
+
+def solved(u, v, w, right):
+    """Return the coefficients of u, v and w that give a vector, by Cramer's rule; not finite where there are none."""
+    det = np.einsum("...i,...i", np.cross(u, v), w)
+    with np.errstate(all="ignore"):
+        return (
+            np.einsum("...i,...i", np.cross(right, v), w) / det,
+            np.einsum("...i,...i", np.cross(u, right), w) / det,
+            np.einsum("...i,...i", np.cross(u, v), right) / det,
+        )
+
+
 def pose(x=0.0, y=0.0, z=0.0, rotation=None):
     T = np.eye(4)
     T[:3, 3] = x, y, z
@@ -94,6 +129,32 @@ def test_touching_at_the_start_is_no_travel(scale):
     # The same, with a rounding error of one unit in the last place.
     just_in = pose(z=np.nextafter(scale, 0.0))
     assert travel(box(scale, scale, scale), box(scale, scale, scale), just_in, [0, 0, -1])[0] == 0.0
+
+
+@pytest.mark.parametrize("aside", [(0.1, 0.2), (-0.3, 0.15), (0.05, -0.4)])
+def test_a_corner_comes_down_inside_of_a_triangle_of_a_face(aside):
+    x, y = aside
+    assert travel(box(1, 1, 1), box(1, 1, 1), pose(x, y, 10.0, CORNER_DOWN), [0, 0, -1])[0] == pytest.approx(
+        9.5 - np.sqrt(3.0) / 2.0, abs=1e-14
+    )
+    up = moved(box(1, 1, 1), pose(rotation=CORNER_DOWN.inv() * Rotation.from_euler("x", 180, degrees=True)))
+    top = up.vertices[up.vertices[:, 2].argmax()]
+    assert travel(box(1, 1, 1), up, pose(top[0] - x, top[1] - y, 10.0), [0, 0, -1])[0] == pytest.approx(
+        9.5 - top[2], abs=1e-14
+    )
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("kinds", [(hull, hull), (star, hull), (hull, star), (star, star)])
+def test_no_event_is_earlier_and_none_is_made_up(seed, kinds):
+    moving, rest = kinds[0](seed, 0.3), kinds[1](seed + 100, 0.5)
+    rng = np.random.default_rng([3, seed])
+    frame = Rotation.random(random_state=seed).as_matrix()
+    start = pose(*(rng.uniform(0.0, 0.9) * frame[1] - 4.0 * frame[0]), rotation=Rotation.random(random_state=seed + 1))
+    distance, one, two = travel(moving, rest, start, frame[0])
+    expected = first_event(moving, rest, start, frame[0])
+    assert distance == pytest.approx(expected, abs=1e-12)
+    assert (one < 0) == (two < 0) == (expected == np.inf)
 
 
 @settings(max_examples=80, deadline=None)

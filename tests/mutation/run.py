@@ -35,7 +35,7 @@ TESTS = {
     "turning": ["kernels/test_turning.py", PLANAR],
     "turning_pairs": ["kernels/test_turning_pairs.py", RATES, PLANAR, TWO_SIDED],
     "coupled": ["kernels/test_coupled.py", PLANAR],
-    "coupled_pairs": [PLANAR, TWO_SIDED],
+    "coupled_pairs": ["kernels/test_coupled_pairs.py", PLANAR, TWO_SIDED],
     "outline_sweep": ["kernels/test_outline_sweep.py", PLANAR, ROUND],
     "outline_gap": ["kernels/test_outline_gap.py", ROUND, TOUCHING, "kernels/test_overlap.py"],
     "touching": [ROUND, TOUCHING],

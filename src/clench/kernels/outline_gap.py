@@ -18,7 +18,8 @@ def point_segment(px: float, pz: float, ax: float, az: float, bx: float, bz: flo
     t = 0.0
     if square > 0.0:
         t = min(max(((px - ax) * dx + (pz - az) * dz) / square, 0.0), 1.0)
-    fx, fz = ax + t * dx, az + t * dz
+    # Which end is touched is told by the foot: rounding must not take it off the second one.
+    fx, fz = (ax + t * dx, az + t * dz) if t < 1.0 else (bx, bz)
     return math.hypot(px - fx, pz - fz), fx, fz
 
 
