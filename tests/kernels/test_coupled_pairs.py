@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from oracle.adapter import solve_planar
-from oracle.cases import placed_vertices, pushed_against, random_finger
+from oracle.cases import placed_vertices, pushed_against, random_finger, scaled
 from oracle.checking import check_answer
 from oracle.planar import gap_at
 from oracle.scene import PlanarCurve
@@ -25,7 +25,10 @@ def moved_at_once(seed, kinds):
 def within_reach(finger, curve, rng, *, touching):
     """Return the curve where it is clear of the open finger, or touches it."""
     if touching:
-        return pushed_against(finger, curve, rng.uniform(0.0, 2.0 * np.pi), rng)
+        curve = pushed_against(finger, curve, rng.uniform(0.0, 2.0 * np.pi), rng)
+        # Some are apart by a part of the touch tolerance.
+        nearby = curve.moved(rng.choice([0.0, 0.5e-9]) * finger.length * rng.normal(size=2))
+        return nearby if gap_at(finger, nearby, np.zeros(1)) > 0.0 else curve
     while True:
         met = placed_vertices(finger, rng.uniform(0.0, 1.0, 1), int(rng.integers(len(finger.outlines))))
         put = curve.moved(met[int(rng.integers(len(met)))] + rng.normal(0.0, 0.005, 2))
@@ -51,6 +54,7 @@ def test_it_does_not_matter_which_way_a_sheet_goes(kinds, touching):
         length = rng.uniform(0.002, 0.03)
         line = turned(np.array([[0.0, 0.0], [length, 0.0]]), rng.uniform(0.0, 7.0))
         curve = within_reach(finger, PlanarCurve(lines=(line,), two_sided=True), rng, touching=touching)
+        finger, curve = scaled(finger, curve, (1.0, 1e-4, 1e3)[seed % 3])
         back = replace(curve, lines=(curve.lines[0][::-1].copy(),))
         (one, touches), (other, touches_too) = judged(finger, curve), judged(finger, back)
         assert other == pytest.approx(one, abs=1e-8)
@@ -66,6 +70,7 @@ def test_a_flipped_loop_stops_on_either_side(kind, touching):
     for seed in range(30):
         finger, rng = moved_at_once(seed, ("box", "convex", "blade", "capsule", "round_box"))
         curve = within_reach(finger, CURVES[kind](0.02, rng), rng, touching=touching)
+        finger, curve = scaled(finger, curve, (1.0, 1e-4, 1e3)[seed % 3])
         flipped = replace(curve, loops=tuple(loop[::-1].copy() for loop in curve.loops), two_sided=True)
         (one, touches), (other, touches_too) = judged(finger, curve), judged(finger, flipped)
         assert other == pytest.approx(one, abs=1e-8)

@@ -91,6 +91,24 @@ def test_triangles_part_or_stop(touching, seed, swapped, back):
         assert apart(turned(a, rate * found), b) > -1e-9
 
 
+def test_edges_that_part_while_the_plane_along_both_goes_through_the_axis_of_z():
+    """The part of its normal along z changes its sign on the first step, which is a few millionths of a radian."""
+    parted = 0
+    for seed in range(400):
+        rng = np.random.default_rng([8, seed])
+        angle = rng.uniform(0.0, 7.0)
+        n = np.array([np.cos(angle), np.sin(angle), rng.uniform(-1e-5, 1e-5)])
+        n /= np.linalg.norm(n)
+        u, v, *rest = (w - (w @ n) * n for w in rng.normal(size=(4, 3)) * 0.02)
+        at = rng.normal(size=3) * 0.05
+        a = at + np.array([u * rng.uniform(0.2, 1), -u * rng.uniform(0.2, 1), rest[0] + n * rng.uniform(0.002, 0.02)])
+        b = at + np.array([v * rng.uniform(0.2, 1), -v * rng.uniform(0.2, 1), rest[1] - n * rng.uniform(0.002, 0.02)])
+        if min(apart(turned(a, s), b) for s in (1e-6, 1e-5, 1e-4)) > 1e-9:
+            assert sweep(a, b) > 1e-5
+            parted += 1
+    assert parted > 100
+
+
 @pytest.mark.parametrize("rate", [1.0, -1.0])
 @pytest.mark.parametrize("behind", [-0.01, 0.03])
 def test_a_face_on_both_sides_of_its_pivot_tilts_off_a_ball(rate, behind):

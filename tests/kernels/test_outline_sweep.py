@@ -1,6 +1,9 @@
 """The stadium around an outline, wherever it is put; and what it says about what can be met first."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -9,6 +12,12 @@ from clench.grasp.packing import enclosing
 from clench.kernels import outline_sweep
 from clench.kernels.layout import Outline, SectionArrays, Work
 from kernels.kernel_entries import entry
+from oracle.adapter import solve_planar
+from oracle.cases import placed_vertices, random_finger
+from oracle.checking import check_answer
+from oracle.planar import gap_at
+from oracle.scene import PlanarCurve
+from oracle.shapes import turned
 
 put_stadium, stadium_gap, farthest, first_near = (
     entry(f)
@@ -78,3 +87,38 @@ def test_a_travel_that_is_said_to_be_free_reaches_no_point_of_a_segment(ax, az, 
     # Not less than the circle around the segment leaves.
     middle = np.hypot(0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) - 0.5 * np.hypot(bx - ax, bz - az)
     assert free * speed >= middle - radius - touch - 1e-12
+
+
+def before_a_wall(seed, joints):
+    """Return a finger whose joints all move at once, and one long segment in its way that it does not touch yet."""
+    rng = np.random.default_rng([6, seed])
+    while True:
+        finger = random_finger(rng, joints=joints)
+        rates = rng.uniform(0.4, 1.2, joints) * rng.choice([-1.0, 1.0])
+        finger = replace(finger, group=np.zeros(joints, dtype=np.int64), rates=rates)
+        half = rng.uniform(0.004, 0.1)
+        line = turned(np.array([[-half, 0.0], [half, 0.0]]), rng.uniform(0.0, 7.0))
+        met = placed_vertices(finger, rng.uniform(0.0, 1.0, 1), int(rng.integers(len(finger.outlines))))
+        curve = PlanarCurve(lines=(line + met[0] + rng.uniform(-0.9, 0.9) * line[1],), two_sided=True)
+        if gap_at(finger, curve, np.zeros(1)) > 1e-5:
+            return finger, curve
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_a_single_segment_is_met_wherever_the_scene_lies(joints):
+    """Across either axis or far from both; nothing else is there that would make the kernel look at it."""
+    stopped = 0
+    for seed in range(60):
+        finger, curve = before_a_wall(seed, joints)
+        middle = curve.lines[0].mean(axis=0)
+        found = []
+        for to in (middle, np.zeros(2), np.array([0.0, 0.3]), np.array([-0.3, 0.0]), np.array([0.2, -0.4])):
+            pivots = finger.pivots.copy()
+            pivots[0] += to - middle
+            there, wall = replace(finger, pivots=pivots), curve.moved(to - middle)
+            (stage,), answer = solve_planar(there, wall)
+            assert not check_answer(there, wall, (stage,)).failures
+            found.append(stage.parameter)
+        assert found == pytest.approx([found[0]] * len(found), abs=1e-7)
+        stopped += int(answer.contacts[0])
+    assert stopped > 20

@@ -3,8 +3,22 @@
 import numpy as np
 import pytest
 
-from clench.kernels.layout import HIT_CURVE_X, HIT_GAP, HIT_GROUP, HIT_NX, HIT_OUTLINE, HIT_SOURCE, HIT_X
-from oracle.adapter import pack_curve, solve_planar
+from clench.kernels.closing import close_items
+from clench.kernels.exact import planes_only
+from clench.kernels.family_section import make_sections
+from clench.kernels.layout import (
+    HIT_CURVE_X,
+    HIT_GAP,
+    HIT_GROUP,
+    HIT_NX,
+    HIT_OUTLINE,
+    HIT_SOURCE,
+    HIT_X,
+    ItemArrays,
+    no_rounds,
+)
+from clench.kernels.tree import build_tree
+from oracle.adapter import empty_answer, pack_curve, pack_finger, solve_planar
 from oracle.cases import cases
 from oracle.distances import place, signed_gap
 from oracle.planar import overlaps_at_start
@@ -74,3 +88,78 @@ def test_a_contact_lies_on_both_and_looks_out_of_the_object():
     assert opened > 10
     assert elsewhere > 0
     assert corners < 0.01 * seen
+
+
+def behind_a_joint(hand, turn, pose):
+    """Return a hand whose family comes after one with a single joint, which turns first and moves no outline."""
+    chain, outlines = hand.chain, hand.outlines
+    behind = chain._replace(
+        joint_family=np.concatenate([[0], chain.joint_family + 1]),
+        joint_group=np.concatenate([[0], chain.joint_group + 1]),
+        pivot=np.vstack([np.zeros((1, 2)), chain.pivot]),
+        rate=np.concatenate([[1.0], chain.rate]),
+        start=np.concatenate([[0.0], chain.start]),
+        stop=np.concatenate([[turn], chain.stop]),
+        group_length=np.concatenate([[turn], chain.group_length]),
+        speed=np.concatenate([[1.0], chain.speed]),
+        breaks=np.concatenate([[0], chain.breaks]),
+    )
+    return hand._replace(
+        entry_group=np.array([0, len(chain.group_length) + 1]),
+        entry_family=np.array([0, 2]),
+        chain=behind,
+        outlines=outlines._replace(joint=outlines.joint + 1),
+        family_pose=np.stack([hand.family_pose[0], pose]),
+        family_plane=np.array([0, 1, 2]),
+        plane_offset=np.zeros(2),
+        family_reach=np.repeat(hand.family_reach, 2),
+        family_length=np.repeat(hand.family_length, 2),
+        plane_outline=np.concatenate([[0], hand.plane_outline]),
+    )
+
+
+def walls(curve, height):
+    """Return a curve's segments as walls that look where they do, along y: vertices and triangles."""
+    vertices = np.array([[x, y, z] for y in (-height, 1.3 * height) for x, z in curve.segments.reshape(-1, 2)])
+    first = np.arange(0, len(vertices) // 2, 2)
+    up = len(vertices) // 2
+    triangles = [
+        np.column_stack([first, first + 1 + up, first + 1]),
+        np.column_stack([first, first + up, first + 1 + up]),
+    ]
+    return vertices, np.vstack(triangles).astype(np.int32)
+
+
+def test_a_later_family_touches_as_the_same_joints_do_in_the_first():
+    """Its planes lie askew to those of the family before, and cut the object only once that one has turned."""
+    turn, tilt = 0.7, 0.4
+    pose = np.array([[1.0, 0, 0, 0.01], [0, np.cos(tilt), -np.sin(tilt), 0.02], [0, np.sin(tilt), np.cos(tilt), -0.01]])
+    c, s = np.cos(turn), np.sin(turn)
+    T_palm_object = np.ascontiguousarray(np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]) @ pose)
+    opened = touching = 0
+    for case in cases(11, 250):
+        finger, curve = case.finger, case.curve
+        other = not curve.loops or len(curve.disks) or curve.two_sided
+        if case.name != "anywhere" or other or overlaps_at_start(finger, curve):
+            continue
+        hand = behind_a_joint(pack_finger(finger), turn, pose)
+        shared, own = make_sections(2, 1, 0), make_sections(2, 4 * len(curve.segments), 0)
+        joints = len(hand.chain.rate)
+        whole = np.array([0], dtype=np.int64)
+        items = ItemArrays(whole, whole, whole + 1, np.full((1, joints), np.inf))
+        answer, exact = empty_answer(hand, 1, finger.groups + 1), planes_only(1, 1)
+        tree = build_tree(*walls(curve, finger.length))
+        close_items(hand, exact, tree, no_rounds(), True, T_palm_object, shared, own, items, 1, False, answer)
+        plain = solve_planar(finger, curve)[1]
+        assert answer.overflow[0] == 0
+        assert answer.turn[0, 0] == turn
+        np.testing.assert_allclose(answer.turn[0, 1:], plain.turn[0], atol=1e-7)
+        assert answer.contacts[0] == plain.contacts[0]
+        for k in range(plain.contacts[0]):
+            assert answer.hit[0, k, HIT_GROUP] == plain.hit[0, k, HIT_GROUP] + 1
+            gap_there = answer.point[0, k, HIT_GAP]
+            assert gap_there == pytest.approx(plain.point[0, k, HIT_GAP], abs=2e-8 * finger.length)
+            opened += gap_there > finger.tolerance
+            touching += gap_there <= finger.tolerance
+    assert opened > 10
+    assert touching > 50

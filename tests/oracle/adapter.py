@@ -142,9 +142,8 @@ def solve_planar(
     answer = empty_answer(hand, 1, finger.groups)
     closed = not curve.two_sided
     T = np.eye(4)[:3].copy()
-    close_items(
-        hand, planes_only(1, 1), EMPTY_TREE, no_rounds(), closed, T, sections, sections, items, 1, together, answer
-    )
+    own = make_sections(1, 1, 0)  # for later families, of which there are none
+    close_items(hand, planes_only(1, 1), EMPTY_TREE, no_rounds(), closed, T, sections, own, items, 1, together, answer)
     stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
     stages = tuple(
         StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)
