@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .advance import advance, make_work, place_joints
+from .advance import advance, make_work
 from .compiling import allocating_kernel, inner_kernel, kernel
-from .exact import ExactArrays, describe_pair, last_mover, pose_movers, settle_pair, sweep_stage
+from .exact import ExactArrays, describe_pair, last_mover, pose_movers, sweep_stage
 from .family_pose import compose_inverse, copy_pose, pose_family
 from .family_section import cut_planes
 from .layout import (
-    HIT_FAMILY,
     HIT_GAP,
     HIT_GROUP,
     HIT_JOINT,
-    HIT_PLANE,
     ChainArrays,
     ClosingArrays,
     Floats,
@@ -26,6 +24,7 @@ from .layout import (
     Work,
 )
 from .segments import ALL, lock_held, lock_joints, move_groups, next_segment
+from .settling import settle
 from .sweeping import SweepWork, make_sweep_work
 from .touching import describe_hit, settle_hit
 from .tree import MeshTree
@@ -165,34 +164,6 @@ def enter_family(
         low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
         wanted = cut_planes(hand, family, low, high, tree, rounds, T, own, hand.family_plane[start], work.pose[1])
         answer.overflow[i] = max(answer.overflow[i], wanted)
-
-
-@inner_kernel
-def settle(
-    hand: HandArrays,
-    exact: ExactArrays,
-    T_palm_object: Floats,
-    start: int,
-    shared: SectionArrays,
-    own: SectionArrays,
-    items: ItemArrays,
-    i: int,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> None:
-    """Evaluate an item's contacts again at its final posture."""
-    if exact.wanted[i]:
-        pose_movers(exact, hand.chain, items.entry[i], answer.turn[i], sweep.poses)
-    touch = TOUCH_FRACTION * hand.family_length[start]
-    for n in range(answer.contacts[i]):
-        hit, point = answer.hit[i, n], answer.point[i, n]
-        if hit[HIT_PLANE] < 0:
-            T, place = answer.pose[i, hit[HIT_FAMILY]], work.place
-            place_joints(hand.chain, hit[HIT_FAMILY], answer.turn[i], place)
-            settle_pair(exact, hand.chain, T_palm_object, T, hit, point, touch, place, sweep)
-        else:
-            settle_hit(hand, start, shared, own, answer.turn[i], hit, point, work)
 
 
 @inner_kernel

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from clench.base.tolerances import PASSED_GAP, SWEEP_FRACTION
+from clench.base.tolerances import SWEEP_FRACTION
 
 from .advance import fill_chain, place_joints
 from .bodies import BodyArrays, pack_bodies
@@ -34,8 +34,7 @@ from .layout import (
     Ints,
     Work,
 )
-from .sweeping import SweepWork, bodies_overlap, body_gap, make_sweep_work, put_core, put_point
-from .touching import holds
+from .sweeping import SweepWork, bodies_overlap, make_sweep_work, put_core, put_point
 
 
 class ExactArrays(NamedTuple):
@@ -342,48 +341,3 @@ def describe_pair(
     point[0], point[1], point[2] = x + w * nx, y + w * ny, z + w * nz
     point[3], point[4], point[5] = nx, ny, nz
     point[HIT_GAP] = d - w - exact.links.radius[i]
-
-
-@inner_kernel
-def settle_pair(
-    exact: ExactArrays,
-    chain: ChainArrays,
-    T_palm_object: Floats,
-    T_palm_family: Floats,
-    hit: Ints,
-    point: Floats,
-    touch: float,
-    place: Floats,
-    sweep: SweepWork,
-) -> None:
-    """Evaluate an exact contact again with the links at `sweep.poses`; it may have rolled on to other elements.
-
-    Where the link only touches something else by now, which does not hold what was stopped, the contact is left behind.
-    """
-    m, met = hit[HIT_OUTLINE], hit[HIT_WHICH]
-    i, k = hit[HIT_FEATURE], hit[HIT_SOURCE]
-    sweep.winner[0], sweep.winner[1], sweep.winner[2] = i, k, m
-    describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
-    if abs(point[HIT_GAP]) <= touch:
-        return
-    on_object = met == exact.checked.shape[0]
-    copy_pose(sweep.poses[m], sweep.moving)
-    copy_pose(T_palm_object if on_object else sweep.poses[met], sweep.resting)
-    body_gap(exact.links, m, exact.object if on_object else exact.links, 0 if on_object else met, math.inf, 1.0, sweep)
-    keep_pair(sweep)
-    describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
-    if on_object and point[HIT_GAP] <= PASSED_GAP and not holds_exactly(chain, T_palm_family, hit, point, place):
-        sweep.winner[0], sweep.winner[1] = i, k
-        describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
-
-
-@inner_kernel
-def holds_exactly(chain: ChainArrays, T: Floats, hit: Ints, point: Floats, place: Floats) -> bool:
-    """Say what `holds` does of a point and a normal in the palm frame; `T` is `T_palm_family`."""
-    x, z, nx, nz = 0.0, 0.0, 0.0, 0.0
-    for r in range(3):
-        x += T[r, 0] * (point[r] - T[r, 3])
-        z += T[r, 2] * (point[r] - T[r, 3])
-        nx += T[r, 0] * point[3 + r]
-        nz += T[r, 2] * point[3 + r]
-    return bool(holds(chain, hit, x, z, nx, nz, place))

@@ -66,6 +66,13 @@ def step_to_plane(
 
 
 @inner_kernel
+def passes_by(placed: Floats, ka: int, fixed: Floats, kb: int, apart: float) -> bool:
+    """Say whether cores lie farther apart than that along the axis that everything turns about: it stays so."""
+    one, other = plane_gap(placed, ka, fixed, kb, 0.0, 1.0, 0.0), plane_gap(placed, ka, fixed, kb, 0.0, -1.0, 0.0)
+    return bool(max(one, other) > apart)
+
+
+@inner_kernel
 def turning_step(
     core: Floats,
     placed: Floats,
@@ -163,6 +170,8 @@ def sweep_pair(
                 apart = w > 0.0 and gap >= -OVERLAPPING * touch
                 return OVERLAP if flat and free == OVERLAP and not apart else s
             level, step = -1.0, free if s + free >= best else 0.5 * free
+        elif turn >= PLAIN and passes_by(placed, ka, fixed, kb, w + level):
+            return best
         elif turn >= PLAIN:
             # Edges that slide along each other: the closest points run, and no plane that rests lasts.
             longer = turning_step(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, level, leap, best - s)

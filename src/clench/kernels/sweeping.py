@@ -10,6 +10,7 @@ import numpy as np
 from .bodies import BodyArrays
 from .closest import crosses, separation
 from .compiling import inner_allocating_kernel, inner_kernel
+from .crossing import only_touch
 from .layout import Floats, Ints
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
@@ -185,7 +186,7 @@ def element_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: S
 
 @inner_kernel
 def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, work: SweepWork) -> bool:
-    """Say whether two bodies cross each other's surface; see `body_gap`. Round ones may overlap by `allowed`."""
+    """Say whether two bodies cut into each other; see `body_gap`. Round ones may overlap by `allowed`."""
     stack = work.stack
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
     waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
@@ -198,8 +199,12 @@ def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allo
             gap = element_gap(moving, a, resting, b, work)
             if a < 0 and b < 0:
                 corners, others = moving.corners[-1 - a], resting.corners[-1 - b]
-                if gap < -allowed or crosses(work.core, corners, work.fixed, others):
+                if gap < -allowed:
                     return True
+                if crosses(work.core, corners, work.fixed, others):
+                    round_ones = moving.radius[-1 - a] + resting.radius[-1 - b] > 0.0
+                    if round_ones or not only_touch(work.core, corners, work.fixed, others):
+                        return True
                 continue
             if gap > 0.0:
                 continue

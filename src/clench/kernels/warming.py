@@ -21,7 +21,7 @@ import numpy as np
 
 from .advance import advance
 from .closing import close_items
-from .exact import planes_only, settle_pair, sweep_stage
+from .exact import planes_only, sweep_stage
 from .family_section import cut_first_families
 from .frames import FrameArrays, place_links, relate_poses
 from .layout import (
@@ -37,6 +37,7 @@ from .layout import (
 from .link_meshes import LinkMeshArrays, ObjectMesh, find_contained, measure_depths
 from .nearness import smallest_gap
 from .overlap import find_overlaps
+from .settling import settle_pair
 from .sweeping import SweepWork
 from .touches import SurfaceArrays, TouchArrays, read_touches
 from .touching import describe_hit, settle_hit
