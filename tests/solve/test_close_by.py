@@ -1,11 +1,14 @@
 """Links that slide, roll and lie flush: neither stopped nor refused where they touch what is beside them at most."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import clench
-from chain_hands import HandBuilder, X, Y, along_x, mount, turned
+from chain_hands import HandBuilder, X, Y, Z, along_x, mount, turned
 from clench.base.pose import Pose
+from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import Shape, ShapeKind
 
@@ -31,7 +34,7 @@ def test_a_link_that_rolls_on_what_it_touches_still_touches_it(planes, tilt):
     assert held.position[[0, 2]] == pytest.approx([0.09, 0.03], abs=1e-8)
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-12, 5.327e-10, 6.161e-10, 8.325e-10, 1.283e-9, 1e-8])
+@pytest.mark.parametrize("gap", [1e-12, 5.327e-10, 6.161e-10, 8.325e-10, 1.283e-9, 1e-8])
 def test_a_finger_slides_past_a_parallel_one_however_close(gap):
     """Their sides are parallel, so the gap between them never changes, and both meet the box at the same angle."""
     link = Shape(ShapeKind.BOX, (0.02, 0.01, 0.004), Pose([0.02, 0.0, 0.0]))
@@ -54,6 +57,29 @@ def test_a_link_that_ends_with_its_side_flush_to_a_face_overlaps_nothing(turn):
     solution = clench.solve(hand.hand(), GraspObject.from_shape(Shape(ShapeKind.BOX, (0.01, 0.01, 0.02))), command)
     assert solution.joint_angles["index_0"] == 0.3
     assert solution.certified, solution.certificate
+
+
+def bipyramid(steep, flat, corners=4, radius=0.01):
+    """Return a body of two pyramids on one ring, with these slopes up and down [degrees]."""
+    around = 2.0 * np.pi * np.arange(corners) / corners
+    ring = radius * np.column_stack([np.cos(around), np.sin(around), np.zeros(corners)])
+    tips = [[0.0, 0.0, radius * np.tan(np.radians(steep))], [0.0, 0.0, -radius * np.tan(np.radians(flat))]]
+    k = np.arange(corners)
+    up = np.column_stack([k, (k + 1) % corners, np.full(corners, corners)])
+    down = np.column_stack([(k + 1) % corners, k, np.full(corners, corners + 1)])
+    mesh = TriangleMesh(np.vstack([ring, tips]), np.vstack([up, down]))
+    return Shape(ShapeKind.MESH, mesh=mesh)
+
+
+@pytest.mark.parametrize("corners", [3, 4, 12])
+def test_links_that_share_a_ring_of_edges_and_most_of_their_volume_are_refused(corners):
+    """Every two of their faces are on either side of some plane, but the bodies are not."""
+    one, other = bipyramid(75.0, 60.0, corners), bipyramid(60.0, 75.0, corners)
+    builder = HandBuilder(palm=one).finger("idle", [None, along_x(0.002, 0.02)], [0.1, 0.02], upper=0.1)
+    hand = builder.finger("spinning", [other], [0.02], axes=[Z], upper=0.1).hand()
+    hand = replace(hand, allowed_pairs=())
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.1, 0.1, 0.3]))
+    assert not clench.solve(hand, GraspObject.load("ball"), command).certified
 
 
 def test_fingers_of_one_section_that_lie_in_each_other_are_refused():

@@ -303,12 +303,12 @@ def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, 
     for m in range(links):
         copy_pose(poses[m], sweep.moving)
         copy_pose(T_palm_object, sweep.resting)
-        if bodies_overlap(exact.links, m, exact.object, 0, allowed, sweep):
+        if bodies_overlap(exact.links, m, exact.object, 0, allowed, True, sweep):
             return m, links
         for r in range(m):
             if exact.checked[m, r] != 0 and boxes_meet(exact.links.box, poses, m, r):
                 copy_pose(poses[r], sweep.resting)
-                if bodies_overlap(exact.links, m, exact.links, r, allowed, sweep):
+                if bodies_overlap(exact.links, m, exact.links, r, allowed, False, sweep):
                     return m, r
     return -1, -1
 

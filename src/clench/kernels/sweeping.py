@@ -185,8 +185,15 @@ def element_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: S
 
 
 @inner_kernel
-def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, work: SweepWork) -> bool:
-    """Say whether two bodies cut into each other; see `body_gap`. Round ones may overlap by `allowed`."""
+def bodies_overlap(
+    moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, work: SweepWork
+) -> bool:
+    """Say whether two bodies cross each other's surface; see `body_gap`. Round ones may overlap by `allowed`.
+
+    Args:
+        flush: sharp faces that only touch do not count. Faces alone do not tell bodies whose edges coincide from such
+            that lie in each other: only where depth is measured as well.
+    """
     stack = work.stack
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
     waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
@@ -202,8 +209,8 @@ def bodies_overlap(moving: BodyArrays, m: int, resting: BodyArrays, r: int, allo
                 if gap < -allowed:
                     return True
                 if crosses(work.core, corners, work.fixed, others):
-                    round_ones = moving.radius[-1 - a] + resting.radius[-1 - b] > 0.0
-                    if round_ones or not only_touch(work.core, corners, work.fixed, others):
+                    sharp = moving.radius[-1 - a] + resting.radius[-1 - b] == 0.0
+                    if not (flush and sharp and only_touch(work.core, corners, work.fixed, others)):
                         return True
                 continue
             if gap > 0.0:
