@@ -15,7 +15,6 @@ import pytest
 
 from clench.kernels import compiling
 
-
 #: When it is looked again whether a test that takes too long can be ended [s].
 LATER = 0.1
 
