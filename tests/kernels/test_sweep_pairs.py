@@ -125,16 +125,20 @@ def test_a_pair_that_takes_too_many_planes_ends_where_it_is_free():
     assert np.hypot(0.05 * np.cos(found) + 0.05 + 1e-6, 0.05 * np.sin(found)) >= 1e-6
 
 
+def all_but_parallel(rng, sine):
+    """Return a place, two directions with this sine between them, and unit vectors across both, aside and up."""
+    at, u = rng.normal(size=3) * 0.04, rng.normal(size=3) * 0.02
+    across = np.cross(u, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    return at, u, u + sine * np.linalg.norm(u) * across, across, np.cross(u, across) / np.linalg.norm(u)
+
+
 @pytest.mark.parametrize("sine", [1.2e-8, 3e-8, 5e-7])
 def test_round_edges_that_touch_and_are_all_but_parallel_do_not_overlap(sine):
     """The plane across such edges is known to 1e-16 / sine only, their distance to the last digit."""
     for seed in range(300):
         rng = np.random.default_rng(seed)
-        at, u = rng.normal(size=3) * 0.04, rng.normal(size=3) * 0.02
-        across = np.cross(u, rng.normal(size=3))
-        across /= np.linalg.norm(across)
-        up = np.cross(u, across) / np.linalg.norm(u)
-        v = u + sine * np.linalg.norm(u) * across
+        at, u, v, across, up = all_but_parallel(rng, sine)
         w = 10 ** rng.uniform(-6, -2)
         face = [at + 0.5 * u, at - 0.7 * u, at + 0.1 * across]
         edge = [at + 0.4 * v - w * up, at - 0.6 * v - w * up]
@@ -146,11 +150,7 @@ def test_sharp_edges_that_touch_and_are_all_but_parallel_do_not_overlap(sine):
     """A face stands on an edge of another; in height they overlap by less than the touch tolerance."""
     for seed in range(100):
         rng = np.random.default_rng(seed)
-        at, u = rng.normal(size=3) * 0.04, rng.normal(size=3) * 0.02
-        across = np.cross(u, rng.normal(size=3))
-        across /= np.linalg.norm(across)
-        up = np.cross(u, across) / np.linalg.norm(u)
-        v = u + sine * np.linalg.norm(u) * across
+        at, u, v, across, up = all_but_parallel(rng, sine)
         deep = rng.uniform(0.0, 1e-12)
         above = [at + 0.5 * u, at - 0.7 * u, at + rng.uniform(-0.02, 0.02) * across + rng.uniform(1e-6, 0.02) * up]
         below = [at + 0.4 * v, at - 0.6 * v, at + rng.uniform(-0.02, 0.02) * across - rng.uniform(1e-6, 0.02) * up]

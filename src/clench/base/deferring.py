@@ -2,82 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 
-class DeferredMapping(Mapping[str, Any]):
-    """Hold a mapping that costs more to make than most readers want to wait for; it equals what it holds.
+class _Deferred:
+    """Hold what costs more to make than most readers want to wait for.
 
     Args:
-        make: returns the mapping; called once at most, unless two threads read it at once for the first time.
+        make: returns it; called once at most, unless two threads read it at once for the first time.
     """
 
-    def __init__(self, make: Callable[[], Mapping[str, Any]]) -> None:
-        self._make: Callable[[], Mapping[str, Any]] | None = make
-        self._made: dict[str, Any] = {}
+    #: What it is once it is made, and what a copy of it is.
+    _kind: ClassVar[type[Any]]
+
+    def __init__(self, make: Callable[[], Iterable[Any]]) -> None:
+        self._make: Callable[[], Iterable[Any]] | None = make
+        self._made: Any = None
 
     @property
     def is_made(self) -> bool:
         """Whether it has been read."""
         return self._make is None
 
-    def _all(self) -> dict[str, Any]:
+    def _all(self) -> Any:
         make = self._make
         if make is not None:
-            self._made = dict(make())
+            self._made = self._kind(make())
             self._make = None
         return self._made
 
-    def __getitem__(self, key: str) -> Any:
+    def __getitem__(self, key: Any) -> Any:
         return self._all()[key]
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def __reduce__(self) -> tuple[type[Any], tuple[Any]]:
+        """Be copied and pickled as what it holds."""
+        return self._kind, (self._all(),)
+
+
+class DeferredMapping(_Deferred, Mapping[str, Any]):
+    """A mapping that is made when it is first read; it equals what it holds, and its copies are plain."""
+
+    _kind = dict
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._all())
 
-    def __len__(self) -> int:
-        return len(self._all())
 
-    def __repr__(self) -> str:
-        return repr(self._all())
+class DeferredSequence(_Deferred, Sequence[Any]):
+    """A sequence that is made when it is first read; its copies are plain tuples."""
 
-    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
-        """Be copied and pickled as the plain mapping."""
-        return dict, (self._all(),)
-
-
-class DeferredSequence(Sequence[Any]):
-    """Hold a sequence that costs more to make than most readers want to wait for.
-
-    Args:
-        make: returns the sequence; called once at most, unless two threads read it at once for the first time.
-    """
-
-    def __init__(self, make: Callable[[], Sequence[Any]]) -> None:
-        self._make: Callable[[], Sequence[Any]] | None = make
-        self._made: tuple[Any, ...] = ()
-
-    @property
-    def is_made(self) -> bool:
-        """Whether it has been read."""
-        return self._make is None
-
-    def _all(self) -> tuple[Any, ...]:
-        make = self._make
-        if make is not None:
-            self._made = tuple(make())
-            self._make = None
-        return self._made
-
-    def __getitem__(self, index: Any) -> Any:
-        return self._all()[index]
-
-    def __len__(self) -> int:
-        return len(self._all())
-
-    def __repr__(self) -> str:
-        return repr(self._all())
-
-    def __reduce__(self) -> tuple[type[tuple[Any, ...]], tuple[tuple[Any, ...]]]:
-        """Be copied and pickled as the plain tuple."""
-        return tuple, (self._all(),)
+    _kind = tuple

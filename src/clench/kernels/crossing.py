@@ -8,22 +8,21 @@ from .closest import edge_count, face_normal
 from .compiling import inner_kernel
 from .core_motion import plane_gap
 from .layout import Floats
+from .leaving import Vector, side
 
 #: Surfaces that cross by no more than this touch [m].
 DEEP = 1e-9
 #: Directions shorter than this fraction of what they are made of are none [-].
 _NONE = 1e-9
 
-Vector = tuple[float, float, float]
-
 
 @inner_kernel
-def looks_right(core: Floats, corners: int, n: Vector, side: float) -> bool:
-    """Say whether a face that lies across n looks to the given side of it, so that its body is on the other."""
+def looks_right(core: Floats, corners: int, n: Vector, way: float) -> bool:
+    """Say whether a face that lies across n looks the given way along it, so that its body is on the other."""
     if corners < 3 or -plane_gap(core, corners, core, corners, n[0], n[1], n[2]) > DEEP:
         return True
     mx, my, mz, _ = face_normal(core)
-    return side * (mx * n[0] + my * n[1] + mz * n[2]) >= 0.0
+    return way * (mx * n[0] + my * n[1] + mz * n[2]) >= 0.0
 
 
 @inner_kernel
@@ -40,13 +39,6 @@ def keeps_apart(a: Floats, ka: int, b: Floats, kb: int, n: Vector) -> bool:
         if apart and looks_right(a, ka, m, -1.0) and looks_right(b, kb, m, 1.0):
             return True
     return False
-
-
-@inner_kernel
-def edge(core: Floats, corners: int, k: int) -> Vector:
-    """Return a core's edge from corner `k` on."""
-    j = (k + 1) % corners
-    return core[j, 0] - core[k, 0], core[j, 1] - core[k, 1], core[j, 2] - core[k, 2]
 
 
 @inner_kernel
@@ -78,13 +70,13 @@ def only_touch(a: Floats, ka: int, b: Floats, kb: int) -> bool:
         if keeps_apart(a, ka, b, kb, n):
             return True
         for k in range(edge_count(ka) + edge_count(kb)):
-            u = edge(a, ka, k) if k < edge_count(ka) else edge(b, kb, k - edge_count(ka))
+            u = side(a, ka, k) if k < edge_count(ka) else side(b, kb, k - edge_count(ka))
             spans, m = across(u, n)
             if spans and keeps_apart(a, ka, b, kb, m):
                 return True
     for i in range(edge_count(ka)):
         for k in range(edge_count(kb)):
-            spans, m = across(edge(a, ka, i), edge(b, kb, k))
+            spans, m = across(side(a, ka, i), side(b, kb, k))
             if spans and keeps_apart(a, ka, b, kb, m):
                 return True
     return False
