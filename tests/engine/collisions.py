@@ -95,6 +95,33 @@ class Collisions:
                 q[j] = end[j]
         return postures
 
+    def path_at_once(self, start: Floats, end: Floats) -> list[Floats]:
+        """Return postures on the way of joints that all move at speed 1, and 1e-5 rad before each of them stops."""
+        rates = np.zeros(len(start))
+        for finger in self.hand.fingers:
+            for j in finger.joints:
+                if self.hand.joints[j].role is JointRole.CLOSING and j not in self.followers:
+                    rates[j] = 1.0
+        for c in self.hand.couplings:
+            rates[c.follower] = abs(c.ratio) * rates[c.leader]
+        run = end - start
+        stops = sorted({float(abs(run[j])) for j in np.flatnonzero(rates == 1.0)})
+        travels = [*np.linspace(0.0, stops[-1], 4 * _LOOKS), *(max(s - BACK, 0.0) for s in stops)]
+        return [start + np.sign(run) * np.minimum(rates * s, np.abs(run)) for s in sorted(travels)]
+
+    def wrong_at_once(self, solution: clench.GraspSolution) -> tuple[Counter[str], list[str]]:
+        """Return what was looked at, and what collides on the path of a hand whose fingers all close at once."""
+        T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
+        start = np.array([solution.open_angles[name] for name in self.hand.joint_names])
+        end = np.array([solution.joint_angles[name] for name in self.hand.joint_names])
+        counted: Counter[str] = Counter(contacts=len(solution.contacts))
+        for q in [*self.path_at_once(start, end), end]:
+            counted["postures"] += 1
+            hit = [name for f in self.hand.fingers for name in self.collide(q, T_object_palm, f)]
+            if hit or (hit := [str(pair) for pair in self.collide_among(q)]):
+                return counted, [f"{hit} collide at {np.round(q, 6).tolist()}"]
+        return counted, []
+
     def wrong(self, solution: clench.GraspSolution) -> tuple[Counter[str], list[str]]:
         """Return what was looked at, and what is wrong with a certified solution, as sentences.
 

@@ -74,6 +74,23 @@ def test_a_certified_grasp_overlaps_nothing_and_stops_at_what_it_touches(shared_
 
 
 @pytest.mark.shared
+@pytest.mark.parametrize("model", HANDS.values(), ids=HANDS)
+def test_a_certified_grasp_of_fingers_that_move_at_once_overlaps_nothing(shared_data, model):
+    """Fingers whose closing joints are not parallel (LEAP) among them; links of the hand count as well."""
+    hand = clench.Hand.load(shared_data / model)
+    obj = clench.GraspObject.load(shared_data / OBJECTS["mug"])
+    collisions, seen = Collisions(hand, obj), 0
+    for pose in clench.approach_poses(hand, obj, 2, seed=1):
+        command = clench.GraspCommand(hand_pose=pose, order=clench.ClosingOrder.TOGETHER)
+        solution = clench.solve(hand, obj, command)
+        if solution.certified:
+            counted, wrong = collisions.wrong_at_once(solution)
+            assert not wrong, wrong
+            seen += counted["contacts"]
+    assert seen >= 1
+
+
+@pytest.mark.shared
 @pytest.mark.parametrize("model", ["Barrett", "D'Claw"])
 def test_nothing_is_left_between_the_planes(shared_data, model):
     """On a single plane each, fingers overlap the glass; the full width does not, with as few planes."""

@@ -53,11 +53,11 @@ def test_speeds_and_accelerations_are_differences_and_within_their_bounds(seed):
     tightest = np.zeros(2)
     for k in range(3):
         before, now, after = (placed(core, chain, s + d)[k] @ n for d in (-h, 0.0, h))
-        slope, curvature, lever, bound = corner_motion(core, k, chain, len(chain), n[0], n[2], s)
+        slope, curvature, lever, bound = corner_motion(core, k, chain, len(chain), *n, s)
         assert slope == pytest.approx((after - before) / (2.0 * h), abs=1e-7)
         assert curvature == pytest.approx((after - 2.0 * now + before) / h**2, abs=1e-5)
         for turn in np.linspace(-2.0, 2.0, 9):
-            there = corner_motion(core, k, chain, len(chain), n[0], n[2], s + turn)
+            there = corner_motion(core, k, chain, len(chain), *n, s + turn)
             assert abs(there[0]) <= lever + 1e-15
             assert abs(there[1]) <= bound + 1e-15
             assert there[2:] == pytest.approx((lever, bound), rel=1e-12)
@@ -68,7 +68,7 @@ def test_speeds_and_accelerations_are_differences_and_within_their_bounds(seed):
         assert [lever, bound] == pytest.approx(tightest, rel=1e-12)
     one, other = (
         base_motion(chain, len(chain), n[0], n[2], s),
-        corner_motion(core * 0.0, 0, chain, len(chain), *n[::2], s),
+        corner_motion(core * 0.0, 0, chain, len(chain), *n, s),
     )
     assert one[2:] == pytest.approx(other, abs=1e-15)
 

@@ -101,7 +101,7 @@ def test_meshes_that_cross_against_the_other_engine(triangles: int) -> None:
         shapes = [(points * (1.0 if triangles > 1 else 5.0), faces[:triangles]), blob(rng, 0.02)]
         poses = np.stack([pose(rng, 0.06 * rng.normal(size=3)), pose(rng, np.zeros(3))])
         links = pack_bodies([Elements(p, f, np.zeros(len(f))) for p, f in shapes])
-        work = make_sweep_work(np.empty((1, 3)), 0)
+        work = make_sweep_work(0, 0)
         work.moving[:], work.resting[:] = poses
         engines = [engine(*shapes[k], poses[k]) for k in (0, 1)]
         crossing = fcl.collide(*engines, fcl.CollisionRequest(), fcl.CollisionResult()) > 0

@@ -16,7 +16,10 @@ from oracle.test_against_oracle import judge
 from oracle.width import judge_places
 from resumable import each
 
-ORDERS = ("proximal-first", "together", "speeds", "fingertip")
+ORDERS = (
+    *("proximal-first", "together", "speeds", "fingertip"),
+    *("tilted proximal-first", "tilted together", "tilted speeds", "tilted fingertip"),
+)
 #: Cases of one piece of work; places of the object for each random finger of the full width.
 PLANAR, FINGERS, PLACES = 500, 20, 10
 COLUMNS = ("cases", "blocked", "contacts", "stages", "grazing", "unresolved", "wrong")

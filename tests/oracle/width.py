@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 import clench
 from chain_hands import HandBuilder, along_x
-from clench.base.pose import Pose
+from clench.base.pose import Pose, rotation_about
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject
@@ -229,19 +229,31 @@ class Oracle:
         found.unresolved += 1
 
 
-def make_case(seed: int) -> Case:
-    """Return a random finger of 1 to 4 joints, some coupled, and a random object: thick, thin, pointed or round."""
+def make_case(seed: int, tilted: bool = False) -> Case:
+    """Return a random finger of 1 to 4 joints, some coupled, and a random object: thick, thin, pointed or round.
+
+    Args:
+        tilted: the joints' axes are not parallel, by anything from 3e-6 rad to a right angle.
+    """
     rng = np.random.default_rng([77, seed])
     joints = int(rng.integers(1, 5))
     lengths = rng.uniform(0.02, 0.05, joints)
     shapes = [link_shape(rng, float(length)) for length in lengths]
-    hand = HandBuilder().finger("index", shapes, lengths, upper=2.2)
+    axes = tilted_axes(seed, joints) if tilted else None
+    hand = HandBuilder().finger("index", shapes, lengths, axes=axes, upper=2.2)
     if joints > 1 and rng.random() < 0.5:
         follower = int(rng.integers(1, joints))
         hand = hand.couple(f"index_{follower - 1}", f"index_{follower}", float(rng.uniform(0.3, 1.2)))
     body = object_shape(rng)
     obj = GraspObject.from_shape(body, name="thing")
     return Case(hand.hand(), obj, random_place(rng, float(lengths.sum())))
+
+
+def tilted_axes(seed: int, joints: int) -> list[Floats]:
+    """Return the axes of a finger's joints, each tilted off -y by its own angle about a random direction."""
+    rng = np.random.default_rng([80, seed])
+    tilts = 10.0 ** rng.uniform(-5.5, 0.2, joints)
+    return [rotation_about(unit(rng.normal(size=3)), float(tilt)) @ [0.0, -1.0, 0.0] for tilt in tilts]
 
 
 def random_place(rng: np.random.Generator, length: float) -> Pose:
@@ -311,9 +323,10 @@ def judge_places(seed: int, order: str, places: int) -> list[Judged]:
     """Close one finger on one object in so many places, and judge every answer; the first is that of the case.
 
     Args:
-        order: of closing; `speeds` is `together` with a random speed per joint.
+        order: of closing; `speeds` is `together` with a random speed per joint; `tilted` before it tilts the axes.
     """
-    case = make_case(seed)
+    tilted, order = order.startswith("tilted "), order.removeprefix("tilted ")
+    case = make_case(seed, tilted)
     oracle = Oracle(case)
     rng = np.random.default_rng([78, seed])
     length = sum(float(link.T_parent_link[0, 3]) for link in case.hand.links[2:]) + 0.035
@@ -323,7 +336,10 @@ def judge_places(seed: int, order: str, places: int) -> list[Judged]:
         case = replace(case, place=place)
         oracle.place = place.matrix
         judged = _judge(case, oracle, seed, order)
-        judged.wrong = [f"{order}, seed {seed}, place {number}: {sentence}" for sentence in judged.wrong]
+        judged.wrong = [
+            f"{'tilted ' if tilted else ''}{order}, seed {seed}, place {number}: {sentence}"
+            for sentence in judged.wrong
+        ]
         found.append(judged)
     return found
 

@@ -45,7 +45,8 @@ class HandPlan:
     Args:
         plans: one per finger and posture, in entry order. finger: index into the command's fingers of each entry.
         posture: index of the posture alternative of each entry.
-        arrays: the plans packed. items: one per entry and plane, then the full width, if wanted.
+        arrays: the plans packed. items: one per entry and plane, then the full width, if wanted; of a finger that does
+            not lie in planes, the full width alone, without planes.
         whole: whether each item is the full width. together: all joints of a finger move at once.
     """
 
@@ -91,17 +92,27 @@ class ClosedHand:
 
 
 def make_hand_plan(
-    plans: Sequence[FingerPlan], finger: Sequence[int], posture: Sequence[int], full_width: bool, together: bool
+    plans: Sequence[FingerPlan],
+    finger: Sequence[int],
+    posture: Sequence[int],
+    full_width: bool,
+    together: bool,
+    again: bool = False,
 ) -> HandPlan:
-    """Pack plans and list their items of work."""
+    """Pack plans and list their items of work.
+
+    Args:
+        plans, finger, posture, together: see `HandPlan`. full_width: wanted. again: joints move in several rounds.
+    """
     from clench.kernels.layout import ItemArrays
 
     rows = []
     for entry, plan in enumerate(plans):
         count = len(plan.families[0].offsets)
-        rows += [(entry, k, k + 1, 0) for k in range(count)]
+        planar = plan.lies_in_planes(together or again)
+        rows += [(entry, k, k + 1, 0) for k in range(count) if planar]
         if full_width:
-            rows.append((entry, 0, count, 1))
+            rows.append((entry, 0, count if planar else 0, 1))
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
     entries, low, high = (np.ascontiguousarray(table[:, k]) for k in range(3))
     arrays = pack_plans(plans)

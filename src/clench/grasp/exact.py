@@ -9,7 +9,6 @@ import numpy as np
 
 from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
-from clench.base.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
 
 _KEPT_HANDS: Final = 16
-_KEPT_PLANS: Final = 256
 
 
 class HandBodies(NamedTuple):
@@ -110,9 +108,8 @@ def _movers(hand: Hand, plan: FingerPlan, first: int) -> list[tuple[int, int]]:
 def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
     """Return axis and anchor of a joint in the palm frame at the open posture; a positive turn takes x towards z."""
     joint = plan.joints[k]
-    T = plan.families[joint.family].T_palm_family
-    anchor: FloatArray = T[:3, 3] + T[:3, 0] * joint.pivot[0] + T[:3, 2] * joint.pivot[1]
-    return -T[:3, 1], anchor
+    family = plan.families[joint.family]
+    return -family.T_palm_family[:3, 1], family.pivot_in_palm(joint.pivot)
 
 
 @kept_by_identity(_KEPT_HANDS)
@@ -123,22 +120,3 @@ def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -
         max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)
         for sizes in ([(s.kind, s.size) for s in shapes], packed.round_sizes)
     )
-
-
-@kept_by_identity(_KEPT_PLANS)
-def tilt_deviation(hand: Hand, plan: FingerPlan) -> float:
-    """Return how far links of a finger may get from where they are swept [m]: 0 but for coupled joints out of parallel.
-
-    Coupled joints turn about their family's axis `a'`, tilted by δ from their own `a`. With `R' = Q R Qᵀ`, Q the tilt,
-    `‖R' - R‖ ≤ 2 ‖Q - I‖ ‖R - I‖ ≤ 4 δ sin(θ/2)` for a turn of θ; that many lengths of the finger, joint by joint.
-    """
-    poses = hand.link_poses(plan.posture)
-    mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
-    total = 0.0
-    for p in plan.joints:
-        own = poses[mover[p.joint]][:3, :3] @ hand.joints[p.joint].axis
-        tilt = float(np.linalg.norm(np.cross(own, plan.families[p.family].T_palm_family[:3, 1])))
-        if tilt > PARALLEL_ANGLE:
-            turn = min(abs(p.rate) * (p.stop - p.start), np.pi)
-            total += 4.0 * tilt * float(np.sin(0.5 * turn)) * plan.length
-    return total

@@ -12,7 +12,7 @@ import numpy as np
 
 from clench.base.errors import HandError
 from clench.base.pose import FloatArray, invert
-from clench.base.tolerances import CLOSING_ANGLE, PARALLEL_ANGLE
+from clench.base.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.shapes import CollisionSource
 
@@ -71,6 +71,11 @@ class CurlFamily:
     outlines: tuple[tuple[LinkOutline, ...], ...]
     reach: float
 
+    def pivot_in_palm(self, pivot: FloatArray) -> FloatArray:
+        """Return a pivot of its joints in the palm frame at the open posture [m], shape (3,)."""
+        T = self.T_palm_family
+        return np.asarray(T[:3, 3] + T[:3, 0] * pivot[0] + T[:3, 2] * pivot[1])
+
 
 @dataclass(frozen=True, eq=False)
 class FingerPlan:
@@ -94,6 +99,17 @@ class FingerPlan:
     breaks: tuple[bool, ...]
     families: tuple[CurlFamily, ...]
     length: float
+
+    def lies_in_planes(self, again: bool) -> bool:
+        """Say whether only joints of one family ever move at once, those before them resting: then planes tell all.
+
+        Args:
+            again: all joints move at once, or in several rounds.
+        """
+        homes: dict[int, set[int]] = {}
+        for p in self.joints:
+            homes.setdefault(0 if again else p.group, set()).add(p.family)
+        return all(len(families) == 1 for families in homes.values())
 
     def turned(self, hand: Hand, turn: FloatArray) -> FloatArray:
         """Return the angles of all joints of the hand when the plan's joints have turned, shape (J,) [rad]."""
@@ -137,7 +153,7 @@ def plan_finger(
     mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
     axes = {j: poses[mover[j]][:3, :3] @ hand.joints[j].axis * hand.joints[j].direction for j in closing}
     anchors = {j: (poses[mover[j]] @ np.append(hand.joints[j].anchor, 1.0))[:3] for j in closing}
-    split = _families(hand, closing, axes, leaders)
+    split = _families(closing, axes)
     moved_by = last_closing_joint(hand, finger, closing)
     frames = [_frame(hand, closing, f, axes, anchors, poses, moved_by, source) for f in split]
     joints = []
@@ -204,46 +220,15 @@ def _leaders(hand: Hand, closing: list[int]) -> dict[int, int]:
     return leaders
 
 
-def _families(hand: Hand, closing: list[int], axes: dict[int, FloatArray], leaders: dict[int, int]) -> list[list[int]]:
-    """Split closing joints into runs of parallel axes; coupled joints stay together.
-
-    Raises:
-        HandError: coupled joints whose axes are more than 5 degrees apart.
-    """
+def _families(closing: list[int], axes: dict[int, FloatArray]) -> list[list[int]]:
+    """Split closing joints into runs of parallel axes."""
     families: list[list[int]] = []
     for j in closing:
-        coupled = [k for k in closing if leaders[k] == leaders[j] and k != j]
-        if families:
-            first = families[-1][0]
-            angle = float(np.linalg.norm(np.cross(axes[first], axes[j])))
-            together = any(k in families[-1] for k in coupled)
-            if together and angle > np.sin(CLOSING_ANGLE):
-                raise HandError(
-                    f"{hand.name}: joints '{hand.joints[first].name}' and '{hand.joints[j].name}' are coupled but "
-                    f"their axes are {np.degrees(np.arcsin(min(angle, 1.0))):.1f} degrees apart; curl planes need "
-                    "coupled joints to be parallel to 5 degrees."
-                )
-            if angle <= PARALLEL_ANGLE or together:
-                families[-1].append(j)
-                continue
-        families.append([j])
-    _check_groups(hand, families, leaders)
+        if families and np.linalg.norm(np.cross(axes[families[-1][0]], axes[j])) <= PARALLEL_ANGLE:
+            families[-1].append(j)
+        else:
+            families.append([j])
     return families
-
-
-def _check_groups(hand: Hand, families: list[list[int]], leaders: dict[int, int]) -> None:
-    """Refuse coupled joints with a joint between them that closes about another axis.
-
-    Raises:
-        HandError: with the names of the coupled joints.
-    """
-    home = {j: f for f, members in enumerate(families) for j in members}
-    for j, leader in leaders.items():
-        if leader not in home or home[leader] != home[j]:
-            raise HandError(
-                f"{hand.name}: joints '{hand.joints[leader].name}' and '{hand.joints[j].name}' are coupled, but a "
-                "closing joint between them turns about another axis; curl planes need them side by side."
-            )
 
 
 def last_closing_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[int, int]:

@@ -197,8 +197,7 @@ def _link_speeds(hand: Hand, c: FingerCandidate, bodies: HandBodies) -> dict[int
     """Return bounds on how fast each joint of a plan moves the points of links that can touch [m per motion], (n,)."""
     moved_by = last_closing_joint(hand, c.plan.finger, [p.joint for p in c.plan.joints])
     poses = hand.link_poses(c.plan.posture)
-    T = c.plan.families[0].T_palm_family
-    pivots = [T[:3, 3] + T[:3, 0] * p.pivot[0] + T[:3, 2] * p.pivot[1] for p in c.plan.joints]
+    pivots = [c.plan.families[p.family].pivot_in_palm(p.pivot) for p in c.plan.joints]
     rates = [abs(p.rate) * c.plan.speeds[p.group] for p in c.plan.joints]
     order = [p.joint for p in c.plan.joints]
     speeds = {}

@@ -102,7 +102,7 @@ def close_poses(
         answers: see `ClosingArrays`, with the poses first; `overflow` is written for all items of a pose.
     """
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
-    sweep = make_sweep_work(work.chain, exact.checked.shape[0])
+    sweep = make_sweep_work(hand.chain.rate.shape[0], exact.checked.shape[0])
     for n in range(T_palm_object.shape[0]):
         answer, T, one = answer_at(answers, n), T_palm_object[n], min(n, link_pose.shape[0] - 1)
         overflow = cut_first_families(hand, tree, rounds, T, shared, work.pose)

@@ -8,9 +8,10 @@ from .bodies import BodyArrays
 from .closest import separation
 from .compiling import inner_kernel
 from .core_motion import plane_offset
-from .earliest import ball_entry, core_misses, measure_of, stays_above
+from .earliest import ball_entry, core_misses, measure_of, stays_above, walk_ball
+from .layout import Floats
 from .sweep_pairs import sweep_pair
-from .sweeping import SweepWork, point_distance, put_ball, put_item, split_pair
+from .sweeping import SweepWork, put_ball, put_item, split_pair
 
 #: How coarsely the sweep of an element against a node's ball is settled, as a fraction of the ball's radius [-].
 COARSE = 0.25
@@ -18,25 +19,29 @@ COARSE = 0.25
 
 @inner_kernel
 def earliest_meeting(
-    moving: BodyArrays, a: int, resting: BodyArrays, b: int, count: int, speed: float, touch: float, work: SweepWork
+    moving: BodyArrays,
+    a: int,
+    resting: BodyArrays,
+    b: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    limit: float,
+    work: SweepWork,
 ) -> float:
     """Return a bound on when the balls of two items come within `touch`: a `turn_measure`, for several joints a travel.
 
     Args:
-        speed: no point of the moving body is faster [m per travel]. The rest as in `sweep_body`.
+        limit: later ones are of no interest, in the same measure. The rest as in `sweep_body`.
     """
     reach = put_ball(moving, a, work.moving, work.core[0]) + put_ball(resting, b, work.resting, work.fixed[0]) + touch
     if count > 1:
-        for i in range(count - 1):
-            work.core[0, 0] += work.chain[i, 1]
-            work.core[0, 2] += work.chain[i, 2]
-        apart = point_distance(work.core, work.fixed) - reach
-        return 0.0 if apart <= 0.0 else apart / speed
+        return float(walk_ball(work.core, work.fixed, reach, chain, count, limit, work.placed))
     square = reach * reach - (work.core[0, 1] - work.fixed[0, 1]) ** 2
     if square < 0.0:
         return math.inf
     # Mirrored where the joint turns from z to x.
-    sense = 1.0 if work.chain[0, 0] > 0.0 else -1.0
+    sense = 1.0 if chain[0, 0] > 0.0 else -1.0
     return ball_entry(work.core[0, 0], sense * work.core[0, 2], work.fixed[0, 0], sense * work.fixed[0, 2], square)
 
 
@@ -46,8 +51,8 @@ def keep_earliest(
     resting: BodyArrays,
     low: int,
     high: int,
+    chain: Floats,
     count: int,
-    speed: float,
     touch: float,
     limit: float,
     work: SweepWork,
@@ -60,7 +65,7 @@ def keep_earliest(
     stack, keys, kept = work.stack, work.keys, low
     for k in range(low, high):
         a, b = stack[k, 0], stack[k, 1]
-        key = earliest_meeting(moving, a, resting, b, count, speed, touch, work)
+        key = earliest_meeting(moving, a, resting, b, chain, count, touch, limit, work)
         if key >= limit and key > 0.0:
             continue
         n = kept
@@ -82,6 +87,7 @@ def part_misses(
     kb: int,
     wa: float,
     wb: float,
+    chain: Floats,
     count: int,
     touch: float,
     best: float,
@@ -96,10 +102,8 @@ def part_misses(
         if a < 0 and b < 0:
             return False
         near = COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
-        return (
-            sweep_pair(work.core, ka, work.fixed, kb, wa + wb, work.chain, count, near, best, True, work.placed) >= best
-        )
-    sense, turn = (1.0 if work.chain[0, 0] > 0.0 else -1.0), abs(work.chain[0, 0]) * best
+        return sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, near, best, True, work.placed) >= best
+    sense, turn = (1.0 if chain[0, 0] > 0.0 else -1.0), abs(chain[0, 0]) * best
     if a < 0:
         # Seen from the moving element, the other body turns backwards.
         reach = wa + put_ball(resting, b, work.resting, work.placed[0]) + touch
@@ -117,12 +121,14 @@ def lay_plane(ka: int, wa: float, kb: int, wb: float, work: SweepWork) -> None:
 
 
 @inner_kernel
-def plane_parts(ka: int, wa: float, kb: int, wb: float, count: int, best: float, work: SweepWork) -> bool:
+def plane_parts(
+    ka: int, wa: float, kb: int, wb: float, chain: Floats, count: int, best: float, work: SweepWork
+) -> bool:
     """Say whether the plane of `work` keeps the two items there apart until `best`."""
     nx, ny, nz, offset = work.plane[0], work.plane[1], work.plane[2], work.plane[3]
     if plane_offset(work.fixed, kb, nx, ny, nz) + wb > offset:
         return False
-    return stays_above(work.core, work.placed, ka, work.chain, count, nx, ny, nz, offset + wa, best)
+    return stays_above(work.core, work.placed, ka, chain, count, nx, ny, nz, offset + wa, best)
 
 
 @inner_kernel
@@ -131,8 +137,8 @@ def sweep_body(
     m: int,
     resting: BodyArrays,
     r: int,
+    chain: Floats,
     count: int,
-    speed: float,
     touch: float,
     best: float,
     work: SweepWork,
@@ -144,15 +150,14 @@ def sweep_body(
     or an element cannot meet the other item's ball.
 
     Args:
-        work: has `chain`, `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
-        count: rows of the chain. speed: no point of body `m` is faster [m per travel].
-        touch: gaps up to this touch [m].
+        chain, count: what moves, and its rows. touch: gaps up to this touch [m].
+        work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
     stack, laid = work.stack, False
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
-    limit = best if count > 1 else measure_of(abs(work.chain[0, 0]) * best)
+    limit = best if count > 1 else measure_of(abs(chain[0, 0]) * best)
     waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
-    waiting = keep_earliest(moving, resting, 0, waiting, count, speed, touch, limit, work)
+    waiting = keep_earliest(moving, resting, 0, waiting, chain, count, touch, limit, work)
     while waiting > 0:
         waiting -= 1
         if work.keys[waiting] >= limit and work.keys[waiting] > 0.0:
@@ -160,22 +165,22 @@ def sweep_body(
         a, b = stack[waiting, 0], stack[waiting, 1]
         ka, wa = put_item(moving, a, work.moving, work.core)
         kb, wb = put_item(resting, b, work.resting, work.fixed)
-        if laid and plane_parts(ka, wa, kb, wb, count, best, work):
+        if laid and plane_parts(ka, wa, kb, wb, chain, count, best, work):
             continue
-        if (a < 0 or b < 0) and part_misses(moving, a, resting, b, ka, kb, wa, wb, count, touch, best, work):
+        if (a < 0 or b < 0) and part_misses(moving, a, resting, b, ka, kb, wa, wb, chain, count, touch, best, work):
             continue
         if a >= 0 or b >= 0:
             height = split_pair(moving, a, resting, b, stack, waiting)
-            waiting = keep_earliest(moving, resting, waiting, height, count, speed, touch, limit, work)
+            waiting = keep_earliest(moving, resting, waiting, height, chain, count, touch, limit, work)
             continue
-        found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, work.chain, count, touch, best, False, work.placed)
+        found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, best, False, work.placed)
         if found >= best:
             continue
         best = found
         work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
         if best < 0.0:
             return best
-        limit = best if count > 1 else measure_of(abs(work.chain[0, 0]) * best)
+        limit = best if count > 1 else measure_of(abs(chain[0, 0]) * best)
         lay_plane(ka, wa, kb, wb, work)
         laid = True
     return best

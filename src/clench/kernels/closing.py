@@ -6,8 +6,8 @@ from clench.base.tolerances import TOUCH_FRACTION
 
 from .advance import advance, make_work
 from .compiling import allocating_kernel, inner_kernel, kernel
-from .exact import ExactArrays, describe_pair, last_mover, pose_movers, sweep_stage
-from .family_pose import compose_inverse, copy_pose, pose_family
+from .exact import ExactArrays, describe_pair, last_mover, pose_movers
+from .family_pose import compose_inverse, copy_pose, pose_families, pose_family
 from .family_section import cut_planes
 from .layout import (
     HIT_GAP,
@@ -25,6 +25,7 @@ from .layout import (
 )
 from .segments import ALL, lock_held, lock_joints, move_groups, next_segment
 from .settling import settle
+from .stage_sweep import sweep_stage
 from .sweeping import SweepWork, make_sweep_work
 from .touching import describe_hit, settle_hit
 from .tree import MeshTree
@@ -53,7 +54,7 @@ def close_group(
     of them the planes give a first bound, and the exact sweep, where wanted, what comes before it.
 
     Args:
-        sections, base: whose row `plane - base` belongs to `plane`. family: of the joints. group: or `ALL`.
+        sections, base: whose row `plane - base` belongs to `plane`. family: of the planes. group: or `ALL`.
         start: the entry's first family. work: whose `locked` says which joints stand still; written.
 
     Returns:
@@ -77,9 +78,10 @@ def close_group(
         moved = min(moved, end)
         met = -1
         if exact.wanted[i]:
-            T, size = answer.pose[i, family], hand.family_length[family]
+            families, size = answer.pose[i], hand.family_length[family]
+            pose_families(hand, entry, turns, work, families)
             moved, met = sweep_stage(
-                exact, chain, entry, family, T, T_palm_object, size, turns, rates, moved, work, sweep
+                exact, chain, entry, families, T_palm_object, size, turns, rates, moved, work, sweep
             )
             if moved < 0.0:
                 answer.overlap[i] = sweep.winner[2]
@@ -99,7 +101,7 @@ def close_group(
                 T_palm_object,
                 sections,
                 base,
-                family,
+                chain.joint_family[last],
                 chain.joint_group[last],
                 last,
                 plane,
@@ -282,6 +284,7 @@ def close_item(
         if not moved:
             break
     answer.skipped[i] = sweep.skipped[0]
+    pose_families(hand, entry, answer.turn[i], work, answer.pose[i])
     settle(hand, exact, T_palm_object, start, shared, own, items, i, work, sweep, answer)
 
 
@@ -309,11 +312,12 @@ def close_items(
         shared: sections with every entry's first family, by global plane. own: arena for later families, with a row for
             every plane of the largest entry.
         items: what to close. times: how often all groups are gone through at most; fewer where nothing moves any more.
-        together: all groups move at once instead, those of a finger with one family.
+        together: all groups move at once instead. Where joints of several families do, or in several rounds, an item
+            has no planes, since those of later families are cut where the earlier ones are at rest.
         answer: written; `travel`, `turn`, `contacts` and `overflow` must be zero.
     """
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
-    sweep = make_sweep_work(work.chain, exact.checked.shape[0])
+    sweep = make_sweep_work(hand.chain.rate.shape[0], exact.checked.shape[0])
     for i in range(items.entry.shape[0]):
         close_item(
             hand,

@@ -6,11 +6,17 @@ import math
 
 from .compiling import inner_kernel
 from .layout import Floats
+from .spatial_motion import is_spatial, moved, moved_back, point_bounds, point_motion, total_rate
+from .vectors import Vector, dot
 
 
 @inner_kernel
 def move_core(core: Floats, corners: int, chain: Floats, count: int, s: float, out: Floats) -> None:
     """Write a core's corners when the chain has moved by `s`; they are given relative to its last pivot."""
+    if is_spatial(chain):
+        for k in range(corners):
+            out[k, 0], out[k, 1], out[k, 2] = moved((core[k, 0], core[k, 1], core[k, 2]), chain, count, s)
+        return
     x, z = 0.0, 0.0
     for i in range(count - 1):
         c, d = math.cos(chain[i, 0] * s), math.sin(chain[i, 0] * s)
@@ -29,7 +35,7 @@ def base_motion(
 ) -> tuple[float, float, float, float, float, float]:
     """Return the last pivot at `s`, its speed and acceleration along n, and bounds on both (of the speed: whatever n).
 
-    Along the axis nothing moves, so only the part of n across it counts.
+    The axes are parallel: along them nothing moves, so only the part of n across them counts.
     """
     px, pz, slope, curvature, lever, bound = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(count - 1):
@@ -48,9 +54,14 @@ def base_motion(
 
 @inner_kernel
 def corner_motion(
-    core: Floats, k: int, chain: Floats, count: int, nx: float, nz: float, s: float
+    core: Floats, k: int, chain: Floats, count: int, nx: float, ny: float, nz: float, s: float
 ) -> tuple[float, float, float, float]:
     """Return speed and acceleration of a corner along n at `s`, and bounds (of the speed: whatever n)."""
+    if is_spatial(chain):
+        corner, n = (core[k, 0], core[k, 1], core[k, 2]), (nx, ny, nz)
+        velocity, acceleration = point_motion(corner, chain, count, s)
+        lever, bound = point_bounds(corner, chain, count)
+        return dot(velocity, n), dot(acceleration, n), lever, bound
     rate = chain[count - 1, 0]
     c, d = math.cos(rate * s), math.sin(rate * s)
     x, z = c * core[k, 0] - d * core[k, 2], d * core[k, 0] + c * core[k, 2]
@@ -62,6 +73,26 @@ def corner_motion(
         lever + abs(rate) * arm,
         bound + math.sqrt(nx * nx + nz * nz) * rate * rate * arm,
     )
+
+
+@inner_kernel
+def turn_rate(chain: Floats, count: int) -> float:
+    """Return a bound on how fast the core, or anything before it, turns."""
+    if is_spatial(chain):
+        return float(total_rate(chain, count))
+    rate = 0.0
+    for i in range(count):
+        rate = max(rate, abs(chain[i, 0]))
+    return rate
+
+
+@inner_kernel
+def carried_back(m: Vector, chain: Floats, count: int, s: float, step: float) -> Vector:
+    """Return a direction that goes along with the core as it was a step before `s + step`."""
+    if is_spatial(chain):
+        return moved_back(m, chain, count, s, step)
+    c, d = math.cos(chain[count - 1, 0] * step), math.sin(chain[count - 1, 0] * step)
+    return c * m[0] + d * m[2], m[1], c * m[2] - d * m[0]
 
 
 @inner_kernel

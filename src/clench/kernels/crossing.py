@@ -8,7 +8,8 @@ from .closest import edge_count, face_normal
 from .compiling import inner_kernel
 from .core_motion import plane_gap
 from .layout import Floats
-from .leaving import Vector, side
+from .leaving import side
+from .vectors import Vector
 
 #: Surfaces that cross by no more than this touch [m].
 DEEP = 1e-9

@@ -92,7 +92,7 @@ def close_poses_on_device(
     poses, count = asked.shape
     joints = hand.chain.rate.shape[0]
     work = _plain(make_work)(joints, hand.outlines)
-    sweep = _plain(make_sweep_work)(np.empty((joints + 1, 3)), exact.checked.shape[0])
+    sweep = _plain(make_sweep_work)(joints, exact.checked.shape[0])
     given = _each(
         _device().put,
         Job(
@@ -184,15 +184,16 @@ def _work_at(w: Work, n: int) -> Work:
 
 
 @_inlined
-def _sweep_at(s: SweepWork, chain: Floats, n: int) -> SweepWork:
+def _sweep_at(s: SweepWork, n: int) -> SweepWork:
     return SweepWork(
         s.core[n],
         s.fixed[n],
         s.placed[n],
-        chain,
+        s.axis[n],
+        s.anchor[n],
+        s.spatial[n],
         s.moving[n],
         s.resting[n],
-        s.start[n],
         s.poses[n],
         s.stack[n],
         s.keys[n],
@@ -237,7 +238,7 @@ def _close(job: Job) -> None:
         return
     shared, own = _sections_at(job.shared, n), _sections_at(job.own, index)
     work = _work_at(job.item_work, index)
-    sweep = _sweep_at(job.sweep, work.chain, index)
+    sweep = _sweep_at(job.sweep, index)
     hand, exact = _with_lengths(job.hand, job.length[one]), _with_links(job.exact, job.link_pose[one])
     T = job.T_palm_object[n]
     close_item(

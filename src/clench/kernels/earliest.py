@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .compiling import inner_kernel
-from .core_motion import move_core
+from .core_motion import corner_motion, move_core
 from .distance import Point, closest_on_triangle
 from .layout import Floats
 from .sweep_pairs import step_to_plane
@@ -14,6 +14,8 @@ from .sweep_pairs import step_to_plane
 NEAR = 0.125
 #: Steps of a ball along its arc towards a core at most, and of a plane's check.
 STEPS = 8
+#: Steps of a walk behind several joints at most.
+WALK = 24
 
 
 @inner_kernel
@@ -93,6 +95,31 @@ def core_misses(p: Floats, core: Floats, corners: int, reach: float, sense: floa
 
 
 @inner_kernel
+def walk_ball(
+    centre: Floats, other: Floats, reach: float, chain: Floats, count: int, limit: float, placed: Floats
+) -> float:
+    """Return a travel up to which a moving point, the first of `centre`, is farther than `reach` from a resting one.
+
+    Every step is as long as the distance allows at the highest speed that the point can have.
+
+    Args:
+        limit: what comes later is of no interest. placed: scratch space, (6, 3).
+    """
+    _, _, fastest, _ = corner_motion(centre, 0, chain, count, 1.0, 0.0, 0.0, 0.0)
+    s = 0.0
+    for _ in range(WALK):
+        move_core(centre, 1, chain, count, s, placed)
+        x, y, z = placed[0, 0] - other[0, 0], placed[0, 1] - other[0, 1], placed[0, 2] - other[0, 2]
+        apart = math.sqrt(x * x + y * y + z * z) - reach
+        if apart <= NEAR * reach:
+            break
+        if apart >= fastest * (limit - s):
+            return limit
+        s += apart / fastest
+    return s
+
+
+@inner_kernel
 def stays_above(
     core: Floats,
     placed: Floats,
@@ -109,7 +136,7 @@ def stays_above(
     s = 0.0
     for _ in range(STEPS):
         move_core(core, corners, chain, count, s, placed)
-        step = step_to_plane(placed, corners, chain, count, nx, ny, nz, offset, s, best - s)
+        step = step_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best - s)
         if step <= 0.0:
             return False
         if step >= best - s:

@@ -1,4 +1,4 @@
-"""The exact width: moving links against object and resting links, stage by stage (METHOD.md section 5)."""
+"""The exact width: where the links are, what overlaps, and how a pair touches (METHOD.md section 5)."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from clench.base.tolerances import SWEEP_FRACTION
-
-from .advance import fill_chain, place_joints
 from .bodies import BodyArrays, pack_bodies
-from .body_sweep import sweep_body
 from .boxes import boxes_meet
 from .closest import AT_CORNER, separation
 from .compiling import allocating_kernel, inner_kernel
-from .family_pose import compose_inverse, copy_pose
+from .family_pose import copy_pose
 from .layout import (
     HIT_FAMILY,
     HIT_FEATURE,
@@ -32,9 +28,10 @@ from .layout import (
     ChainArrays,
     Floats,
     Ints,
-    Work,
 )
-from .sweeping import SweepWork, bodies_overlap, make_sweep_work, put_core, put_point
+from .spatial_motion import turned
+from .sweeping import SweepWork, bodies_overlap, make_sweep_work, put_core
+from .vectors import plus, scaled
 
 
 class ExactArrays(NamedTuple):
@@ -112,157 +109,20 @@ def pose_movers(exact: ExactArrays, chain: ChainArrays, entry: int, turns: Float
 
 
 @inner_kernel
-def sweep_link(
-    links: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    first: int,
-    joint: int,
-    rates: Floats,
-    touch: float,
-    best: float,
-    work: Work,
-    sweep: SweepWork,
-) -> float:
-    """Return the first contact of one moving link with one resting body before `best`; see `sweep_body`.
-
-    Args:
-        first, joint: first active joint, and the last one that moves the link. work: has the joints placed.
-        sweep: `start` has `T_family_link`, `resting` the resting body's pose relative to the first active pivot.
-    """
-    count, last, rate, speed = fill_chain(joint, first, rates, work.place, work)
-    copy_pose(sweep.start, sweep.moving)
-    sweep.moving[0, 3] -= work.place[last, 0]
-    sweep.moving[2, 3] -= work.place[last, 1]
-    put_point(sweep.moving, links.node[links.root[m]], sweep.core[0])
-    reach = math.hypot(sweep.core[0, 0], sweep.core[0, 2]) + links.node[links.root[m], 3]
-    return sweep_body(links, m, resting, r, count, speed + abs(rate) * reach, touch, best, sweep)
-
-
-@inner_kernel
-def place_resting(T_palm_family: Floats, T_palm_body: Floats, x: float, z: float, out: Floats) -> None:
-    """Write a resting body's pose relative to a pivot of the family."""
-    compose_inverse(T_palm_family, T_palm_body, out)
-    out[0, 3] -= x
-    out[2, 3] -= z
-
-
-@inner_kernel
-def lanes_apart(box: Floats, T: Floats, other: Floats, T_other: Floats) -> bool:
-    """Say whether two boxes lie apart along the axis that the joints of a family turn about: then nothing meets."""
-    away, reach = T[1, 3] - T_other[1, 3], 0.0
-    for k in range(3):
-        away += T[1, k] * box[k] - T_other[1, k] * other[k]
-        reach += abs(T[1, k]) * box[3 + k] + abs(T_other[1, k]) * other[3 + k]
-    return bool(abs(away) > reach)
-
-
-@inner_kernel
-def sweep_links(
-    exact: ExactArrays,
-    entry: int,
-    m: int,
-    first: int,
-    joint: int,
-    T_palm_family: Floats,
-    rates: Floats,
-    touch: float,
-    best: float,
-    work: Work,
-    sweep: SweepWork,
-) -> tuple[float, int]:
-    """Return the first contact of a moving link with other links of the hand before `best`, and that link or -1.
-
-    Args:
-        m: the moving link. first, joint: first active joint, and the last one that moves it. `work` has the joints
-            placed; the rest as in `sweep_stage`.
-    """
-    met = -1
-    for r in range(exact.checked.shape[0]):
-        if exact.checked[m, r] == 0 or exact.links.root[r] < 0:
-            continue
-        # Seen from a link that moves as well, only the joints after its own turn.
-        after = first_after(exact, entry, r, first, joint, rates)
-        if after > joint:
-            continue
-        x, z = work.place[after, 0], work.place[after, 1]
-        place_resting(T_palm_family, sweep.poses[r], x, z, sweep.resting)
-        if lanes_apart(exact.links.box[m], sweep.start, exact.links.box[r], sweep.resting):
-            continue
-        found = sweep_link(exact.links, m, exact.links, r, after, joint, rates, touch, best, work, sweep)
-        if found < 0.0:
-            sweep.skipped[0] += 1
-        elif found < best:
-            best, met = found, r
-            keep_pair(sweep)
-    return best, met
-
-
-@inner_kernel
-def sweep_stage(
-    exact: ExactArrays,
-    chain: ChainArrays,
-    entry: int,
-    family: int,
-    T_palm_family: Floats,
-    T_palm_object: Floats,
-    length: float,
-    turns: Floats,
-    rates: Floats,
-    best: float,
-    work: Work,
-    sweep: SweepWork,
-) -> tuple[float, int]:
-    """Return how far a path segment goes before a moving link meets anything it must not overlap, at most `best`.
-
-    Args:
-        exact, chain: the hand. entry: of the item. family: of the active joints. T_palm_family: (3, 4).
-        T_palm_object: (3, 4). length: of the finger [m]. turns: of every joint [rad], (J,). rates: (J,).
-
-    Returns:
-        the travel; what is met: -1 nothing, L the object, else a link of the hand. `sweep.winner` and `sweep.poses`,
-        which has every link where it is at the start of the segment, describe it. A link that overlaps the object
-        already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
-    """
-    first = 0
-    while first < rates.shape[0] and rates[first] == 0.0:
-        first += 1
-    if first == rates.shape[0]:
-        return best, -1
-    touch = SWEEP_FRACTION * length
-    met, links = -1, exact.checked.shape[0]
-    place_joints(chain, family, turns, work.place)
-    px, pz = work.place[first, 0], work.place[first, 1]
-    pose_movers(exact, chain, entry, turns, sweep.poses)
-    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
-        m, joint = exact.mover_link[n], exact.mover_joint[n]
-        if joint < first or exact.links.root[m] < 0:
-            continue
-        compose_inverse(T_palm_family, sweep.poses[m], sweep.start)
-        place_resting(T_palm_family, T_palm_object, px, pz, sweep.resting)
-        found = sweep_link(
-            exact.links,
-            m,
-            exact.object,
-            0,
-            first,
-            joint,
-            rates,
-            touch,
-            best,
-            work,
-            sweep,
-        )
-        if found < best:
-            best, met = found, links
-            keep_pair(sweep)
-            if best < 0.0:
-                return best, met
-        best, other = sweep_links(exact, entry, m, first, joint, T_palm_family, rates, touch, best, work, sweep)
-        if other >= 0:
-            met = other
-    return best, met
+def place_axes(exact: ExactArrays, entry: int, turns: Floats, sweep: SweepWork) -> None:
+    """Write the axes and anchors of an entry's joints at the present turns to `sweep`, in the palm frame."""
+    begin, end = exact.joint_first[entry], exact.joint_first[entry + 1]
+    for j in range(begin, end):
+        axis = (exact.axis[j, 0], exact.axis[j, 1], exact.axis[j, 2])
+        at = (exact.anchor[j, 0], exact.anchor[j, 1], exact.anchor[j, 2])
+        for k in range(j - begin):
+            i = j - 1 - k
+            about = (exact.axis[i, 0], exact.axis[i, 1], exact.axis[i, 2])
+            pivot = (exact.anchor[i, 0], exact.anchor[i, 1], exact.anchor[i, 2])
+            axis = turned(axis, about, turns[i])
+            at = plus(pivot, turned(plus(at, scaled(pivot, -1.0)), about, turns[i]))
+        sweep.axis[j, 0], sweep.axis[j, 1], sweep.axis[j, 2] = axis
+        sweep.anchor[j, 0], sweep.anchor[j, 1], sweep.anchor[j, 2] = at
 
 
 @inner_kernel
@@ -281,15 +141,6 @@ def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
     return int(last)
 
 
-@inner_kernel
-def first_after(exact: ExactArrays, entry: int, link: int, first: int, joint: int, rates: Floats) -> int:
-    """Return the first active joint, up to `joint`, that does not move a link, or one more than `joint`."""
-    j = last_mover(exact, entry, link, first - 1) + 1
-    while j <= joint and rates[j] == 0.0:
-        j += 1
-    return j
-
-
 @allocating_kernel
 def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
     """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
@@ -299,7 +150,7 @@ def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, 
         allowed: how far round bodies may overlap [m].
     """
     links = exact.checked.shape[0]
-    sweep = make_sweep_work(np.empty((1, 3)), links)
+    sweep = make_sweep_work(0, links)
     for m in range(links):
         copy_pose(poses[m], sweep.moving)
         copy_pose(T_palm_object, sweep.resting)

@@ -76,3 +76,10 @@ def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, work:
     step[2, 0], step[2, 1], step[2, 2], step[2, 3] = s, 0.0, c, place[last, 1]
     compose(poses[family - 1], step, before)
     compose(before, hand.family_pose[family], poses[family])
+
+
+@inner_kernel
+def pose_families(hand: HandArrays, entry: int, turns: Floats, work: Work, poses: Floats) -> None:
+    """Write `T_palm_family` of all families of an entry after the first, which has been written; see `pose_family`."""
+    for family in range(hand.entry_family[entry] + 1, hand.entry_family[entry + 1]):
+        pose_family(hand, family, False, turns, work, poses)

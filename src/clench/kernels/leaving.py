@@ -11,10 +11,11 @@ import math
 
 from .closest import edge_count, face_normal, separation
 from .compiling import inner_kernel
-from .core_motion import corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
+from .core_motion import carried_back, corner_motion, move_core, plane_gap, plane_offset, turn_rate, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
 from .turning import is_blocking
+from .vectors import Vector
 
 #: Below this fraction of the touch tolerance a gap has no direction of its own [-].
 FLAT = 1.0 / 256.0
@@ -29,9 +30,6 @@ ALONG, BARELY = 1e-9, 1e-4
 OPPOSED = -0.5
 #: A plane that separates a touching pair may turn this many times as fast as the moving core [-].
 TILT = 64.0
-
-
-Vector = tuple[float, float, float]
 
 
 @inner_kernel
@@ -52,7 +50,7 @@ def plane_permits(
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
         if gap <= touch:
-            slope, curvature, lever, _ = corner_motion(core, k, chain, count, nx, nz, s)
+            slope, curvature, lever, _ = corner_motion(core, k, chain, count, nx, ny, nz, s)
             if is_blocking(slope, curvature, lever, touch):
                 return False
     return True
@@ -78,7 +76,7 @@ def leave_plane(
     rate = abs(chain[count - 1, 0])
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
-        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, nz, s)
+        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, ny, nz, s)
         if bound == 0.0:
             continue
         if count == 1:
@@ -250,20 +248,19 @@ def leave_touch(
 
 @inner_kernel
 def starts_apart(
-    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Vector, turn: float, touch: float
+    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Vector, back: Vector, turn: float, touch: float
 ) -> bool:
     """Say whether a plane separates a touching pair from which one across m is reached by a turn of that size.
 
     Tried are m itself, m on its way with the moving core, and the planes along two edges.
 
     Args:
-        m: unit direction across the plane that separates the pair after the step. turn: of the moving core on it [rad].
+        m: unit direction across the plane that separates the pair after the step. back: what it was before the step if
+            it goes along with the moving core. turn: of that core on the step, at most [rad].
     """
-    c, d = math.cos(turn), math.sin(turn)
-    bx, bz = c * m[0] + d * m[2], c * m[2] - d * m[0]
     if separates(placed, ka, fixed, kb, w, m[0], m[1], m[2], touch):
         return True
-    if separates(placed, ka, fixed, kb, w, bx, m[1], bz, touch):
+    if separates(placed, ka, fixed, kb, w, back[0], back[1], back[2], touch):
         return True
     for i in range(edge_count(ka)):
         for k in range(edge_count(kb)):
@@ -304,11 +301,9 @@ def probe(
     Args:
         placed: (6, 3); the first rows have the moving core at `s`, the others are scratch space.
     """
-    rate, speed, bend = 0.0, 0.0, 0.0
-    for i in range(count):
-        rate = max(rate, abs(chain[i, 0]))
+    rate, speed, bend = turn_rate(chain, count), 0.0, 0.0
     for k in range(ka):
-        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, s)
+        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, 0.0, s)
         speed, bend = max(speed, lever), max(bend, bound)
     bend += 2.0 * TILT * rate * speed
     if bend == 0.0:
@@ -321,8 +316,9 @@ def probe(
         return BLOCKED
     if mx * known[0] + my * known[1] + mz * known[2] < OPPOSED:
         return BLOCKED
-    turn = chain[count - 1, 0] * step
-    return step if starts_apart(placed, ka, fixed, kb, w, (mx, my, mz), turn, touch) else BLOCKED
+    m = (mx, my, mz)
+    back = carried_back(m, chain, count, s, step)
+    return step if starts_apart(placed, ka, fixed, kb, w, m, back, rate * step, touch) else BLOCKED
 
 
 @inner_kernel

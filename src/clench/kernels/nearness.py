@@ -26,7 +26,7 @@ def smallest_gap(
         the gap [m] and the body's number; infinite and -1 when there is nothing to measure. Bodies that cross each
         other are not noticed here (see `clench.kernels.closest.separation`).
     """
-    work = make_sweep_work(np.empty((1, 3)), 0)
+    work = make_sweep_work(0, 0)
     copy_pose(T_palm_object, work.resting)
     best, nearest = np.inf, -1
     for m in wanted:
@@ -45,7 +45,7 @@ def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, sla
         links: every link in its frame. m, r: which. poses: `T_palm_link` of every link, (L, 3, 4).
         slack: see `body_gap`. out: (6,).
     """
-    sweep = make_sweep_work(np.empty((1, 3)), 0)
+    sweep = make_sweep_work(0, 0)
     copy_pose(poses[m], sweep.moving)
     copy_pose(poses[r], sweep.resting)
     gap = body_gap(links, m, links, r, bound, slack, sweep)

@@ -6,16 +6,16 @@ import math
 
 from clench.base.tolerances import PASSED_GAP, TOUCH_FRACTION
 
-from .advance import place_joints
 from .closest import separation
 from .compiling import inner_kernel
-from .exact import ExactArrays, describe_pair, keep_pair, pose_movers
+from .exact import ExactArrays, describe_pair, keep_pair, place_axes, pose_movers
 from .family_pose import copy_pose
 from .layout import (
     HIT_FAMILY,
     HIT_FEATURE,
     HIT_GAP,
     HIT_GROUP,
+    HIT_JOINT,
     HIT_OUTLINE,
     HIT_PLANE,
     HIT_SOURCE,
@@ -30,7 +30,9 @@ from .layout import (
     Work,
 )
 from .sweeping import SweepWork, body_gap, put_core
-from .touching import holds, settle_hit
+from .touching import settle_hit
+from .turning import STILL
+from .vectors import Vector, cross, dot
 
 
 @inner_kernel
@@ -55,14 +57,12 @@ def settle(
     for n in range(answer.contacts[i]):
         hit, point = answer.hit[i, n], answer.point[i, n]
         family = hit[HIT_FAMILY]
-        T = answer.pose[i, family]
         if hit[HIT_PLANE] < 0:
-            place_joints(hand.chain, family, turns, work.place)
-            settle_pair(exact, hand.chain, T_palm_object, T, hit, point, touch, work.place, sweep)
+            settle_pair(exact, hand.chain, entry, turns, T_palm_object, hit, point, touch, sweep)
             continue
         settle_hit(hand, start, shared, own, turns, hit, point, work)
         if exact.wanted[i] and later_turned(hand, entry, family, turns):
-            settle_carried(exact, hand, T_palm_object, T, hit, point, work.place, sweep)
+            settle_carried(exact, hand, entry, turns, T_palm_object, hit, point, sweep)
 
 
 @inner_kernel
@@ -88,11 +88,11 @@ def closest_pair(exact: ExactArrays, T_palm_object: Floats, m: int, met: int, bo
 def settle_carried(
     exact: ExactArrays,
     hand: HandArrays,
+    entry: int,
+    turns: Floats,
     T_palm_object: Floats,
-    T_palm_family: Floats,
     hit: Ints,
     point: Floats,
-    place: Floats,
     sweep: SweepWork,
 ) -> None:
     """Describe a contact on a plane exactly if its link, which joints of later families carried on, still touches."""
@@ -104,7 +104,7 @@ def settle_carried(
     put_core(exact.object, sweep.pair[1], T_palm_object, sweep.fixed)
     ka, kb = exact.links.corners[sweep.pair[0]], exact.object.corners[sweep.pair[1]]
     _, nx, ny, nz, _, _, x, y, z = separation(sweep.core, ka, sweep.fixed, kb)
-    if holds_exactly(hand.chain, T_palm_family, hit, (x, y, z), (nx, ny, nz), place):
+    if holds_exactly(exact, hand.chain, entry, turns, hit, (x, y, z), (nx, ny, nz), sweep):
         keep_pair(sweep)
         describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
 
@@ -113,12 +113,12 @@ def settle_carried(
 def settle_pair(
     exact: ExactArrays,
     chain: ChainArrays,
+    entry: int,
+    turns: Floats,
     T_palm_object: Floats,
-    T_palm_family: Floats,
     hit: Ints,
     point: Floats,
     touch: float,
-    place: Floats,
     sweep: SweepWork,
 ) -> None:
     """Evaluate an exact contact again with the links at `sweep.poses`; it may have rolled on to other elements.
@@ -136,25 +136,30 @@ def settle_pair(
     describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
     if met == exact.checked.shape[0] and point[HIT_GAP] <= PASSED_GAP:
         at, normal = (point[0], point[1], point[2]), (point[3], point[4], point[5])
-        if not holds_exactly(chain, T_palm_family, hit, at, normal, place):
+        if not holds_exactly(exact, chain, entry, turns, hit, at, normal, sweep):
             sweep.winner[0], sweep.winner[1] = i, k
             describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
 
 
 @inner_kernel
 def holds_exactly(
+    exact: ExactArrays,
     chain: ChainArrays,
-    T: Floats,
+    entry: int,
+    turns: Floats,
     hit: Ints,
-    at: tuple[float, float, float],
-    normal: tuple[float, float, float],
-    place: Floats,
+    at: Vector,
+    normal: Vector,
+    sweep: SweepWork,
 ) -> bool:
-    """Say what `holds` does of a point and a normal in the palm frame; `T` is `T_palm_family`."""
-    x, z, nx, nz = 0.0, 0.0, 0.0, 0.0
-    for r in range(3):
-        x += T[r, 0] * (at[r] - T[r, 3])
-        z += T[r, 2] * (at[r] - T[r, 3])
-        nx += T[r, 0] * normal[r]
-        nz += T[r, 2] * normal[r]
-    return bool(holds(chain, hit, x, z, nx, nz, place))
+    """Say what `holds` does of a point and a normal in the palm frame; the joints may be of several families."""
+    place_axes(exact, entry, turns, sweep)
+    slope, lever = 0.0, 0.0
+    for j in range(exact.joint_first[entry], hit[HIT_JOINT] + 1):
+        if chain.joint_group[j] == hit[HIT_GROUP]:
+            axis = (sweep.axis[j, 0], sweep.axis[j, 1], sweep.axis[j, 2])
+            arm = (at[0] - sweep.anchor[j, 0], at[1] - sweep.anchor[j, 1], at[2] - sweep.anchor[j, 2])
+            speed = cross(axis, arm)
+            slope += chain.rate[j] * dot(speed, normal)
+            lever += abs(chain.rate[j]) * math.sqrt(dot(speed, speed))
+    return slope <= STILL * lever

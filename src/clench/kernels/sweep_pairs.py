@@ -13,10 +13,11 @@ import math
 
 from .closest import crosses, separation
 from .compiling import inner_kernel, kernel
-from .core_motion import base_motion, corner_motion, move_core, plane_gap, plane_offset, turn_to_plane
+from .core_motion import base_motion, corner_motion, move_core, plane_gap, plane_offset, turn_rate, turn_to_plane
 from .coupled import safe_step
 from .layout import Floats
 from .leaving import FLAT, OVERLAP, OVERLAPPING, move_on
+from .spatial_motion import is_spatial
 
 #: Planes that are laid for one pair at most; a pair that needs more stops there, which is safe.
 PLANES = 400
@@ -27,7 +28,34 @@ CLOSE = 1.5
 
 
 @inner_kernel
+def fall_to_plane(
+    core: Floats,
+    placed: Floats,
+    corners: int,
+    chain: Floats,
+    count: int,
+    nx: float,
+    ny: float,
+    nz: float,
+    offset: float,
+    s: float,
+    best: float,
+) -> float:
+    """Return what `step_to_plane` does, by bounds on the corners' accelerations, whatever the axes."""
+    step = best
+    for k in range(corners):
+        gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
+        if gap <= 0.0:
+            return 0.0
+        slope, _, _, bound = corner_motion(core, k, chain, count, nx, ny, nz, s)
+        if bound > 0.0:
+            step = min(step, safe_step(gap, slope, bound))
+    return step
+
+
+@inner_kernel
 def step_to_plane(
+    core: Floats,
     placed: Floats,
     corners: int,
     chain: Floats,
@@ -42,8 +70,10 @@ def step_to_plane(
     """Return how far the motion goes from `s` before a corner comes down to the plane `n·p = offset`, at most `best`.
 
     Args:
-        placed: the moving core as it is at `s`.
+        core, placed: the moving core relative to the last pivot, and as it is at `s`.
     """
+    if is_spatial(chain):
+        return float(fall_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best))
     rate, step, across = chain[count - 1, 0], best, math.sqrt(nx * nx + nz * nz)
     # Where the last pivot is and how it moves is the same for all corners; where they are is known.
     px, pz, base_slope, _, _, base_bound = base_motion(chain, count, nx, nz, s)
@@ -99,11 +129,9 @@ def turning_step(
         placed: (6, 3); the first rows have the moving core at `s`, the others are scratch space.
         leap: factor on the step that is tried [-]. best: the longest step of interest. The others as in `sweep_pair`.
     """
-    rate, speed, bend = 0.0, 0.0, 0.0
-    for i in range(count):
-        rate = max(rate, abs(chain[i, 0]))
+    rate, speed, bend = turn_rate(chain, count), 0.0, 0.0
     for k in range(ka):
-        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, s)
+        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, 0.0, s)
         speed, bend = max(speed, lever), max(bend, bound)
     margin = plane_gap(placed, ka, fixed, kb, nx, ny, nz) - w - level
     if margin <= 0.0 or speed == 0.0:
@@ -159,7 +187,7 @@ def sweep_pair(
             if level < 0.0:
                 level = 0.5 * min(gap, touch)
             offset = plane_offset(fixed, kb, nx, ny, nz) + w + level
-            step = step_to_plane(placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
+            step = step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
         if step <= 0.0:
             # They touch. What moves along a wall is not stopped by the sides of the triangles that make it up.
             if flat and w == 0.0:
@@ -170,7 +198,7 @@ def sweep_pair(
                 apart = w > 0.0 and gap >= -OVERLAPPING * touch
                 return OVERLAP if flat and free == OVERLAP and not apart else s
             level, step = -1.0, free if s + free >= best else 0.5 * free
-        elif turn >= PLAIN and passes_by(placed, ka, fixed, kb, w + level):
+        elif turn >= PLAIN and not is_spatial(chain) and passes_by(placed, ka, fixed, kb, w + level):
             return best
         elif turn >= PLAIN:
             # Edges that slide along each other: the closest points run, and no plane that rests lasts.

@@ -12,6 +12,7 @@ from .closest import crosses, separation
 from .compiling import inner_allocating_kernel, inner_kernel
 from .crossing import only_touch
 from .layout import Floats, Ints
+from .spatial_motion import SPATIAL
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
 PAIRS = 512
@@ -22,8 +23,9 @@ class SweepWork(NamedTuple):
 
     Args:
         core, fixed: corners of a pair, (3, 3) each. placed: those of the moving one on its way, (6, 3).
-        chain: rows (Ω, e_x, e_z), (J + 1, 3).
-        moving, resting: poses of two bodies relative to their pivots, (3, 4). start: pose of the moving one, (3, 4).
+        axis, anchor: of the joints where a segment begins, in the palm frame, (J, 3) each. spatial: see
+            `spatial_motion`, (J, 7).
+        moving, resting: poses of two bodies relative to their pivots, (3, 4).
         poses: `T_palm_link` of every link, (L, 3, 4).
         stack, keys: pairs of items that wait, and when they can meet at the earliest, (PAIRS, 2) and (PAIRS,).
         plane: normal and offset of one that keeps bodies apart, relative to the first pivot, (4,).
@@ -34,10 +36,11 @@ class SweepWork(NamedTuple):
     core: Floats
     fixed: Floats
     placed: Floats
-    chain: Floats
+    axis: Floats
+    anchor: Floats
+    spatial: Floats
     moving: Floats
     resting: Floats
-    start: Floats
     poses: Floats
     stack: Ints
     keys: Floats
@@ -48,14 +51,15 @@ class SweepWork(NamedTuple):
 
 
 @inner_allocating_kernel
-def make_sweep_work(chain: Floats, links: int) -> SweepWork:
-    """Allocate the scratch space for sweeps of a hand; `chain` is that of the closing kernels."""
+def make_sweep_work(joints: int, links: int) -> SweepWork:
+    """Allocate the scratch space for sweeps of a hand."""
     return SweepWork(
         np.empty((3, 3)),
         np.empty((3, 3)),
         np.empty((6, 3)),
-        chain,
-        np.empty((3, 4)),
+        np.empty((joints, 3)),
+        np.empty((joints, 3)),
+        np.empty((joints, SPATIAL)),
         np.empty((3, 4)),
         np.empty((3, 4)),
         np.empty((links, 3, 4)),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .bodies import BodyArrays
 from .closest import Separation, above_face, edge_count, edge_pair, face_normal, separation
 from .compiling import allocating_kernel, inner_kernel
@@ -48,7 +46,7 @@ def touching_pairs(
     Returns:
         how many there are, at most N - 2.
     """
-    count, work = 0, make_sweep_work(np.empty((1, 3)), checked.shape[0])
+    count, work = 0, make_sweep_work(0, checked.shape[0])
     for s in range(poses.shape[0]):
         for m in range(checked.shape[0]):
             if moves[s, m] == 0:

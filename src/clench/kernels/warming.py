@@ -21,7 +21,7 @@ import numpy as np
 
 from .advance import advance
 from .closing import close_items
-from .exact import planes_only, sweep_stage
+from .exact import planes_only
 from .family_section import cut_first_families
 from .frames import FrameArrays, place_links, relate_poses
 from .layout import (
@@ -38,6 +38,7 @@ from .link_meshes import LinkMeshArrays, ObjectMesh, find_contained, measure_dep
 from .nearness import smallest_gap
 from .overlap import find_overlaps
 from .settling import settle_pair
+from .stage_sweep import sweep_stage
 from .sweeping import SweepWork
 from .touches import SurfaceArrays, TouchArrays, read_touches
 from .touching import describe_hit, settle_hit
@@ -115,7 +116,7 @@ def sample_values() -> dict[str, Any]:
         "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1 i1")),
         "exact": planes_only(0, 0),
         "chain": chain,
-        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f3 i2 f1 f1 i1 i1 i1")),
+        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 i2 f1 f1 i1 i1 i1")),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
     }
     values |= {"links": values["exact"].links, "target": values["exact"].object}
@@ -133,7 +134,7 @@ def sample_values() -> dict[str, Any]:
         "f1": ("turns", "rates", "point", "q"),
         "f2": ("T_palm_object", "T_palm_family", "first", "second", "out", "postures", "place"),
         "i1": ("overlaps", "hit", "wanted"),
-        "f3": ("poses", "placed", "scratch"),
+        "f3": ("poses", "placed", "scratch", "families"),
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])

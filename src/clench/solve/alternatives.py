@@ -76,9 +76,9 @@ def with_planes(
 
 def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> Groups:
     """Return the candidates of each finger that closes, in the command's order."""
-    groups: dict[int, list[FingerCandidate]] = {}
+    groups: dict[int, list[FingerCandidate]] = {finger: [] for finger in plan.finger}
     for entry, candidate in zip(plan.items.entry.tolist(), candidates, strict=True):
-        groups.setdefault(plan.finger[entry], []).append(candidate)
+        groups[plan.finger[entry]].append(candidate)
     return list(groups.values())
 
 

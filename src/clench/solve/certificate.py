@@ -14,7 +14,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate
 from clench.grasp.containment import contained_link, link_within_link
 from clench.grasp.depths import LinkDepth
-from clench.grasp.exact import hand_bodies, swept_deviation, tilt_deviation
+from clench.grasp.exact import hand_bodies, swept_deviation
 from clench.grasp.linkage import placed_links
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Certificate:
     Args:
         holds: whether it is promised. text: a sentence.
         deviation: how far links or object may be from where they are swept [m]: round shapes that are swept as
-            polyhedra, and coupled joints that are not quite parallel.
+            polyhedra.
         code: see `CertificateCode`. links: names of those that overlap. finger: the one it is about, or None.
     """
 
@@ -106,10 +106,8 @@ def certify(
         return overlap
     deviation = swept_deviation(hand, problem.source, problem.packed)
     text = f"No link overlaps the object or, where it must not, the hand itself ({problem.source} geometry)"
-    tilted = max((tilt_deviation(hand, c.plan) for c in best), default=0.0)
-    parts = [(deviation, "at cylinders and ellipsoids"), (tilted, "where coupled joints are not quite parallel")]
-    listed = " and ".join(f"{size * 1e6:.2g} um {where}" for size, where in parts if size > 0.0)
-    return Certificate(True, f"{text}, but for {listed}." if listed else f"{text}.", deviation + tilted)
+    but = f", but for {deviation * 1e6:.2g} um at cylinders and ellipsoids" if deviation > 0.0 else ""
+    return Certificate(True, f"{text}{but}.", deviation)
 
 
 def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: ExactArrays) -> Certificate | None:

@@ -76,7 +76,7 @@ def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSo
         close = partial(with_planes, problem, found.overlaps, found.sets)
         alternatives = Alternatives(problem, calibration, setting, close)
         best, names = list(found.sets), calibration.criteria
-        chosen = [len(c.plan.families[0].offsets) for c in best]
+        chosen = planned(problem).plane_counts
         score_sets(best, names, setting)
     else:
         close = partial(group_by_finger, made.plan, found.sets)

@@ -16,7 +16,7 @@ from clench.grasp.closing import HandPlan, make_hand_plan, only_items
 from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
 from clench.grasp.motion import alternatives, asked_fingers
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
-from clench.models.command import ClosingOrder
+from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 
 from .problem import Problem
@@ -41,6 +41,12 @@ class Planned:
         items = np.flatnonzero(self.plan.whole)
         fingers = {self.plan.finger[entry] for entry in self.plan.items.entry[items]}
         return self._only(items) if len(items) == len(fingers) == len(self.plan.plans) else None
+
+    @cached_property
+    def plane_counts(self) -> list[int]:
+        """How many sets of single planes each entry has."""
+        single = self.plan.items.entry[~np.array(self.plan.whole)]
+        return [int((single == entry).sum()) for entry in range(len(self.plan.plans))]
 
     @cached_property
     def planes(self) -> Planned:
@@ -88,9 +94,9 @@ def planned(problem: Problem) -> Planned:
                 posture.append(p)
     if not plans:
         raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
-    if problem.together or command.rounds != 1:
-        _check_parallel(plans, f"order {command.order}" if problem.together else "rounds")
-    plan = make_hand_plan(plans, finger, posture, command.full_width, problem.together)
+    if not command.full_width:
+        _check_planes(plans, command, problem.together)
+    plan = make_hand_plan(plans, finger, posture, command.full_width, problem.together, command.rounds != 1)
     exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
     if problem.together:
         exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
@@ -100,17 +106,18 @@ def planned(problem: Problem) -> Planned:
     return made
 
 
-def _check_parallel(plans: list[FingerPlan], what: str) -> None:
-    """Refuse joints that move at once, or again, where outlines, cut once at the open posture, would no longer hold.
+def _check_planes(plans: Sequence[FingerPlan], command: GraspCommand, together: bool) -> None:
+    """Refuse planes alone for a finger whose joints move at once, or again, about axes that are not parallel.
 
     Raises:
-        CommandError: a finger whose closing axes are not parallel.
+        CommandError: with the name of the finger.
     """
     for plan in plans:
-        if len(plan.families) > 1:
+        if not plan.lies_in_planes(together or command.rounds != 1):
+            how = f"order {command.order}" if together else "rounds" if command.rounds != 1 else "coupled joints"
             raise CommandError(
-                f"{what}: finger '{plan.finger.name}' closes about axes that are not parallel; only order "
-                f"'{ClosingOrder.PROXIMAL_FIRST}' with one round covers that."
+                f"{how}: finger '{plan.finger.name}' closes about axes that are not parallel, so curl planes do not "
+                "tell where it touches; its full width does: leave 'full_width' on."
             )
 
 

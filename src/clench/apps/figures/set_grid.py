@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 MOST_SETS: Final = 8
 _COLUMNS: Final = 4
 _PANEL: Final = 370
+#: Width of the figure at least, for the text above the panels, in pixels.
+_NARROWEST: Final = 1180
 _GAP: Final = 20
 #: Height of the lines below a panel, in pixels.
 _LINES: Final = 70
@@ -49,7 +51,7 @@ def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str
     rows = math.ceil(len(shown) / columns)
     aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.55, 1.1))
     each = (_PANEL, round(_PANEL * aspect))
-    width = max(_GAP + columns * (each[0] + _GAP), 900)
+    width = max(_GAP + columns * (each[0] + _GAP), _NARROWEST)
     height = _TOP + rows * (each[1] + _TITLE + _LINES + _GAP) + _BOTTOM
     figure = style.new_figure(width, height)
     for k, (candidate, scene) in enumerate(zip(shown, scenes, strict=True)):
@@ -164,7 +166,9 @@ def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, 
         family = f" Its joints lie in {len(scenes.plan.families)} families of planes; drawn are those of "
         family += f"{', '.join(j.name for j in scene.joints)}."
     first = "One set per curl plane, closed as if only that plane existed"
-    if any(c.plane is None for c in result.candidates):
+    if all(c.plane is None for c in result.candidates):
+        first = "One set, over the full width: joints about axes that are not parallel move at once, in no plane"
+    elif any(c.plane is None for c in result.candidates):
         first += "; and one over the full width, which stops at touches between the planes, too"
     why = {
         True: "it stops at the first touch anywhere across the finger's width",

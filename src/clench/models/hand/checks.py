@@ -50,7 +50,7 @@ def _almost_parallel(hand: Hand, finger: Finger, a: int, b: int, angle: float) -
     coupled = leaders.get(a, a) == leaders.get(b, b)
     degrees = float(np.rad2deg(angle))
     if coupled:
-        what = "they are coupled, and close as if they were parallel (certificates say how far off that is)"
+        what = "they are coupled, and no plane tells where links touch that both move: only the full width is closed"
     else:
         what = "each closes in curl planes of its own, and outlines after the second are cut anew for every posture"
     return Finding(
