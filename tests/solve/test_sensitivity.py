@@ -76,6 +76,23 @@ def test_random_chains():
     assert seen["unknown"] + seen["rough"] < 0.1 * seen["compared"], seen
 
 
+@pytest.mark.parametrize("tilted", [False, True])
+def test_random_chains_whose_joints_move_at_once(tilted):
+    """At speeds of their own; their axes are parallel or not."""
+    seen, order = Counter(), clench.ClosingOrder.TOGETHER
+    for seed in range(30):
+        case = make_case(seed, tilted)
+        followers = {c.follower for c in case.hand.couplings}
+        free = [name for i, name in enumerate(case.hand.joint_names) if i not in followers]
+        speeds = {name: 0.5 + k for k, name in enumerate(free)}
+        command = clench.GraspCommand(
+            hand_pose=Pose.identity(), object_pose=case.place, planes=1, order=order, speeds=speeds
+        )
+        seen += judge(case.hand, case.obj, command)
+    assert seen["compared"] > 150, seen
+    assert seen["unknown"] + seen["rough"] < 0.1 * seen["compared"], seen
+
+
 @pytest.mark.parametrize("name", ["robonaut2", "patent15"])
 def test_built_in_hands(name):
     hand, mug = clench.Hand.load(name), GraspObject.load("mug")

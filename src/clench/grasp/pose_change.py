@@ -27,7 +27,7 @@ class PoseChange:
 
     Args:
         hand, packed, source: the hand and the object. T_world_palm, T_world_object: poses.
-        stages: see `closing_stages`. object_name: for `stopped_by`.
+        stages: see `closing_stages` and `stages_at_once`. object_name: for `stopped_by`.
     """
 
     def __init__(
@@ -75,7 +75,9 @@ class PoseChange:
             return
         moved = abs(stage.posture[stage.leader] - opened) > LIMIT_TOLERANCE
         row, known, reason = self._row(number, stage, bool(moved))
-        for j in np.flatnonzero(stage.rates):
+        if joint.name in self.stopped_by:
+            self.stopped_by |= {self.hand.joints[j].name: self.stopped_by[joint.name] for j in stage.leaders}
+        for j in stage.stops:
             self.change[j], self.known[j] = stage.rates[j] * row, known
             if reason:
                 self.reasons[self.hand.joints[j].name] = f"{joint.name}: {reason}."
@@ -92,6 +94,8 @@ class PoseChange:
         for touch in sorted(self.touches.get(number, ()), key=lambda t: t.gap):
             if touch.gap > bound:
                 break
+            if touch.link not in stage.finger.links and touch.met not in stage.finger.links:
+                continue
             speeds = _cross(axes, touch.position - anchors) * self._moves(touch)[:, None]
             gaps = speeds @ touch.normal
             rate, speed = float(gaps @ stage.rates), float(np.linalg.norm(stage.rates @ speeds))

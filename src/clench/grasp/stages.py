@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
+from clench.models.command_file import LIMIT_TOLERANCE
 from clench.models.hand.hand import Finger, Hand
 
 from .plan import closing_joints
@@ -20,22 +21,32 @@ if TYPE_CHECKING:
 
 #: Touches that are listed at most; flat faces on each other have many.
 _MOST_TOUCHES = 4096
+#: Joints that stop within so much motion stop at once [rad at speed 1].
+_AT_ONCE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Describe where one degree of freedom of a finger stopped, proximal first.
+    """Describe where degrees of freedom of a finger stopped: one, or several at once.
 
     Args:
-        finger: its finger. leader: joint that moved, index in the hand.
-        rates: of every joint of the hand, per turn of the leader [-], shape (J,); followers at their limits have 0.
-        posture: of the whole hand where it stopped [rad], shape (J,): earlier joints and fingers closed, later open.
+        finger: its finger. leaders: joints that moved on their own and stopped, indices in the hand.
+        stops: all that stopped, those that follow them, too.
+        rates: of every joint of the hand that moved until then, per turn of the first leader [-], shape (J,); followers
+            at their limits have 0.
+        posture: of the whole hand where they stopped [rad], shape (J,).
     """
 
     finger: Finger
-    leader: int
+    leaders: tuple[int, ...]
+    stops: tuple[int, ...]
     rates: FloatArray
     posture: FloatArray
+
+    @property
+    def leader(self) -> int:
+        """The first of the leaders."""
+        return self.leaders[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +83,50 @@ def closing_stages(hand: Hand, fingers: Sequence[Finger], opened: FloatArray, fi
             q = hand.coupled(moved)
             rates = np.zeros(len(hand.joints))
             rates[leader] = 1.0
-            for c in followers.values():
-                joint = hand.joints[c.follower]
-                if c.leader == leader and joint.lower < c.ratio * q[leader] + c.offset < joint.upper:
-                    rates[c.follower] = c.ratio
-            stages.append(Stage(finger, leader, rates, q))
+            _follow(hand, q, rates)
+            stages.append(Stage(finger, (leader,), tuple(np.flatnonzero(rates).tolist()), rates, q))
+    return stages
+
+
+def _follow(hand: Hand, q: FloatArray, rates: FloatArray) -> None:
+    """Write the rates of followers, which have none at their limits; posture and rates have shape (J,)."""
+    for c in hand.couplings:
+        joint = hand.joints[c.follower]
+        if joint.lower < c.ratio * q[c.leader] + c.offset < joint.upper:
+            rates[c.follower] = c.ratio * rates[c.leader]
+
+
+def stages_at_once(
+    hand: Hand, fingers: Sequence[Finger], opened: FloatArray, final: FloatArray, speeds: Mapping[str, float]
+) -> list[Stage]:
+    """Return the stages of fingers whose joints all moved at once, in the order in which they stopped.
+
+    Args:
+        hand: the hand. fingers: that closed. opened, final: postures of the whole hand [rad], shape (J,).
+        speeds: of free joints by name; 1 where not named.
+    """
+    leads = {c.follower: c.leader for c in hand.couplings}
+    free = {j: finger for finger in fingers for j in closing_joints(hand, finger) if j not in leads}
+    speed = np.zeros(len(hand.joints))
+    speed[list(free)] = [hand.joints[j].direction * speeds.get(hand.joints[j].name, 1.0) for j in free]
+    ends = {j: float((final[j] - opened[j]) / speed[j]) for j in free}
+    stages = []
+    while ends:
+        first = min(ends, key=lambda j: ends[j])
+        end, finger = ends[first], free[first]
+        joint = hand.joints[first]
+        limit = joint.upper if joint.direction > 0 else joint.lower
+        # A limit stops its joint alone, a touch all up to the link that touches.
+        alone = abs(float(final[first]) - limit) <= LIMIT_TOLERANCE
+        leaders = [j for j in ends if free[j] is finger and ends[j] - end <= _AT_ONCE and not (alone and j != first)]
+        turned = np.sign(speed) * np.minimum(np.abs(speed) * end, np.abs(final - opened))
+        q = hand.coupled(opened + turned)
+        rates = np.array([speed[j] if ends.get(j, -1.0) >= end else 0.0 for j in range(len(speed))]) / speed[first]
+        _follow(hand, q, rates)
+        stops = [j for j in np.flatnonzero(rates).tolist() if leads.get(j, j) in leaders]
+        stages.append(Stage(finger, tuple(leaders), tuple(stops), rates, q))
+        for j in leaders:
+            del ends[j]
     return stages
 
 

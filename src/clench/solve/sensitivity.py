@@ -14,7 +14,7 @@ from clench.base.pose import FloatArray
 from clench.grasp.plan import closing_joints
 from clench.grasp.pose_change import PoseChange
 from clench.grasp.scene import PackedObject, hash_hand, pack_object
-from clench.grasp.stages import closing_stages
+from clench.grasp.stages import closing_stages, stages_at_once
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -88,7 +88,7 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
     where their own touches let them be. Obstacles move with the object.
 
     Args:
-        solution: closed proximal first, once. hand, obj: those that it was computed for.
+        solution: closed in one round. hand, obj: those that it was computed for.
 
     Raises:
         ClenchError: another hand or object.
@@ -111,7 +111,11 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
         unknown = {names[j]: text for finger in moved for j in closing_joints(hand, finger)}
         columns = np.where(np.isin(names, list(unknown))[:, None], np.inf, np.zeros((len(names), 3)))
         return Sensitivity(names, origin, columns, columns.copy(), {}, unknown)
-    stages = closing_stages(hand, moved, opened, final)
+    orders = {f.best.order for f in solution.fingers.values() if f.best is not None}
+    if orders <= {ClosingOrder.PROXIMAL_FIRST}:
+        stages = closing_stages(hand, moved, opened, final)
+    else:
+        stages = stages_at_once(hand, moved, opened, final, solution.speeds)
     rows = PoseChange(hand, packed, source, solution.hand_pose, solution.object_pose, stages, obj.name)
     for number, stage in enumerate(stages):
         rows.add(number, stage, opened[stage.leader])
@@ -125,11 +129,8 @@ def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -
         result = solution.fingers[finger.name]
         if result.best is None:
             return f"the solution has no set of {finger.name}; in which order it closed is not known"
-        order = result.best.order
         if solution.rounds != 1:
             return "its joints were gone through more than once; changes are known for one round alone"
-        if order != ClosingOrder.PROXIMAL_FIRST:
-            return f"it closed in order '{order}'; changes are known for '{ClosingOrder.PROXIMAL_FIRST}' alone"
         if any(c.breakaway and c.follower in finger.joints for c in hand.couplings):
             return f"joints of {finger.name} break away; changes are known for groups that stop as one"
     return ""
