@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from clench.base.pose import FloatArray, Pose, rotation_about
 from clench.models.hand.hand import Coupling, Finger, Hand, Joint, JointRole, Link
+from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 X, Y, Z = np.eye(3)
@@ -17,6 +18,18 @@ def along_x(radius: float, length: float) -> Shape:
     """Return a capsule whose core runs from the link's origin to (length, 0, 0)."""
     half = np.sqrt(0.5)
     return Shape(ShapeKind.CAPSULE, (radius, length / 2, 0.0), Pose([length / 2, 0, 0], wxyz=[half, 0, half, 0]))
+
+
+def bipyramid(steep: float, flat: float, corners: int = 4, radius: float = 0.01) -> Shape:
+    """Return a body of two pyramids on one ring, with these slopes up and down [degrees]."""
+    around = 2.0 * np.pi * np.arange(corners) / corners
+    ring = radius * np.column_stack([np.cos(around), np.sin(around), np.zeros(corners)])
+    tips = [[0.0, 0.0, radius * np.tan(np.radians(steep))], [0.0, 0.0, -radius * np.tan(np.radians(flat))]]
+    k = np.arange(corners)
+    up = np.column_stack([k, (k + 1) % corners, np.full(corners, corners)])
+    down = np.column_stack([(k + 1) % corners, k, np.full(corners, corners + 1)])
+    mesh = TriangleMesh(np.vstack([ring, tips]), np.vstack([up, down]))
+    return Shape(ShapeKind.MESH, mesh=mesh)
 
 
 def mount(position: ArrayLike = (0.0, 0.0, 0.0), rotation: FloatArray | None = None) -> FloatArray:

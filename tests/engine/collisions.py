@@ -17,6 +17,8 @@ Floats = npt.NDArray[np.float64]
 
 #: How far each joint is backed off along its path, and how far it is advanced beyond its contact [rad].
 BACK, FURTHER = 1e-5, 1e-3
+#: Links that a shift by this takes off each other only press on each other [m].
+PRESSED = 1.01e-8
 #: Parts of the latter at which it is looked whether a contact stops its joint, the longest first.
 STEPS_BEYOND = (1.0, 0.3, 0.1, 0.01, 0.001)
 _LOOKS = 12
@@ -31,6 +33,32 @@ def tree_of(shape: Shape) -> fcl.BVHModel:
 def trees_of_links(hand: Hand) -> list[list[fcl.BVHModel]]:
     """Return the triangles of every link of a hand."""
     return [[tree_of(s) for s in link.shapes.get(hand.default_source, ())] for link in hand.links]
+
+
+def _collisions(one: list[fcl.CollisionObject], other: list[fcl.CollisionObject]) -> list[Floats]:
+    """Return the normals of contacts of two links' triangles."""
+    normals = []
+    for a in one:
+        for b in other:
+            found = fcl.CollisionResult()
+            fcl.collide(a, b, fcl.CollisionRequest(num_max_contacts=20, enable_contact=True), found)
+            normals += [np.array(contact.normal) for contact in found.contacts]
+    return normals
+
+
+def _parts(one: list[fcl.CollisionObject], other: list[fcl.CollisionObject], normals: list[Floats]) -> bool:
+    """Say whether a shift by `PRESSED` along a contact's normal takes two links off each other."""
+    places = [a.getTranslation() for a in one]
+    for normal in normals:
+        for shift in (PRESSED * normal, -PRESSED * normal):
+            for a, place in zip(one, places, strict=True):
+                a.setTranslation(place + shift)
+            free = not any(fcl.collide(a, b) for a in one for b in other)
+            for a, place in zip(one, places, strict=True):
+                a.setTranslation(place)
+            if free:
+                return True
+    return False
 
 
 class Collisions:
@@ -77,7 +105,7 @@ class Collisions:
         return [
             (self.hand.links[a].name, self.hand.links[b].name)
             for a, b in self.pairs
-            if any(fcl.collide(one, other) for one in placed[a] for other in placed[b])
+            if (met := _collisions(placed[a], placed[b])) and not _parts(placed[a], placed[b], met)
         ]
 
     def path(self, finger: Finger, start: Floats, end: Floats) -> list[Floats]:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import clench
-from chain_hands import HandBuilder, X, Y, Z, along_x, mount, turned
+from chain_hands import HandBuilder, X, Y, Z, along_x, bipyramid, mount, turned
 from clench.base.pose import Pose
-from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import Shape, ShapeKind
 
@@ -57,18 +56,6 @@ def test_a_link_that_ends_with_its_side_flush_to_a_face_overlaps_nothing(turn):
     solution = clench.solve(hand.hand(), GraspObject.from_shape(Shape(ShapeKind.BOX, (0.01, 0.01, 0.02))), command)
     assert solution.joint_angles["index_0"] == 0.3
     assert solution.certified, solution.certificate
-
-
-def bipyramid(steep, flat, corners=4, radius=0.01):
-    """Return a body of two pyramids on one ring, with these slopes up and down [degrees]."""
-    around = 2.0 * np.pi * np.arange(corners) / corners
-    ring = radius * np.column_stack([np.cos(around), np.sin(around), np.zeros(corners)])
-    tips = [[0.0, 0.0, radius * np.tan(np.radians(steep))], [0.0, 0.0, -radius * np.tan(np.radians(flat))]]
-    k = np.arange(corners)
-    up = np.column_stack([k, (k + 1) % corners, np.full(corners, corners)])
-    down = np.column_stack([(k + 1) % corners, k, np.full(corners, corners + 1)])
-    mesh = TriangleMesh(np.vstack([ring, tips]), np.vstack([up, down]))
-    return Shape(ShapeKind.MESH, mesh=mesh)
 
 
 @pytest.mark.parametrize("corners", [3, 4, 12])

@@ -9,8 +9,9 @@ import numpy as np
 
 from .bodies import BodyArrays, pack_bodies
 from .boxes import boxes_meet
-from .closest import AT_CORNER, separation
+from .closest import AT_CORNER, edge_count, face_normal, separation
 from .compiling import allocating_kernel, inner_kernel
+from .crossing import across
 from .family_pose import copy_pose
 from .layout import (
     HIT_FAMILY,
@@ -29,9 +30,13 @@ from .layout import (
     Floats,
     Ints,
 )
+from .leaving import side
 from .spatial_motion import turned
 from .sweeping import SweepWork, bodies_overlap, make_sweep_work, put_core
-from .vectors import plus, scaled
+from .vectors import Vector, dot, plus, scaled
+
+#: Bodies that a shift by this takes off each other do not overlap [m].
+PRESSED = 1e-8
 
 
 class ExactArrays(NamedTuple):
@@ -141,6 +146,69 @@ def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
     return int(last)
 
 
+@inner_kernel
+def overlap_truly(
+    links: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, sweep: SweepWork
+) -> bool:
+    """Say whether a link crosses another body, and not only presses on it; see `bodies_overlap`.
+
+    What comes to a stop crosses by what rounding and the touch tolerance leave: a shift by `PRESSED` takes it off,
+    across a face or along two edges of the elements that cross. Bodies that lie in each other still cross then.
+
+    Args:
+        sweep: has their poses.
+    """
+    if not bodies_overlap(links, m, resting, r, allowed, flush, sweep):
+        return False
+    i, k = sweep.pair[0], sweep.pair[1]
+    ka, kb = links.corners[i], resting.corners[k]
+    edges, others = edge_count(ka), edge_count(kb)
+    for way in range(2 * (2 + edges * others + 2 * (edges + others))):
+        put_core(links, i, sweep.moving, sweep.core)
+        put_core(resting, k, sweep.resting, sweep.fixed)
+        spans, n = pressed_along(sweep.core, ka, sweep.fixed, kb, way // 2)
+        if not spans:
+            continue
+        step = PRESSED if way % 2 == 0 else -PRESSED
+        x, y, z = sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3]
+        sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3] = plus((x, y, z), scaled(n, step))
+        apart = not bodies_overlap(links, m, resting, r, allowed, flush, sweep)
+        sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3] = x, y, z
+        if apart:
+            return False
+    return True
+
+
+@inner_kernel
+def pressed_along(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bool, Vector]:
+    """Return whether there is a unit direction of a number, and it: across a face of either core, or across two edges.
+
+    Where a face meets an edge that is taken for one: across both, the other core lies beside the face.
+    """
+    faces, edges, others = 2, edge_count(ka), edge_count(kb)
+    if number < faces:
+        return face_across(a, ka, b, kb, number)
+    number -= faces
+    if number < edges * others:
+        spans, m = across(side(a, ka, number // others), side(b, kb, number % others))
+    else:
+        number -= edges * others
+        found, n = face_across(a, ka, b, kb, number // (edges + others))
+        k = number % (edges + others)
+        spans, m = across(side(a, ka, k) if k < edges else side(b, kb, k - edges), n)
+        spans = spans and found
+    return spans, scaled(m, 1.0 / math.sqrt(dot(m, m))) if spans else m
+
+
+@inner_kernel
+def face_across(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bool, Vector]:
+    """Return whether the first (0) or second (1) of two cores is a face, and its unit normal."""
+    if (ka if number == 0 else kb) < 3:
+        return False, (0.0, 0.0, 0.0)
+    nx, ny, nz, size = face_normal(a) if number == 0 else face_normal(b)
+    return size > 0.0, (nx, ny, nz)
+
+
 @allocating_kernel
 def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
     """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
@@ -154,12 +222,12 @@ def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, 
     for m in range(links):
         copy_pose(poses[m], sweep.moving)
         copy_pose(T_palm_object, sweep.resting)
-        if bodies_overlap(exact.links, m, exact.object, 0, allowed, True, sweep):
+        if overlap_truly(exact.links, m, exact.object, 0, allowed, True, sweep):
             return m, links
         for r in range(m):
             if exact.checked[m, r] != 0 and boxes_meet(exact.links.box, poses, m, r):
                 copy_pose(poses[r], sweep.resting)
-                if bodies_overlap(exact.links, m, exact.links, r, allowed, False, sweep):
+                if overlap_truly(exact.links, m, exact.links, r, allowed, False, sweep):
                     return m, r
     return -1, -1
 

@@ -194,6 +194,8 @@ def bodies_overlap(
 ) -> bool:
     """Say whether two bodies cross each other's surface; see `body_gap`. Round ones may overlap by `allowed`.
 
+    The elements that cross are left in `work.pair`.
+
     Args:
         flush: sharp faces that only touch do not count. Faces alone do not tell bodies whose edges coincide from such
             that lie in each other: only where depth is measured as well.
@@ -210,6 +212,7 @@ def bodies_overlap(
             gap = element_gap(moving, a, resting, b, work)
             if a < 0 and b < 0:
                 corners, others = moving.corners[-1 - a], resting.corners[-1 - b]
+                work.pair[0], work.pair[1] = -1 - a, -1 - b
                 if gap < -allowed:
                     return True
                 if crosses(work.core, corners, work.fixed, others):
