@@ -41,10 +41,11 @@ TESTS = {
     "touching": [ROUND, TOUCHING],
     "segments": ["kernels/test_segments.py"],
     "closest": ["kernels/test_closest.py", "kernels/test_sweep_pairs.py"],
-    "core_motion": ["kernels/test_core_motion.py"],
+    "core_motion": ["kernels/test_core_motion.py", "kernels/test_spatial_motion.py"],
     "sweep_pairs": ["kernels/test_sweep_pairs.py", "kernels/test_leaving.py"],
     "leaving": ["kernels/test_leaving.py", "kernels/test_sweep_pairs.py"],
-    "earliest": ["kernels/test_earliest.py"],
+    "earliest": ["kernels/test_earliest.py", "kernels/test_spatial_sweep.py"],
+    "spatial_motion": ["kernels/test_spatial_motion.py", "kernels/test_spatial_sweep.py"],
     "sweeping": ["kernels/test_nearness.py", "grasp/test_boxes.py", WIDTH],
     "translation": ["kernels/test_translation.py"],
 }
