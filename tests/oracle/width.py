@@ -233,7 +233,7 @@ def make_case(seed: int, tilted: bool = False) -> Case:
     """Return a random finger of 1 to 4 joints, some coupled, and a random object: thick, thin, pointed or round.
 
     Args:
-        tilted: the joints' axes are not parallel, by anything from 3e-6 rad to a right angle.
+        tilted: the joints' axes are not parallel, by anything from 3e-10 rad to a right angle.
     """
     rng = np.random.default_rng([77, seed])
     joints = int(rng.integers(1, 5))
@@ -252,7 +252,7 @@ def make_case(seed: int, tilted: bool = False) -> Case:
 def tilted_axes(seed: int, joints: int) -> list[Floats]:
     """Return the axes of a finger's joints, each tilted off -y by its own angle about a random direction."""
     rng = np.random.default_rng([80, seed])
-    tilts = 10.0 ** rng.uniform(-5.5, 0.2, joints)
+    tilts = 10.0 ** rng.uniform(-9.5, 0.2, joints)
     return [rotation_about(unit(rng.normal(size=3)), float(tilt)) @ [0.0, -1.0, 0.0] for tilt in tilts]
 
 

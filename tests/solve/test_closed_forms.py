@@ -12,7 +12,7 @@ from clench.models.shapes import Shape, ShapeKind
 EXACT = 1e-9
 THICK = 0.008
 LONG = 0.2
-Y = np.array([0.0, 1.0, 0.0])
+X, Y, _ = np.eye(3)
 
 
 def command(**changes):
@@ -221,3 +221,46 @@ def test_axis_that_turns_between_joints_gives_families_of_their_own():
     assert solution.joint_angles["index_0"] == pytest.approx(0.0, abs=EXACT)
     expected = angle - np.arcsin((radius + thick) / distance)
     assert solution.joint_angles["index_2"] == pytest.approx(expected, abs=EXACT)
+
+
+@pytest.mark.parametrize("kind", ["capsule", "cylinder"])
+@pytest.mark.parametrize("full_width", [True, False])
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.09), (-0.04, -0.006, 0.09), (0.01, 0.0, 0.03), (0.022, 0.003, 0.02)])
+def test_a_rod_almost_in_the_planes_is_met_where_one_in_them_is(kind, full_width, place):
+    """Its section is a part of an ellipse that may be kilometres long; the finger stops at the part alone."""
+    box = Shape(ShapeKind.BOX, (0.0145, 0.0045, 0.0056), Pose([0.016, 0, 0]))
+    obj = clench.GraspObject.load(f"{kind}:r=0.006,h=0.04", pose=Pose(place))
+    angles = []
+    for tilt in (0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
+        axis = turned(X, tilt) @ -Y
+        hand = HandBuilder().finger("index", [box], [0.03], axes=[axis], upper=2.2).hand()
+        solution = clench.solve(hand, obj, command(planes=3, full_width=full_width))
+        angles.append(solution.joint_angles["index_0"])
+        assert angles[-1] == pytest.approx(angles[0], abs=5.0 * tilt + 1e-8)
+    assert (angles[0] == 2.2) == (place[2] > 0.05)
+
+
+@pytest.mark.parametrize("thing", ["object", "link"])
+def test_a_short_capsule_across_the_planes(thing):
+    """Both of its caps reach to the plane through its middle: three disks of one shape."""
+    half = np.sqrt(0.5)
+    across = Pose([0.03, 0.0, 0.04], wxyz=[half, half, 0, 0])
+    if thing == "object":
+        hand = HandBuilder().finger("index", [along_x(0.006, 0.05)], [0.05], upper=2.0).hand()
+        solution = clench.solve(hand, clench.GraspObject.load("capsule:r=0.01,h=0.012", pose=across), command(planes=5))
+        expected = np.arctan2(0.04, 0.03) - np.arcsin(0.016 / 0.05)
+        assert solution.joint_angles["index_0"] == pytest.approx(expected, abs=EXACT)
+    else:
+        hand = HandBuilder().finger("index", [along_x(0.0064, 0.01)], [0.01], axes=[[1.0, 0, 0]], upper=2.0).hand()
+        assert clench.solve(hand, ball(0.01, (0.0, 0.0, 0.05)), command(planes=5)).joint_angles["index_0"] == 2.0
+
+
+def test_an_arena_has_room_for_the_sections_of_short_capsules():
+    from clench.kernels.family_section import cut_rounds, make_sections
+    from clench.kernels.layout import RoundArrays
+
+    pose = turned(X, np.pi / 2.0)
+    rounds = RoundArrays(np.array([1]), np.array([[0.01, 0.006, 0.0]]), np.column_stack([pose, np.zeros(3)])[None])
+    sections = make_sections(1, 0, 1)
+    cut_rounds(rounds, np.eye(4)[:3].copy(), 0.0, 0, sections, np.empty((3, 4)))
+    assert sections.counts[0, 1] == 3 <= sections.disks.shape[1] == sections.disk_sources.shape[1]

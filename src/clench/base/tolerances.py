@@ -10,8 +10,9 @@ TOUCH_FRACTION: Final = 1e-9
 SWEEP_FRACTION: Final = 1e-10
 #: Foot points count as inside up to this fraction of the feature's length [-] (section 3).
 FOOT_FRACTION: Final = 1e-12
-#: Axes closer than this share one family of curl planes [rad] (section 1).
-PARALLEL_ANGLE: Final = 1e-6
+#: Axes closer than this share one family of curl planes [rad] (section 1, which says 1e-6: over a finger of 0.1 m that
+#: is off by 1e-7 m, a hundred times what a contact's gap may be).
+PARALLEL_ANGLE: Final = 1e-9
 #: Joints within this of the most distal joint's axis close the finger [rad] (section 1).
 CLOSING_ANGLE: Final = 0.08726646259971647  # 5 degrees
 #: A contact that a later motion opened by more than this is `passed` [m] (section 4).

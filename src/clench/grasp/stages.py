@@ -118,7 +118,11 @@ def stages_at_once(
         limit = joint.upper if joint.direction > 0 else joint.lower
         # A limit stops its joint alone, a touch all up to the link that touches.
         alone = abs(float(final[first]) - limit) <= LIMIT_TOLERANCE
-        leaders = [j for j in ends if free[j] is finger and ends[j] - end <= _AT_ONCE and not (alone and j != first)]
+        leaders = [
+            j
+            for j in ends
+            if free[j] is finger and ends[j] - end <= _AT_ONCE * max(end, 1.0) and not (alone and j != first)
+        ]
         turned = np.sign(speed) * np.minimum(np.abs(speed) * end, np.abs(final - opened))
         q = hand.coupled(opened + turned)
         rates = np.array([speed[j] if ends.get(j, -1.0) >= end else 0.0 for j in range(len(speed))]) / speed[first]

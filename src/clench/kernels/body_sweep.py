@@ -150,7 +150,7 @@ def sweep_body(
     or an element cannot meet the other item's ball.
 
     Args:
-        chain, count: what moves, and its rows. touch: gaps up to this touch [m].
+        chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
     stack, laid = work.stack, False

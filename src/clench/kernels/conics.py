@@ -16,6 +16,9 @@ from .coupled_pairs import side_foot
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning_pairs import note
 
+#: The range of a curve's normals is taken to be wider by this [rad].
+RANGE = 1e-9
+
 
 @inner_kernel
 def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
@@ -112,6 +115,34 @@ def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
 
 
 @inner_kernel
+def turn_into(angle: float, low: float, high: float) -> float:
+    """Return how far an angle grows until it is in a range, modulo a full turn; 0 where it is in there already."""
+    beyond = (angle - low) % (2.0 * math.pi)
+    return 0.0 if beyond <= high - low else 2.0 * math.pi - beyond
+
+
+@inner_kernel
+def turn_to_curve(e: Floats, nx: float, nz: float, sense: float) -> float:
+    """Return how far a side with normal n turns until the curved part of a region has a tangent along it.
+
+    Between two caps the normals of the curve are in two ranges, narrow ones where the ellipse is long: elsewhere a side
+    meets the corners, and the support of the whole ellipse would only tell of what is not there.
+
+    Args:
+        sense: of the turn, 1 from x to z.
+    """
+    a, b = e[4], e[5]
+    if e[6] <= -a and e[7] >= a:
+        return 0.0
+    first = math.atan2(math.sqrt(max(1.0 - (e[7] / a) ** 2, 0.0)) / b, e[7] / (a * a)) - RANGE
+    last = math.atan2(math.sqrt(max(1.0 - (e[6] / a) ** 2, 0.0)) / b, e[6] / (a * a)) + RANGE
+    angle = sense * math.atan2(nx * e[3] - nz * e[2], -nx * e[2] - nz * e[3])
+    # Either range is the other one's mirror image.
+    turn = min(turn_into(angle, first, last), turn_into(angle, -last, -first))
+    return turn + 0.5 * RANGE if turn > 0.0 else 0.0
+
+
+@inner_kernel
 def sweep_side_region(
     chain: Floats,
     terms: Floats,
@@ -135,9 +166,15 @@ def sweep_side_region(
     slack = FOOT_FRACTION * (tb - ta)
     s, sign = 0.0, 0.0
     for _ in range(STEPS):
-        value, slope, _ = evaluate(terms, n, constant, s)
         c, d = math.cos(rate * s), math.sin(rate * s)
         mx, mz = c * nx - d * nz, d * nx + c * nz
+        turn = turn_to_curve(e, mx, mz, math.copysign(1.0, rate))
+        if turn > 0.0:
+            if turn >= abs(rate) * (best - s):
+                return best
+            s, sign = s + turn / abs(rate), 0.0
+            continue
+        value, slope, _ = evaluate(terms, n, constant, s)
         size, change, t = support(e, mx, mz)
         value -= size
         slope -= rate * change

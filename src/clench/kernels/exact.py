@@ -31,7 +31,7 @@ from .layout import (
     Ints,
 )
 from .leaving import side
-from .spatial_motion import turned
+from .spatial_motion import turned_about
 from .sweeping import SweepWork, bodies_overlap, make_sweep_work, put_core
 from .vectors import Vector, dot, plus, scaled
 
@@ -124,8 +124,8 @@ def place_axes(exact: ExactArrays, entry: int, turns: Floats, sweep: SweepWork) 
             i = j - 1 - k
             about = (exact.axis[i, 0], exact.axis[i, 1], exact.axis[i, 2])
             pivot = (exact.anchor[i, 0], exact.anchor[i, 1], exact.anchor[i, 2])
-            axis = turned(axis, about, turns[i])
-            at = plus(pivot, turned(plus(at, scaled(pivot, -1.0)), about, turns[i]))
+            axis = turned_about(axis, about, turns[i])
+            at = plus(pivot, turned_about(plus(at, scaled(pivot, -1.0)), about, turns[i]))
         sweep.axis[j, 0], sweep.axis[j, 1], sweep.axis[j, 2] = axis
         sweep.anchor[j, 0], sweep.anchor[j, 1], sweep.anchor[j, 2] = at
 

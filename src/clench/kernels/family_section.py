@@ -13,12 +13,12 @@ from .tree import MeshTree
 
 
 def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
-    """Allocate an arena; a round primitive gives at most four segments, two disks and one ellipse."""
+    """Allocate an arena; a round primitive gives at most four segments, three disks and one ellipse."""
     return SectionArrays(
         np.empty((planes, capacity + 4 * rounds, 6)),
         np.empty((planes, capacity + 4 * rounds), dtype=np.int64),
-        np.empty((planes, 2 * rounds, 3)),
-        np.empty((planes, 2 * rounds), dtype=np.int64),
+        np.empty((planes, 3 * rounds, 3)),
+        np.empty((planes, 3 * rounds), dtype=np.int64),
         np.empty((planes, rounds, 8)),
         np.empty((planes, rounds), dtype=np.int64),
         np.zeros((planes, 3), dtype=np.int64),

@@ -36,7 +36,7 @@ def way_of(chain: Floats, i: int) -> Vector:
 
 
 @inner_kernel
-def turned(p: Vector, axis: Vector, angle: float) -> Vector:
+def turned_about(p: Vector, axis: Vector, angle: float) -> Vector:
     """Return a vector turned about a unit axis."""
     s, v = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
     across = cross(axis, p)
@@ -48,7 +48,7 @@ def moved(p: Vector, chain: Floats, count: int, s: float) -> Vector:
     """Return where a point is when the chain has moved by `s`."""
     for k in range(count):
         i = count - 1 - k
-        p = turned(p, axis_of(chain, i), chain[i, 0] * s)
+        p = turned_about(p, axis_of(chain, i), chain[i, 0] * s)
         if i > 0:
             p = plus(p, way_of(chain, i - 1))
     return p
@@ -58,10 +58,10 @@ def moved(p: Vector, chain: Floats, count: int, s: float) -> Vector:
 def moved_back(m: Vector, chain: Floats, count: int, s: float, step: float) -> Vector:
     """Return a direction that goes along with what moves as it was a step before `s + step`."""
     for i in range(count):
-        m = turned(m, axis_of(chain, i), -chain[i, 0] * (s + step))
+        m = turned_about(m, axis_of(chain, i), -chain[i, 0] * (s + step))
     for k in range(count):
         i = count - 1 - k
-        m = turned(m, axis_of(chain, i), chain[i, 0] * s)
+        m = turned_about(m, axis_of(chain, i), chain[i, 0] * s)
     return m
 
 
@@ -73,7 +73,7 @@ def point_motion(p: Vector, chain: Floats, count: int, s: float) -> tuple[Vector
         i = count - 1 - k
         axis, rate = axis_of(chain, i), float(chain[i, 0])
         w = scaled(axis, rate)
-        p, v, a = turned(p, axis, rate * s), turned(v, axis, rate * s), turned(a, axis, rate * s)
+        p, v, a = turned_about(p, axis, rate * s), turned_about(v, axis, rate * s), turned_about(a, axis, rate * s)
         along = cross(w, p)
         a = plus(a, plus(scaled(cross(w, v), 2.0), cross(w, along)))
         v = plus(v, along)

@@ -20,7 +20,7 @@ from .leaving import FLAT, OVERLAP, OVERLAPPING, move_on
 from .spatial_motion import is_spatial
 
 #: Planes that are laid for one pair at most; a pair that needs more stops there, which is safe.
-PLANES = 400
+PLANES = 2000
 #: From this plane on, planes that turn are tried as well.
 PLAIN = 8
 #: A pair stops when its gap is below this many times the level that its planes leave open [-].
@@ -168,7 +168,8 @@ def sweep_pair(
         core: the moving core relative to the last pivot [m], (3, 3). ka: its corners.
         fixed: the resting one relative to the first pivot [m], (3, 3). kb: its corners.
         w: sum of their radii [m].
-        chain, count: what moves, rows (Ω, e_x, e_z); the last row gives only its rate.
+        chain, count: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
+            see `spatial_motion`.
         touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
         placed: scratch space, (6, 3); its first rows are the moving core at the contact.
     """

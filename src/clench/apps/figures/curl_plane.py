@@ -216,9 +216,10 @@ def _angle_label(axes: Axes, joint: JointMotion, scene: PlaneScene) -> None:
 
 def outer_side(joint: JointMotion, joints: Sequence[JointMotion]) -> FloatArray:
     """Return the unit direction out of a knuckle, away from the side to which it closes, shape (2,)."""
-    arm = joint.arm / np.linalg.norm(joint.arm)
-    before = [j for j in joints if j.position < joint.position]
-    back = before[-1].arm / np.linalg.norm(before[-1].arm) if before else np.array([1.0, 0.0])
+    arms = [j.arm / np.linalg.norm(j.arm) for j in joints if j.position < joint.position and j.arm.any()]
+    back = arms[-1] if arms else np.array([1.0, 0.0])
+    # Joints in one place have no arm between them.
+    arm = joint.arm / np.linalg.norm(joint.arm) if joint.arm.any() else back
     across = np.array([arm[1], -arm[0]]) if joint.full_turn >= 0.0 else np.array([-arm[1], arm[0]])
     middle = back - arm
     size = float(np.linalg.norm(middle))
