@@ -100,3 +100,17 @@ def test_what_rests_on_a_plane_is_not_said_to_stay_above():
     core, chain = np.zeros((3, 3)), np.array([[1.0, 0.0, 0.0]])
     assert not stays_above(core, np.empty((6, 3)), 1, chain, 1, 0.0, 1.0, 0.0, 0.0, 0.0)
     assert stays_above(core, np.empty((6, 3)), 1, chain, 1, 0.0, 1.0, 0.0, -1e-12, 1.0)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(point, min_size=3, max_size=3), st.integers(1, 3), point)
+def test_the_distance_to_a_core_is_that_to_the_nearest_of_its_points(core, corners, p):
+    rows = np.array(core)
+    if corners > 1 and np.linalg.norm(rows[1] - rows[0]) < 1e-3:
+        return
+    s = np.linspace(0.0, 1.0, 61)
+    u, v = (s, np.zeros(1)) if corners == 2 else (s, s) if corners == 3 else (np.zeros(1), np.zeros(1))
+    weights = np.array([(1.0 - a - b, a, b) for a in u for b in v if a + b <= 1.0 + 1e-12])
+    sampled = np.linalg.norm(weights @ rows - p, axis=1).min()
+    found = point_to_core(*p, rows, corners)
+    assert sampled - 0.06 <= found <= sampled + 1e-12
