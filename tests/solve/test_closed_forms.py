@@ -231,7 +231,7 @@ def test_a_rod_almost_in_the_planes_is_met_where_one_in_them_is(kind, full_width
     box = Shape(ShapeKind.BOX, (0.0145, 0.0045, 0.0056), Pose([0.016, 0, 0]))
     obj = clench.GraspObject.load(f"{kind}:r=0.006,h=0.04", pose=Pose(place))
     angles = []
-    for tilt in (0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
+    for tilt in (0.0, 1e-10, 1e-9, 4e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
         axis = turned(X, tilt) @ -Y
         hand = HandBuilder().finger("index", [box], [0.03], axes=[axis], upper=2.2).hand()
         solution = clench.solve(hand, obj, command(planes=3, full_width=full_width))

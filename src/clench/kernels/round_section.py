@@ -11,6 +11,8 @@ SPHERE, CAPSULE, CYLINDER, ELLIPSOID = 0, 1, 2, 3
 
 #: Axes closer than this to the plane, or to its normal, count as in it, or normal to it [rad].
 ALIGNED = 1e-9
+#: A curve that bends by less than this fraction of the radius is straight [-].
+STRAIGHT = 1e-10
 
 
 @inner_kernel
@@ -105,18 +107,7 @@ def cut_cylinder(
             add_disk(x, z, radius, source, row, sections)
         return
     ux, uz = ax / flat, az / flat
-    if abs(ay) <= ALIGNED:
-        square = radius * radius - (offset - y) * (offset - y)
-        if square > 0.0:
-            k = math.sqrt(square)
-            lx, lz = x - half * ux, z - half * uz
-            hx, hz = x + half * ux, z + half * uz
-            vx, vz = -k * uz, k * ux
-            add_segment(lx + vx, lz + vz, hx + vx, hz + vz, -uz, ux, source, row, sections)
-            add_segment(lx - vx, lz - vz, hx - vx, hz - vz, uz, -ux, source, row, sections)
-            if caps:
-                add_segment(lx + vx, lz + vz, lx - vx, lz - vz, -ux, -uz, source, row, sections)
-                add_segment(hx + vx, hz + vz, hx - vx, hz - vz, ux, uz, source, row, sections)
+    if add_band(pose, radius, half, offset, caps, source, row, sections) or abs(ay) <= ALIGNED:
         return
     along = (offset - y) / ay
     a = radius / abs(ay)
@@ -130,6 +121,43 @@ def cut_cylinder(
             add_chord(cx, cz, ux, uz, radius * math.sqrt(1.0 - (low / a) ** 2), low, -1.0, source, row, sections)
         if high < a:
             add_chord(cx, cz, ux, uz, radius * math.sqrt(1.0 - (high / a) ** 2), high, 1.0, source, row, sections)
+
+
+@inner_kernel
+def add_band(
+    pose: Floats, radius: float, half: float, offset: float, caps: bool, source: int, row: int, sections: SectionArrays
+) -> bool:
+    """Append the section of a cylinder by straight edges where it is straight between its caps; say whether it is.
+
+    Of an axis that hardly leans out of the plane the section is a short part of a long ellipse, whose centre may be
+    kilometres away.
+    """
+    ax, ay, az = pose[0, 2], pose[1, 2], pose[2, 2]
+    away, square = offset - pose[1, 3], ax * ax + az * az
+    low = radius * radius - (away + half * ay) ** 2 / square
+    high = radius * radius - (away - half * ay) ** 2 / square
+    if low <= 0.0 or high <= 0.0:
+        return False
+    low, high = math.sqrt(low), math.sqrt(high)
+    if math.sqrt(radius * radius - away * away / square) - 0.5 * (low + high) > STRAIGHT * radius:
+        return False
+    flat = math.sqrt(square)
+    ux, uz = ax / flat, az / flat
+    # Where the axis' ends are along it, in the plane; and which way the edges run, along u and across it.
+    start, end = (-half - away * ay) / square, (half - away * ay) / square
+    lx, lz = pose[0, 3] + start * ax, pose[2, 3] + start * az
+    hx, hz = pose[0, 3] + end * ax, pose[2, 3] + end * az
+    run, rise = 2.0 * half / flat, high - low
+    size = math.hypot(run, rise)
+    c, s = run / size, rise / size
+    for side in (1.0, -1.0):
+        vx, vz = -side * uz, side * ux
+        nx, nz = c * vx - s * ux, c * vz - s * uz
+        add_segment(lx + low * vx, lz + low * vz, hx + high * vx, hz + high * vz, nx, nz, source, row, sections)
+    if caps:
+        add_segment(lx - low * uz, lz + low * ux, lx + low * uz, lz - low * ux, -ux, -uz, source, row, sections)
+        add_segment(hx - high * uz, hz + high * ux, hx + high * uz, hz - high * ux, ux, uz, source, row, sections)
+    return True
 
 
 @inner_kernel
