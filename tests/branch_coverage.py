@@ -25,7 +25,10 @@ BRIEF = (
     "grasp/test_depths.py",
     "apps/test_bench_peers.py",
 )
-WHOLE = ("solve/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py")
+WHOLE = (
+    *("solve/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),
+    *("kernels/test_pressing.py", "solve/test_close_by.py"),
+)
 STEP_TESTS = ("grasp", "solve", "kernels/test_warming.py")
 
 
