@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from clench.kernels import earliest
@@ -36,6 +36,7 @@ def test_the_measure_grows_with_the_turn():
 
 @settings(deadline=None, max_examples=300)
 @given(length, length, length, length, st.floats(0.0, 1.0))
+@example(1.0, 0.0, 1.0, 1.0, 0.9999999999999999)
 def test_a_point_enters_a_circle_where_sampling_says(ax, az, bx, bz, reach):
     found = ball_entry(ax, az, bx, bz, reach * reach)
     angles = np.linspace(0.0, 2 * math.pi, 4000, endpoint=False)

@@ -14,6 +14,8 @@ from .sweep_pairs import step_to_plane
 NEAR = 0.125
 #: Steps of a ball along its arc towards a core at most, and of a plane's check.
 STEPS = 8
+#: Of the squares that a distance comes from [-].
+ROUNDING = 1e-14
 #: Steps of a walk behind several joints at most.
 WALK = 24
 
@@ -39,9 +41,10 @@ def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> flo
     Args:
         ax, az: the point, which turns from x to z. bx, bz: the other one. square: of the distance [m²].
     """
-    if (ax - bx) ** 2 + (az - bz) ** 2 <= square:
-        return 0.0
     aa, bb = ax * ax + az * az, bx * bx + bz * bz
+    # What rounding puts just outside, and is about to enter, would come round a whole turn later.
+    if (ax - bx) ** 2 + (az - bz) ** 2 <= square + ROUNDING * (aa + bb):
+        return 0.0
     size = math.sqrt(aa * bb)
     if size == 0.0:
         return math.inf
