@@ -137,11 +137,16 @@ class Collisions:
         travels = [*np.linspace(0.0, stops[-1], 4 * _LOOKS), *(max(s - BACK, 0.0) for s in stops)]
         return [start + np.sign(run) * np.minimum(rates * s, np.abs(run)) for s in sorted(travels)]
 
-    def wrong_at_once(self, solution: clench.GraspSolution) -> tuple[Counter[str], list[str]]:
-        """Return what was looked at, and what collides on the path of a hand whose fingers all close at once."""
+    def closing(self, solution: clench.GraspSolution) -> tuple[Floats, Floats, Floats]:
+        """Return where the palm is for the object, shape (4, 4), and a solution's open and final postures, (J,)."""
         T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
         start = np.array([solution.open_angles[name] for name in self.hand.joint_names])
         end = np.array([solution.joint_angles[name] for name in self.hand.joint_names])
+        return T_object_palm, start, end
+
+    def wrong_at_once(self, solution: clench.GraspSolution) -> tuple[Counter[str], list[str]]:
+        """Return what was looked at, and what collides on the path of a hand whose fingers all close at once."""
+        T_object_palm, start, end = self.closing(solution)
         counted: Counter[str] = Counter(contacts=len(solution.contacts))
         for q in [*self.path_at_once(start, end), end]:
             counted["postures"] += 1
@@ -156,9 +161,7 @@ class Collisions:
         On the path and at its end nothing may collide; with a joint advanced alone beyond the contact that stops it,
         its finger must collide with the object.
         """
-        T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
-        start = np.array([solution.open_angles[name] for name in self.hand.joint_names])
-        end = np.array([solution.joint_angles[name] for name in self.hand.joint_names])
+        T_object_palm, start, end = self.closing(solution)
         counted: Counter[str] = Counter()
         wrong = [f"links {pair} collide at the end" for pair in self.collide_among(end)]
         for name in solution.fingers:

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from clench.kernels import core_motion
 from kernels.kernel_entries import entry
+from kernels.motion_check import STEPS, check_motion
 
 move_core, corner_motion, base_motion, plane_offset, plane_gap, turn_to_plane = (
     entry(getattr(core_motion, name))
@@ -49,23 +50,14 @@ def test_a_core_is_where_rotations_take_it(seed):
 @given(seeds)
 def test_speeds_and_accelerations_are_differences_and_within_their_bounds(seed):
     core, chain, n, s = drawn(seed)
-    h = 1e-4
-    tightest = np.zeros(2)
     for k in range(3):
-        before, now, after = (placed(core, chain, s + d)[k] @ n for d in (-h, 0.0, h))
-        slope, curvature, lever, bound = corner_motion(core, k, chain, len(chain), *n, s)
-        assert slope == pytest.approx((after - before) / (2.0 * h), abs=1e-7)
-        assert curvature == pytest.approx((after - 2.0 * now + before) / h**2, abs=1e-5)
-        for turn in np.linspace(-2.0, 2.0, 9):
-            there = corner_motion(core, k, chain, len(chain), *n, s + turn)
-            assert abs(there[0]) <= lever + 1e-15
-            assert abs(there[1]) <= bound + 1e-15
-            assert there[2:] == pytest.approx((lever, bound), rel=1e-12)
+        height = [placed(core, chain, s + d)[k] @ n for d in STEPS]
+        bounds = check_motion(lambda at, k=k: corner_motion(core, k, chain, len(chain), *n, at), s, height)
         arms = np.hypot(chain[:-1, 1], chain[:-1, 2])
         rates, across = np.abs(chain[:, 0]), np.hypot(n[0], n[2])
         arms = np.append(arms, np.hypot(core[k, 0], core[k, 2]))
         tightest = [rates @ arms, across * (rates**2 @ arms)]
-        assert [lever, bound] == pytest.approx(tightest, rel=1e-12)
+        assert bounds == pytest.approx(tightest, rel=1e-12)
     one, other = (
         base_motion(chain, len(chain), n[0], n[2], s),
         corner_motion(core * 0.0, 0, chain, len(chain), *n, s),

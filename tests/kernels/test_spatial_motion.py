@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from clench.kernels import core_motion
 from clench.kernels.spatial_motion import SPATIAL
 from kernels.kernel_entries import entry
+from kernels.motion_check import STEPS, check_motion
 
 move_core, corner_motion, carried_back, turn_rate = (
     entry(getattr(core_motion, name)) for name in ("move_core", "corner_motion", "carried_back", "turn_rate")
@@ -70,17 +71,9 @@ def test_a_direction_is_carried_back(seed):
 @given(seeds)
 def test_speeds_and_accelerations_are_differences_and_within_their_bounds(seed):
     core, chain, n, s = drawn(seed)
-    h = 1e-4
     for k in range(3):
-        before, now, after = (placed(core, chain, s + d)[k] @ n for d in (-h, 0.0, h))
-        slope, curvature, lever, bound = corner_motion(core, k, chain, len(chain), *n, s)
-        assert slope == pytest.approx((after - before) / (2.0 * h), abs=1e-7)
-        assert curvature == pytest.approx((after - 2.0 * now + before) / h**2, abs=1e-5)
-        for turn in np.linspace(-2.0, 2.0, 9):
-            there = corner_motion(core, k, chain, len(chain), *n, s + turn)
-            assert abs(there[0]) <= lever + 1e-15
-            assert abs(there[1]) <= bound + 1e-15
-            assert there[2:] == pytest.approx((lever, bound), rel=1e-12)
+        height = [placed(core, chain, s + d)[k] @ n for d in STEPS]
+        check_motion(lambda at, k=k: corner_motion(core, k, chain, len(chain), *n, at), s, height)
 
 
 @settings(deadline=None, max_examples=100)

@@ -325,8 +325,7 @@ def judge_places(seed: int, order: str, places: int) -> list[Judged]:
     Args:
         order: of closing; `speeds` is `together` with a random speed per joint; `tilted` before it tilts the axes.
     """
-    tilted, order = order.startswith("tilted "), order.removeprefix("tilted ")
-    case = make_case(seed, tilted)
+    case = make_case(seed, tilted=order.startswith("tilted "))
     oracle = Oracle(case)
     rng = np.random.default_rng([78, seed])
     length = sum(float(link.T_parent_link[0, 3]) for link in case.hand.links[2:]) + 0.035
@@ -335,11 +334,8 @@ def judge_places(seed: int, order: str, places: int) -> list[Judged]:
         place = case.place if number == 0 else random_place(rng, length)
         case = replace(case, place=place)
         oracle.place = place.matrix
-        judged = _judge(case, oracle, seed, order)
-        judged.wrong = [
-            f"{'tilted ' if tilted else ''}{order}, seed {seed}, place {number}: {sentence}"
-            for sentence in judged.wrong
-        ]
+        judged = _judge(case, oracle, seed, order.removeprefix("tilted "))
+        judged.wrong = [f"{order}, seed {seed}, place {number}: {sentence}" for sentence in judged.wrong]
         found.append(judged)
     return found
 

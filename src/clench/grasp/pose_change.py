@@ -14,7 +14,7 @@ from clench.models.shapes import CollisionSource
 
 from .exact import HandBodies, hand_bodies, swept_deviation
 from .scene import PackedObject
-from .stages import Stage, StageTouch, carried_links, stage_touches
+from .stages import Stage, StageTouch, at_limit, carried_links, stage_touches
 
 #: A touch whose normal is this close to perpendicular to the motion grazes: its cosine [-].
 GRAZING = 1e-3
@@ -59,7 +59,9 @@ class PoseChange:
         self.touches: dict[int, list[StageTouch]] = {}
         bodies = hand_bodies(hand, source)
         T_palm_object = invert(T_world_palm.matrix) @ T_world_object.matrix
-        moves = np.array([moved @ (s.rates != 0.0) & ~_at_limit(hand, s) for s in stages], dtype=np.bool_)
+        moves = np.array(
+            [moved @ (s.rates != 0.0) & ~at_limit(hand, s.leader, s.posture) for s in stages], dtype=np.bool_
+        )
         self.tie = _tolerance(bodies, self.poses)
         deviation = swept_deviation(hand, source, packed)
         for touch in stage_touches(
@@ -70,7 +72,7 @@ class PoseChange:
     def add(self, number: int, stage: Stage, opened: float) -> None:
         """Find what stopped a stage, and fill in its joints."""
         joint = self.hand.joints[stage.leader]
-        if _at_limit(self.hand, stage):
+        if at_limit(self.hand, stage.leader, stage.posture):
             self.stopped_by[joint.name] = "limit"
             return
         moved = abs(stage.posture[stage.leader] - opened) > LIMIT_TOLERANCE
@@ -135,12 +137,6 @@ class PoseChange:
 
     def _met(self, touch: StageTouch) -> str:
         return self.hand.links[touch.met].name if touch.met < len(self.hand.links) else self.object_name
-
-
-def _at_limit(hand: Hand, stage: Stage) -> bool:
-    joint = hand.joints[stage.leader]
-    limit = joint.upper if joint.direction > 0 else joint.lower
-    return abs(float(stage.posture[stage.leader]) - limit) <= LIMIT_TOLERANCE
 
 
 def _tolerance(bodies: HandBodies, poses: FloatArray) -> float:

@@ -114,10 +114,8 @@ def stages_at_once(
     while ends:
         first = min(ends, key=lambda j: ends[j])
         end, finger = ends[first], free[first]
-        joint = hand.joints[first]
-        limit = joint.upper if joint.direction > 0 else joint.lower
         # A limit stops its joint alone, a touch all up to the link that touches.
-        alone = abs(float(final[first]) - limit) <= LIMIT_TOLERANCE
+        alone = at_limit(hand, first, final)
         leaders = [
             j
             for j in ends
@@ -132,6 +130,17 @@ def stages_at_once(
         for j in leaders:
             del ends[j]
     return stages
+
+
+def at_limit(hand: Hand, joint: int, q: FloatArray) -> bool:
+    """Say whether a joint is at the limit that it closes to.
+
+    Args:
+        joint: index in the hand. q: posture of the whole hand [rad], shape (J,).
+    """
+    closing = hand.joints[joint]
+    limit = closing.upper if closing.direction > 0 else closing.lower
+    return abs(float(q[joint]) - limit) <= LIMIT_TOLERANCE
 
 
 def carried_links(hand: Hand) -> NDArray[np.bool_]:

@@ -101,8 +101,6 @@ def close_group(
                 T_palm_object,
                 sections,
                 base,
-                chain.joint_family[last],
-                chain.joint_group[last],
                 last,
                 plane,
                 met,
@@ -181,8 +179,6 @@ def write_contact(
     T_palm_object: Floats,
     sections: SectionArrays,
     base: int,
-    family: int,
-    group: int,
     joint: int,
     plane: int,
     met: int,
@@ -193,10 +189,11 @@ def write_contact(
     items: ItemArrays,
     answer: ClosingArrays,
 ) -> None:
-    """Write a contact that stops a group, up to `joint`; in a further round it takes the place of the earlier one.
+    """Write a contact that stops the group of `joint`, up to it; in a further round it takes the earlier one's place.
 
     Where a plane's contact and an exact one are the same touch, the plane describes it: it says more.
     """
+    family, group = hand.chain.joint_family[joint], hand.chain.joint_group[joint]
     n = 0
     while n < answer.contacts[i] and not stops_same(hand.chain, answer.hit[i, n], group, joint):
         n += 1

@@ -243,11 +243,12 @@ def place_active(
     sweep: SweepWork,
 ) -> None:
     """Place the joints of every family that has active ones in its frame, and in the palm's where they are several."""
-    before = -1
+    before, several = -1, False
     for j in range(first, rates.shape[0]):
         family = chain.joint_family[j]
         if rates[j] != 0.0 and family != before:
             place_joints(chain, family, turns, work.place)
-            if before >= 0:
-                place_axes(exact, entry, turns, sweep)
+            several = before >= 0
             before = family
+    if several:
+        place_axes(exact, entry, turns, sweep)

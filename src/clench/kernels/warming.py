@@ -129,10 +129,10 @@ def sample_values() -> dict[str, Any]:
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values["tree"] = tree
     values |= dict.fromkeys(("closed", "together"), True)
-    values |= dict.fromkeys(("family", "start", "base", "low", "high", "i", "times", "group", "plane", "entry"), 0)
+    values |= dict.fromkeys(("family", "start", "base", "low", "high", "times", "group", "plane", "entry"), 0)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
-        "f2": ("T_palm_object", "T_palm_family", "first", "second", "out", "postures", "place"),
+        "f2": ("T_palm_object", "first", "second", "out", "postures"),
         "i1": ("overlaps", "hit", "wanted"),
         "f3": ("poses", "placed", "scratch", "families"),
     }
