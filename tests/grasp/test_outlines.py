@@ -100,6 +100,15 @@ def test_a_capsule_in_the_plane_is_two_points_and_a_radius():
     np.testing.assert_allclose(sorted(outline.sides[:, 1]), [-1.0, 1.0])
 
 
+def test_a_section_of_no_width_is_its_two_ends():
+    shape = Shape(ShapeKind.ELLIPSOID, (0.03, 1e-320, 0.01), Pose([0.02, 0, 0]))
+    T = np.eye(4)
+    T[0, 1], T[1, 0], T[1, 3] = -1.76e-22, -1.76e-22, -3.5e-24
+    outline = cut_shape(shape, T, -8.78e-24)
+    assert len(outline.vertices) == len(outline.sides) == 2
+    np.testing.assert_allclose(np.ptp(outline.vertices, axis=0), [0.0, 0.0188], atol=1e-4)
+
+
 def test_sides_of_a_mesh_look_out_and_meet_their_vertices():
     box = Shape(ShapeKind.BOX, (0.01, 0.02, 0.03)).to_mesh()
     outline = cut_shape(Shape(ShapeKind.MESH, mesh=box), np.eye(4), 0.003)

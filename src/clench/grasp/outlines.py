@@ -259,9 +259,14 @@ def _steps(radius: float) -> FloatArray:
 
 
 def _hull(points: FloatArray) -> FloatArray:
-    from scipy.spatial import ConvexHull
+    """Return the corners of the convex hull, counter-clockwise; the ends where points lie on a line."""
+    from scipy.spatial import ConvexHull, QhullError
 
-    return points[ConvexHull(points).vertices]
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        along = points[:, np.argmax(np.ptp(points, axis=0))]
+        return np.unique(points[[np.argmin(along), np.argmax(along)]], axis=0)
 
 
 def _ring(core: FloatArray) -> FloatArray:
