@@ -27,7 +27,7 @@ BRIEF = (
 )
 WHOLE = (
     *("solve/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),
-    *("kernels/test_pressing.py", "solve/test_close_by.py"),
+    *("kernels/test_pressing.py", "solve/test_close_by.py", "solve/test_orders.py"),
 )
 STEP_TESTS = ("grasp", "solve", "kernels/test_warming.py")
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from clench.kernels import stage_sweep
 from kernels.kernel_entries import entry
 
-lanes_apart = entry(stage_sweep.lanes_apart)
+put_lane, lanes_apart = entry(stage_sweep.put_lane), entry(stage_sweep.lanes_apart)
 
 number = st.floats(-1.0, 1.0)
 box = st.tuples(number, number, number, *[st.floats(0.0, 0.5)] * 3)
@@ -21,18 +21,20 @@ def placed(turn, place):
     return np.column_stack([Rotation.from_rotvec(turn).as_matrix(), place])
 
 
-def lane(box, T):
-    """Return the extent of a box along y."""
+def lane(box, T, family):
+    """Return the extent of a box along a family's y axis."""
     corners = np.array([np.add(box[:3], np.multiply(box[3:], s)) for s in itertools.product((-1.0, 1.0), repeat=3)])
-    y = corners @ T[1, :3] + T[1, 3]
+    y = (corners @ T[:, :3].T + T[:, 3]) @ family[:, 1]
     return y.min(), y.max()
 
 
 @settings(deadline=None, max_examples=300)
-@given(box, pose, box, pose)
-def test_boxes_are_apart_where_their_corners_are(one, there, other, elsewhere):
-    T, R = placed(*there), placed(*elsewhere)
-    (low, high), (least, most) = lane(one, T), lane(other, R)
-    between = max(least - high, low - most)
-    if abs(between) > 1e-12:
-        assert lanes_apart(np.array(one), T, np.array(other), R) == (between > 0.0)
+@given(box, pose, box, pose, pose)
+def test_boxes_are_apart_where_their_corners_are(one, there, other, elsewhere, family):
+    T, R, F = placed(*there), placed(*elsewhere), placed(*family)
+    lanes = np.empty((2, 2))
+    for row, (size, at) in zip(lanes, ((one, T), (other, R)), strict=True):
+        put_lane(np.array(size), at, F, row)
+        np.testing.assert_allclose(row, lane(size, at, F), atol=1e-14)
+    (low, high), (least, most) = lanes
+    assert lanes_apart(*lanes) == lanes_apart(*lanes[::-1]) == (max(least - high, low - most) > 0.0)

@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from clench.kernels import core_motion
 from clench.kernels.leaving import OVERLAP
 from clench.kernels.sweep_pairs import sweep_pair
+from kernels.kernel_entries import entry
+
+move_core, plane_gap = entry(core_motion.move_core), entry(core_motion.plane_gap)
 
 TOUCH = 1e-11
 BEST = 1.5
@@ -155,3 +159,27 @@ def test_sharp_edges_that_touch_and_are_all_but_parallel_do_not_overlap(sine):
         above = [at + 0.5 * u, at - 0.7 * u, at + rng.uniform(-0.02, 0.02) * across + rng.uniform(1e-6, 0.02) * up]
         below = [at + 0.4 * v, at - 0.6 * v, at + rng.uniform(-0.02, 0.02) * across - rng.uniform(1e-6, 0.02) * up]
         assert swept(np.array(above) - deep * up, below) != OVERLAP
+
+
+def test_a_plane_that_is_told_keeps_the_cores_apart_on_the_whole_way():
+    rng = np.random.default_rng(5)
+    told = met = neither = 0
+    for _ in range(600):
+        (ka, kb, count), w = rng.integers(1, [4, 4, 3]), float(rng.choice([0.0, 0.003]))
+        core, fixed = rng.uniform(-0.03, 0.03, (2, 3, 3))
+        fixed[:, 2] += 0.03
+        chain = np.column_stack([rng.uniform(0.5, 2.0, count), rng.uniform(-0.02, 0.02, (count, 2))])
+        placed, there = np.zeros((6, 3)), np.zeros((6, 3))
+        found = sweep_pair(core, ka, fixed, kb, w, chain, count, TOUCH, 0.8, False, placed)
+        n = placed[5]
+        if found < 0.8:
+            met += 1
+        elif not n.any():
+            neither += 1
+        else:
+            told += 1
+            assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-12)
+            for s in np.linspace(0.0, 0.8, 101):
+                move_core(core, ka, chain, count, s, there)
+                assert plane_gap(there, ka, fixed, kb, *n) >= w
+    assert min(told, met, neither) > 30

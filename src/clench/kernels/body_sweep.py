@@ -121,6 +121,16 @@ def lay_plane(ka: int, wa: float, kb: int, wb: float, work: SweepWork) -> None:
 
 
 @inner_kernel
+def keep_plane(kb: int, wb: float, touch: float, work: SweepWork) -> bool:
+    """Write the plane that kept apart two elements that never meet, if one did; say so. It lies on the resting one."""
+    nx, ny, nz = work.placed[5, 0], work.placed[5, 1], work.placed[5, 2]
+    plane = work.plane
+    plane[0], plane[1], plane[2] = nx, ny, nz
+    plane[3] = plane_offset(work.fixed, kb, nx, ny, nz) + wb + 0.25 * touch
+    return bool(nx != 0.0 or ny != 0.0 or nz != 0.0)
+
+
+@inner_kernel
 def plane_parts(
     ka: int, wa: float, kb: int, wb: float, chain: Floats, count: int, best: float, work: SweepWork
 ) -> bool:
@@ -153,7 +163,7 @@ def sweep_body(
         chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
-    stack, laid = work.stack, False
+    stack, laid, met = work.stack, False, False
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
     limit = best if count > 1 else measure_of(abs(chain[0, 0]) * best)
     waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
@@ -175,6 +185,8 @@ def sweep_body(
             continue
         found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, best, False, work.placed)
         if found >= best:
+            if not met:
+                laid = keep_plane(kb, wb, touch, work)
             continue
         best = found
         work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
@@ -182,5 +194,5 @@ def sweep_body(
             return best
         limit = best if count > 1 else measure_of(abs(chain[0, 0]) * best)
         lay_plane(ka, wa, kb, wb, work)
-        laid = True
+        laid = met = True
     return best

@@ -107,21 +107,20 @@ def separation(a: Floats, ka: int, b: Floats, kb: int) -> Separation:
     if k >= 0:
         d, nx, ny, nz, fa, fb = e, -mx, -my, -mz, AT_FACE, AT_CORNER
         qx, qy, qz = b[k, 0], b[k, 1], b[k, 2]
-    square = d * d
+    square, s, t, dx, dy, dz, edge, other = d * d, 0.0, 0.0, 0.0, 0.0, 0.0, -1, -1
     for i in range(edge_count(ka)):
-        ia = (i + 1) % ka
         for k in range(edge_count(kb)):
-            kb2 = (k + 1) % kb
-            s, t, dx, dy, dz, apart = edge_pair(a, i, ia, b, k, kb2)
+            at, there, x, y, z, apart = edge_pair(a, i, (i + 1) % ka, b, k, (k + 1) % kb)
             if apart < square:
-                square = apart
-                d = math.sqrt(apart)
-                fa = AT_EDGE if 0.0 < s < 1.0 else AT_CORNER
-                fb = AT_EDGE if 0.0 < t < 1.0 else AT_CORNER
-                nx, ny, nz = edge_direction(a, i, ia, b, k, kb2, dx, dy, dz, fa == AT_EDGE and fb == AT_EDGE)
-                qx = b[k, 0] + t * (b[kb2, 0] - b[k, 0])
-                qy = b[k, 1] + t * (b[kb2, 1] - b[k, 1])
-                qz = b[k, 2] + t * (b[kb2, 2] - b[k, 2])
+                square, s, t, dx, dy, dz, edge, other = apart, at, there, x, y, z, i, k
+    if edge >= 0:
+        d, i, k, m = math.sqrt(square), (edge + 1) % ka, other, (other + 1) % kb
+        fa = AT_EDGE if 0.0 < s < 1.0 else AT_CORNER
+        fb = AT_EDGE if 0.0 < t < 1.0 else AT_CORNER
+        nx, ny, nz = edge_direction(a, edge, i, b, k, m, dx, dy, dz, fa == AT_EDGE and fb == AT_EDGE)
+        qx = b[k, 0] + t * (b[m, 0] - b[k, 0])
+        qy = b[k, 1] + t * (b[m, 1] - b[k, 1])
+        qz = b[k, 2] + t * (b[m, 2] - b[k, 2])
     return d, nx, ny, nz, fa, fb, qx, qy, qz
 
 

@@ -195,6 +195,8 @@ def _sweep_at(s: SweepWork, n: int) -> SweepWork:
         s.moving[n],
         s.resting[n],
         s.poses[n],
+        s.lane[n],
+        s.after[n],
         s.stack[n],
         s.keys[n],
         s.plane[n],

@@ -6,6 +6,8 @@ families move at once is seen in the palm frame, with a chain that has an axis p
 
 from __future__ import annotations
 
+import math
+
 from clench.base.tolerances import SWEEP_FRACTION
 
 from .advance import fill_chain, place_joints
@@ -39,8 +41,6 @@ def sweep_turning(
     count, last, _, _ = fill_chain(joint, first, rates, place, work)
     compose_inverse(T_palm_family, sweep.poses[m], moving)
     compose_inverse(T_palm_family, T_palm_resting, other)
-    if lanes_apart(links.box[m], moving, resting.box[r], other):
-        return best
     moving[0, 3], moving[2, 3] = moving[0, 3] - place[last, 0], moving[2, 3] - place[last, 1]
     other[0, 3], other[2, 3] = other[0, 3] - place[first, 0], other[2, 3] - place[first, 1]
     return sweep_body(links, m, resting, r, work.chain, count, touch, best, sweep)
@@ -87,13 +87,21 @@ def sweep_spatially(
 
 
 @inner_kernel
-def lanes_apart(box: Floats, T: Floats, other: Floats, T_other: Floats) -> bool:
-    """Say whether two boxes lie apart along the axis that the joints of a family turn about: then nothing meets."""
-    away, reach = T[1, 3] - T_other[1, 3], 0.0
+def put_lane(box: Floats, T: Floats, T_palm_family: Floats, lane: Floats) -> None:
+    """Write the extent of a body's box along the axis that the joints of a family turn about."""
+    x, y, z = T_palm_family[0, 1], T_palm_family[1, 1], T_palm_family[2, 1]
+    middle, half = x * T[0, 3] + y * T[1, 3] + z * T[2, 3], 0.0
     for k in range(3):
-        away += T[1, k] * box[k] - T_other[1, k] * other[k]
-        reach += abs(T[1, k]) * box[3 + k] + abs(T_other[1, k]) * other[3 + k]
-    return bool(abs(away) > reach)
+        along = x * T[0, k] + y * T[1, k] + z * T[2, k]
+        middle += along * box[k]
+        half += abs(along) * box[3 + k]
+    lane[0], lane[1] = middle - half, middle + half
+
+
+@inner_kernel
+def lanes_apart(one: Floats, other: Floats) -> bool:
+    """Say whether two extents lie apart along the axis that everything turns about: then nothing meets."""
+    return bool(one[0] > other[1] or other[0] > one[1])
 
 
 @inner_kernel
@@ -132,12 +140,34 @@ def sweep_link(
 
 
 @inner_kernel
-def first_after(exact: ExactArrays, entry: int, link: int, first: int, joint: int, rates: Floats) -> int:
-    """Return the first active joint, up to `joint`, that does not move a link, or one more than `joint`."""
+def first_after(exact: ExactArrays, entry: int, link: int, first: int, rates: Floats) -> int:
+    """Return the first active joint that does not move a link, or how many joints there are."""
     j = last_mover(exact, entry, link, first - 1) + 1
-    while j <= joint and rates[j] == 0.0:
+    while j < rates.shape[0] and rates[j] == 0.0:
         j += 1
     return j
+
+
+@inner_kernel
+def put_lanes(
+    exact: ExactArrays,
+    entry: int,
+    T_palm_family: Floats,
+    T_palm_object: Floats,
+    several: bool,
+    first: int,
+    rates: Floats,
+    sweep: SweepWork,
+) -> None:
+    """Write `lane` and `after` of every link at `sweep.poses`; of `several` families all are in each other's lanes."""
+    links, lane = exact.checked.shape[0], sweep.lane
+    for r in range(links):
+        sweep.after[r] = first_after(exact, entry, r, first, rates)
+        put_lane(exact.links.box[r], sweep.poses[r], T_palm_family, lane[r])
+    put_lane(exact.object.box[0], T_palm_object, T_palm_family, lane[links])
+    if several:
+        for r in range(links + 1):
+            lane[r, 0], lane[r, 1] = -math.inf, math.inf
 
 
 @inner_kernel
@@ -165,8 +195,8 @@ def sweep_links(
         if exact.checked[m, r] == 0:
             continue
         # Seen from a link that moves as well, only the joints after its own turn.
-        after = first_after(exact, entry, r, first, joint, rates)
-        if after > joint:
+        after = sweep.after[r]
+        if after > joint or lanes_apart(sweep.lane[m], sweep.lane[r]):
             continue
         found = sweep_link(
             exact, chain, families, m, exact.links, r, sweep.poses[r], after, joint, rates, touch, best, work, sweep
@@ -211,15 +241,18 @@ def sweep_stage(
         return best, -1
     touch = SWEEP_FRACTION * length
     met, links = -1, exact.checked.shape[0]
-    place_active(exact, chain, entry, first, turns, rates, work, sweep)
+    several = place_active(exact, chain, entry, first, turns, rates, work, sweep)
     pose_movers(exact, chain, entry, turns, sweep.poses)
+    put_lanes(exact, entry, families[chain.joint_family[first]], T_palm_object, several, first, rates, sweep)
     for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
         m, joint = exact.mover_link[n], exact.mover_joint[n]
         if joint < first or exact.links.root[m] < 0:
             continue
-        found = sweep_link(
-            exact, chain, families, m, exact.object, 0, T_palm_object, first, joint, rates, touch, best, work, sweep
-        )
+        found = best
+        if not lanes_apart(sweep.lane[m], sweep.lane[links]):
+            found = sweep_link(
+                exact, chain, families, m, exact.object, 0, T_palm_object, first, joint, rates, touch, best, work, sweep
+            )
         if found < best:
             best, met = found, links
             keep_pair(sweep)
@@ -241,8 +274,12 @@ def place_active(
     rates: Floats,
     work: Work,
     sweep: SweepWork,
-) -> None:
-    """Place the joints of every family that has active ones in its frame, and in the palm's where they are several."""
+) -> bool:
+    """Place the joints of every family that has active ones in its frame, and in the palm's where they are several.
+
+    Returns:
+        whether they are.
+    """
     before, several = -1, False
     for j in range(first, rates.shape[0]):
         family = chain.joint_family[j]
@@ -252,3 +289,4 @@ def place_active(
             before = family
     if several:
         place_axes(exact, entry, turns, sweep)
+    return several

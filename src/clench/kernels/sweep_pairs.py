@@ -171,7 +171,8 @@ def sweep_pair(
         chain, count: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
             see `spatial_motion`.
         touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
-        placed: scratch space, (6, 3); its first rows are the moving core at the contact.
+        placed: scratch space, (6, 3); its first rows are the moving core at the contact. Where nothing is
+            met, its last row is the normal of a plane that keeps the cores apart from the start on, or zero.
     """
     s, level, leap = 0.0, -1.0, 1.0
     for turn in range(PLANES):
@@ -200,7 +201,7 @@ def sweep_pair(
                 return OVERLAP if flat and free == OVERLAP and not apart else s
             level, step = -1.0, free if s + free >= best else 0.5 * free
         elif turn >= PLAIN and not is_spatial(chain) and passes_by(placed, ka, fixed, kb, w + level):
-            return best
+            step = math.inf
         elif turn >= PLAIN:
             # Edges that slide along each other: the closest points run, and no plane that rests lasts.
             longer = turning_step(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, level, leap, best - s)
@@ -208,5 +209,7 @@ def sweep_pair(
             step = max(step, longer)
         s += step
         if s >= best:
+            alone = 1.0 if turn == 0 and level > 0.0 else 0.0
+            placed[5, 0], placed[5, 1], placed[5, 2] = alone * nx, alone * ny, alone * nz
             return best
     return s

@@ -10,7 +10,9 @@ import numpy as np
 from .bodies import BodyArrays
 from .closest import crosses, separation
 from .compiling import inner_allocating_kernel, inner_kernel
+from .core_motion import plane_gap
 from .crossing import only_touch
+from .earliest import point_to_core
 from .layout import Floats, Ints
 from .spatial_motion import SPATIAL
 
@@ -27,6 +29,8 @@ class SweepWork(NamedTuple):
             `spatial_motion`, (J, 7).
         moving, resting: poses of two bodies relative to their pivots, (3, 4).
         poses: `T_palm_link` of every link, (L, 3, 4).
+        lane: extent of every link, and of the object last, along the axis that a segment turns about, (L + 1, 2).
+        after: the first joint that moves and does not move a link, (L,).
         stack, keys: pairs of items that wait, and when they can meet at the earliest, (PAIRS, 2) and (PAIRS,).
         plane: normal and offset of one that keeps bodies apart, relative to the first pivot, (4,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
@@ -42,6 +46,8 @@ class SweepWork(NamedTuple):
     moving: Floats
     resting: Floats
     poses: Floats
+    lane: Floats
+    after: Ints
     stack: Ints
     keys: Floats
     plane: Floats
@@ -63,6 +69,8 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((3, 4)),
         np.empty((3, 4)),
         np.empty((links, 3, 4)),
+        np.empty((links + 1, 2)),
+        np.empty(links, dtype=np.int64),
         np.empty((PAIRS, 2), dtype=np.int64),
         np.empty(PAIRS),
         np.empty(4),
@@ -200,7 +208,7 @@ def bodies_overlap(
         flush: sharp faces that only touch do not count. Faces alone do not tell bodies whose edges coincide from such
             that lie in each other: only where depth is measured as well.
     """
-    stack = work.stack
+    stack, nx, ny, nz = work.stack, 0.0, 0.0, 0.0
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
     waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
     while waiting > 0:
@@ -209,21 +217,34 @@ def bodies_overlap(
         if ball_gap(moving, a, resting, b, work) > 0.0:
             continue
         if a < 0 or b < 0:
-            gap = element_gap(moving, a, resting, b, work)
-            if a < 0 and b < 0:
-                corners, others = moving.corners[-1 - a], resting.corners[-1 - b]
-                work.pair[0], work.pair[1] = -1 - a, -1 - b
-                if gap < -allowed:
-                    return True
-                if crosses(work.core, corners, work.fixed, others):
-                    sharp = moving.radius[-1 - a] + resting.radius[-1 - b] == 0.0
-                    if not (flush and sharp and only_touch(work.core, corners, work.fixed, others)):
-                        return True
+            ka, wa = put_item(moving, a, work.moving, work.core)
+            kb, wb = put_item(resting, b, work.resting, work.fixed)
+            # What parted two elements parts most of what is beside them.
+            if plane_gap(work.core, ka, work.fixed, kb, nx, ny, nz) > wa + wb:
                 continue
-            if gap > 0.0:
+            if a < 0 and b < 0:
+                d, mx, my, mz, _, _, _, _, _ = separation(work.core, ka, work.fixed, kb)
+                work.pair[0], work.pair[1] = -1 - a, -1 - b
+                if d - wa - wb < -allowed:
+                    return True
+                if crosses(work.core, ka, work.fixed, kb):
+                    if not (flush and wa + wb == 0.0 and only_touch(work.core, ka, work.fixed, kb)):
+                        return True
+                else:
+                    nx, ny, nz = mx, my, mz
+                continue
+            if away_from_ball(work, ka, kb, a < 0) > wa + wb:
                 continue
         waiting = split_pair(moving, a, resting, b, stack, waiting)
     return False
+
+
+@inner_kernel
+def away_from_ball(work: SweepWork, ka: int, kb: int, first: bool) -> float:
+    """Return how far the `first` core, or else the second, is from the centre that is the other one."""
+    if first:
+        return point_to_core(work.fixed[0, 0], work.fixed[0, 1], work.fixed[0, 2], work.core, ka)
+    return point_to_core(work.core[0, 0], work.core[0, 1], work.core[0, 2], work.fixed, kb)
 
 
 @inner_kernel
