@@ -115,3 +115,17 @@ def test_the_distance_to_a_core_is_that_to_the_nearest_of_its_points(core, corne
     sampled = np.linalg.norm(weights @ rows - p, axis=1).min()
     found = point_to_core(*p, rows, corners)
     assert sampled - 0.06 <= found <= sampled + 1e-12
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-14, 1e-10, 1e-7, 1e-5])
+def test_a_point_is_as_far_from_a_sliver_as_from_its_long_side(height):
+    rng = np.random.default_rng(1)
+    for _ in range(2000):
+        a, run, p = rng.normal(size=3), rng.normal(size=3), rng.normal(size=3)
+        size = np.linalg.norm(run)
+        beside = np.cross(run, rng.normal(size=3))
+        third = a + rng.uniform(0.02, 0.98) * run + height * size * beside / np.linalg.norm(beside)
+        sliver = rng.permutation(np.array([a, a + run, third]))
+        t = np.clip((p - a) @ run / size**2, 0.0, 1.0)
+        expected = np.linalg.norm(a + t * run - p)
+        assert point_to_core(*p, sliver, 3) == pytest.approx(expected, abs=height * size + 1e-14 * (1.0 + size))

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from clench.kernels import stage_sweep
 from kernels.kernel_entries import entry
 
-put_lane, lanes_apart = entry(stage_sweep.put_lane), entry(stage_sweep.lanes_apart)
+lane_of, lanes_apart = entry(stage_sweep.lane_of), entry(stage_sweep.lanes_apart)
 
 number = st.floats(-1.0, 1.0)
 box = st.tuples(number, number, number, *[st.floats(0.0, 0.5)] * 3)
@@ -32,9 +32,7 @@ def lane(box, T, family):
 @given(box, pose, box, pose, pose)
 def test_boxes_are_apart_where_their_corners_are(one, there, other, elsewhere, family):
     T, R, F = placed(*there), placed(*elsewhere), placed(*family)
-    lanes = np.empty((2, 2))
-    for row, (size, at) in zip(lanes, ((one, T), (other, R)), strict=True):
-        put_lane(np.array(size), at, F, row)
-        np.testing.assert_allclose(row, lane(size, at, F), atol=1e-14)
+    lanes = [lane_of(np.array(size), at, *F[:, 1]) for size, at in ((one, T), (other, R))]
+    np.testing.assert_allclose(lanes, [lane(one, T, F), lane(other, R, F)], atol=1e-14)
     (low, high), (least, most) = lanes
     assert lanes_apart(*lanes) == lanes_apart(*lanes[::-1]) == (max(least - high, low - most) > 0.0)

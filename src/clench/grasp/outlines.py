@@ -264,7 +264,7 @@ def _hull(points: FloatArray) -> FloatArray:
 
     try:
         return points[ConvexHull(points).vertices]
-    except QhullError:
+    except QhullError:  # which has no other reason here: the points are finite
         along = points[:, np.argmax(np.ptp(points, axis=0))]
         return np.unique(points[[np.argmin(along), np.argmax(along)]], axis=0)
 

@@ -122,12 +122,17 @@ def lay_plane(ka: int, wa: float, kb: int, wb: float, work: SweepWork) -> None:
 
 @inner_kernel
 def keep_plane(kb: int, wb: float, touch: float, work: SweepWork) -> bool:
-    """Write the plane that kept apart two elements that never meet, if one did; say so. It lies on the resting one."""
-    nx, ny, nz = work.placed[5, 0], work.placed[5, 1], work.placed[5, 2]
-    plane = work.plane
+    """Keep the plane by which `sweep_pair` saw that two elements never meet; say whether there is one.
+
+    It lies just off the resting element. The other one stayed half a touch tolerance away from that, or half of the
+    gap where it began closer.
+    """
+    nx, ny, nz, plane = work.placed[5, 0], work.placed[5, 1], work.placed[5, 2], work.plane
+    if nx == 0.0 and ny == 0.0 and nz == 0.0:
+        return False
     plane[0], plane[1], plane[2] = nx, ny, nz
     plane[3] = plane_offset(work.fixed, kb, nx, ny, nz) + wb + 0.25 * touch
-    return bool(nx != 0.0 or ny != 0.0 or nz != 0.0)
+    return True
 
 
 @inner_kernel
@@ -156,8 +161,8 @@ def sweep_body(
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
     Pairs of items are looked at in the order in which their balls can meet. A pair is left out when they cannot before
-    `best`; or the plane between the elements that met last keeps them apart, as it does everywhere on a convex body;
-    or an element cannot meet the other item's ball.
+    `best`; or a plane keeps them apart, as one does everywhere on a convex body: that between the elements that met
+    last, before that one by which two never met; or an element cannot meet the other item's ball.
 
     Args:
         chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
@@ -185,8 +190,8 @@ def sweep_body(
             continue
         found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, best, False, work.placed)
         if found >= best:
-            if not met:
-                laid = keep_plane(kb, wb, touch, work)
+            if not met and keep_plane(kb, wb, touch, work):
+                laid = True
             continue
         best = found
         work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r

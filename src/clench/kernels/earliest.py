@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from .closest import above_face, edge_count, face_normal
 from .compiling import inner_kernel
 from .core_motion import corner_motion, move_core
-from .distance import Point, closest_on_triangle
 from .layout import Floats
 from .sweep_pairs import step_to_plane
 
@@ -59,19 +59,25 @@ def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> flo
 
 @inner_kernel
 def point_to_core(x: float, y: float, z: float, core: Floats, corners: int) -> float:
-    """Return the distance from a point to a core."""
-    qx, qy, qz = core[0, 0], core[0, 1], core[0, 2]
-    if corners == 2:
-        ux, uy, uz = core[1, 0] - qx, core[1, 1] - qy, core[1, 2] - qz
-        t = ((x - qx) * ux + (y - qy) * uy + (z - qz) * uz) / (ux * ux + uy * uy + uz * uz)
+    """Return the distance from a point to a core: to its edges, and to its face where the point lies above it.
+
+    The edges alone hold for a triangle without area.
+    """
+    least = math.inf
+    for k in range(edge_count(corners)):
+        m = (k + 1) % corners
+        qx, qy, qz = core[k, 0], core[k, 1], core[k, 2]
+        ux, uy, uz = core[m, 0] - qx, core[m, 1] - qy, core[m, 2] - qz
+        square = ux * ux + uy * uy + uz * uz
+        t = ((x - qx) * ux + (y - qy) * uy + (z - qz) * uz) / square if square > 0.0 else 0.0
         t = min(max(t, 0.0), 1.0)
-        qx, qy, qz = qx + t * ux, qy + t * uy, qz + t * uz
-    elif corners == 3:
-        a: Point = (qx, qy, qz)
-        b: Point = (core[1, 0], core[1, 1], core[1, 2])
-        c: Point = (core[2, 0], core[2, 1], core[2, 2])
-        qx, qy, qz = closest_on_triangle((x, y, z), a, b, c)
-    return math.sqrt((x - qx) ** 2 + (y - qy) ** 2 + (z - qz) ** 2)
+        least = min(least, (x - qx - t * ux) ** 2 + (y - qy - t * uy) ** 2 + (z - qz - t * uz) ** 2)
+    if corners == 3:
+        nx, ny, nz, size = face_normal(core)
+        if size > 0.0 and above_face(core, nx, ny, nz, x, y, z):
+            height = nx * (x - core[0, 0]) + ny * (y - core[0, 1]) + nz * (z - core[0, 2])
+            least = min(least, height * height)
+    return math.sqrt(least)
 
 
 @inner_kernel

@@ -41,6 +41,9 @@ def sweep_turning(
     count, last, _, _ = fill_chain(joint, first, rates, place, work)
     compose_inverse(T_palm_family, sweep.poses[m], moving)
     compose_inverse(T_palm_family, T_palm_resting, other)
+    # Told before from what `put_lanes` wrote, but for segments in which other families move as well.
+    if lanes_apart(lane_of(links.box[m], moving, 0.0, 1.0, 0.0), lane_of(resting.box[r], other, 0.0, 1.0, 0.0)):
+        return best
     moving[0, 3], moving[2, 3] = moving[0, 3] - place[last, 0], moving[2, 3] - place[last, 1]
     other[0, 3], other[2, 3] = other[0, 3] - place[first, 0], other[2, 3] - place[first, 1]
     return sweep_body(links, m, resting, r, work.chain, count, touch, best, sweep)
@@ -87,19 +90,18 @@ def sweep_spatially(
 
 
 @inner_kernel
-def put_lane(box: Floats, T: Floats, T_palm_family: Floats, lane: Floats) -> None:
-    """Write the extent of a body's box along the axis that the joints of a family turn about."""
-    x, y, z = T_palm_family[0, 1], T_palm_family[1, 1], T_palm_family[2, 1]
+def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the extent of a body's box along an axis; NaN, which parts nothing, where there is no box."""
     middle, half = x * T[0, 3] + y * T[1, 3] + z * T[2, 3], 0.0
     for k in range(3):
         along = x * T[0, k] + y * T[1, k] + z * T[2, k]
         middle += along * box[k]
         half += abs(along) * box[3 + k]
-    lane[0], lane[1] = middle - half, middle + half
+    return middle - half, middle + half
 
 
 @inner_kernel
-def lanes_apart(one: Floats, other: Floats) -> bool:
+def lanes_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Say whether two extents lie apart along the axis that everything turns about: then nothing meets."""
     return bool(one[0] > other[1] or other[0] > one[1])
 
@@ -159,15 +161,18 @@ def put_lanes(
     rates: Floats,
     sweep: SweepWork,
 ) -> None:
-    """Write `lane` and `after` of every link at `sweep.poses`; of `several` families all are in each other's lanes."""
+    """Write `lane` and `after` of every link at `sweep.poses`; where `several` families move there are no lanes."""
     links, lane = exact.checked.shape[0], sweep.lane
+    x, y, z = T_palm_family[0, 1], T_palm_family[1, 1], T_palm_family[2, 1]
     for r in range(links):
         sweep.after[r] = first_after(exact, entry, r, first, rates)
-        put_lane(exact.links.box[r], sweep.poses[r], T_palm_family, lane[r])
-    put_lane(exact.object.box[0], T_palm_object, T_palm_family, lane[links])
-    if several:
-        for r in range(links + 1):
+    for r in range(links + 1):
+        if several:
             lane[r, 0], lane[r, 1] = -math.inf, math.inf
+        elif r < links:
+            lane[r, 0], lane[r, 1] = lane_of(exact.links.box[r], sweep.poses[r], x, y, z)
+        else:
+            lane[r, 0], lane[r, 1] = lane_of(exact.object.box[0], T_palm_object, x, y, z)
 
 
 @inner_kernel
@@ -190,13 +195,13 @@ def sweep_links(
     Args:
         m: the moving link. first, joint: first active joint, and the last one that moves it; see `sweep_link`.
     """
-    met = -1
+    met, lane = -1, sweep.lane
     for r in range(exact.checked.shape[0]):
         if exact.checked[m, r] == 0:
             continue
         # Seen from a link that moves as well, only the joints after its own turn.
         after = sweep.after[r]
-        if after > joint or lanes_apart(sweep.lane[m], sweep.lane[r]):
+        if after > joint or lanes_apart((lane[m, 0], lane[m, 1]), (lane[r, 0], lane[r, 1])):
             continue
         found = sweep_link(
             exact, chain, families, m, exact.links, r, sweep.poses[r], after, joint, rates, touch, best, work, sweep
@@ -240,7 +245,7 @@ def sweep_stage(
     if first == rates.shape[0]:
         return best, -1
     touch = SWEEP_FRACTION * length
-    met, links = -1, exact.checked.shape[0]
+    met, links, lane = -1, exact.checked.shape[0], sweep.lane
     several = place_active(exact, chain, entry, first, turns, rates, work, sweep)
     pose_movers(exact, chain, entry, turns, sweep.poses)
     put_lanes(exact, entry, families[chain.joint_family[first]], T_palm_object, several, first, rates, sweep)
@@ -249,7 +254,7 @@ def sweep_stage(
         if joint < first or exact.links.root[m] < 0:
             continue
         found = best
-        if not lanes_apart(sweep.lane[m], sweep.lane[links]):
+        if not lanes_apart((lane[m, 0], lane[m, 1]), (lane[links, 0], lane[links, 1])):
             found = sweep_link(
                 exact, chain, families, m, exact.object, 0, T_palm_object, first, joint, rates, touch, best, work, sweep
             )
@@ -278,7 +283,7 @@ def place_active(
     """Place the joints of every family that has active ones in its frame, and in the palm's where they are several.
 
     Returns:
-        whether they are.
+        whether several families have active joints.
     """
     before, several = -1, False
     for j in range(first, rates.shape[0]):

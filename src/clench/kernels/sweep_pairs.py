@@ -172,7 +172,8 @@ def sweep_pair(
             see `spatial_motion`.
         touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
         placed: scratch space, (6, 3); its first rows are the moving core at the contact. Where nothing is
-            met, its last row is the normal of a plane that keeps the cores apart from the start on, or zero.
+            met before a positive `best`, its last row is the normal of a plane that keeps the cores apart all the way
+            from the start, or zero.
     """
     s, level, leap = 0.0, -1.0, 1.0
     for turn in range(PLANES):
@@ -209,7 +210,8 @@ def sweep_pair(
             step = max(step, longer)
         s += step
         if s >= best:
-            alone = 1.0 if turn == 0 and level > 0.0 else 0.0
-            placed[5, 0], placed[5, 1], placed[5, 2] = alone * nx, alone * ny, alone * nz
+            if turn > 0 or level < 0.0:
+                nx, ny, nz = 0.0, 0.0, 0.0
+            placed[5, 0], placed[5, 1], placed[5, 2] = nx, ny, nz
             return best
     return s

@@ -24,7 +24,8 @@ class SweepWork(NamedTuple):
     """Hold the scratch space of a sweep.
 
     Args:
-        core, fixed: corners of a pair, (3, 3) each. placed: those of the moving one on its way, (6, 3).
+        core, fixed: corners of a pair, (3, 3) each. placed: those of the moving one on its way, and scratch space, see
+            `sweep_pair`, (6, 3).
         axis, anchor: of the joints where a segment begins, in the palm frame, (J, 3) each. spatial: see
             `spatial_motion`, (J, 7).
         moving, resting: poses of two bodies relative to their pivots, (3, 4).
@@ -233,18 +234,19 @@ def bodies_overlap(
                 else:
                     nx, ny, nz = mx, my, mz
                 continue
-            if away_from_ball(work, ka, kb, a < 0) > wa + wb:
+            if centre_distance(work, a >= 0, ka, kb) > wa + wb:
                 continue
         waiting = split_pair(moving, a, resting, b, stack, waiting)
     return False
 
 
 @inner_kernel
-def away_from_ball(work: SweepWork, ka: int, kb: int, first: bool) -> float:
-    """Return how far the `first` core, or else the second, is from the centre that is the other one."""
-    if first:
-        return point_to_core(work.fixed[0, 0], work.fixed[0, 1], work.fixed[0, 2], work.core, ka)
-    return point_to_core(work.core[0, 0], work.core[0, 1], work.core[0, 2], work.fixed, kb)
+def centre_distance(work: SweepWork, moving: bool, ka: int, kb: int) -> float:
+    """Return the distance from the centre of a node's ball, of the `moving` body or the resting one, to the element."""
+    centre, core, corners = work.fixed[0], work.core, ka
+    if moving:
+        centre, core, corners = work.core[0], work.fixed, kb
+    return float(point_to_core(centre[0], centre[1], centre[2], core, corners))
 
 
 @inner_kernel
