@@ -10,7 +10,7 @@ from kernels.kernel_entries import entry
 from kernels.test_spatial_motion import drawn, placed
 from oracle.width import Core, gap
 
-walk_ball = entry(earliest.walk_ball)
+walk_ball, walk_core = entry(earliest.walk_ball), entry(earliest.walk_core)
 TOUCH = 1e-11
 BEST = 1.2
 
@@ -29,9 +29,7 @@ def distance(core, chain, fixed, s):
 
 def swept(core, chain, fixed, w=0.0):
     rows = [np.ascontiguousarray(np.resize(np.asarray(c, dtype=float), (3, 3))) for c in (core, fixed)]
-    return sweep_pair(
-        rows[0], len(core), rows[1], len(fixed), w, chain, len(chain), TOUCH, BEST, False, np.zeros((6, 3))
-    )
+    return sweep_pair(rows[0], len(core), rows[1], len(fixed), w, chain, len(chain), TOUCH, BEST, np.zeros((6, 3)))
 
 
 @pytest.mark.parametrize("corners", [1, 2, 3])
@@ -89,7 +87,7 @@ def test_a_walk_never_passes_a_ball():
         rng = np.random.default_rng(seed)
         other = placed(core[:1], chain, 0.6 * s)[0] + rng.uniform(-0.02, 0.02, 3)
         reach, limit = float(rng.uniform(0.003, 0.03)), float(rng.uniform(0.2, 2.0))
-        found = walk_ball(core, other[None].copy(), reach, chain, len(chain), limit, np.empty((6, 3)))
+        found = walk_ball(core, other[None].copy(), reach, chain, len(chain), 0.0, limit, np.empty((6, 3)))
         away = [np.linalg.norm(placed(core[:1], chain, t)[0] - other) for t in np.linspace(0.0, found, 40)]
         assert min(away) >= reach - 1e-12 or found == 0.0
         if found == 0.0:
@@ -97,3 +95,44 @@ def test_a_walk_never_passes_a_ball():
         assert found <= limit
         seen.add("free" if found == limit else "near" if away[-1] <= 1.126 * reach else "gave up")
     assert {"free", "near"} <= seen
+
+
+def test_a_walk_goes_on_where_it_is_told_to():
+    """What is known to be free already is not looked at again: a ball that was passed there does not stop it."""
+    core, chain, _, _ = drawn(1)
+    other = placed(core[:1], chain, 0.3)
+    first = walk_ball(core, other.copy(), 1e-3, chain, len(chain), 0.0, 1.0, np.empty((6, 3)))
+    after = walk_ball(core, other.copy(), 1e-3, chain, len(chain), 0.4, 1.0, np.empty((6, 3)))
+    assert first < 0.3 < 0.4 < after
+
+
+@pytest.mark.parametrize("corners", [1, 2, 3])
+@pytest.mark.parametrize("others", [1, 2, 3])
+def test_a_walk_never_passes_a_core(corners, others):
+    seen = set()
+    for seed in range(40):
+        core, chain, _, s = drawn(1000 * corners + 100 * others + seed)
+        rng = np.random.default_rng(seed)
+        if seed % 2:
+            chain = np.array([[rng.choice([-1.5, 1.0]), 0.0, 0.0]])  # one joint, about y
+        moved = placed if seed % 2 == 0 else turned
+        fixed = moved(core[:corners], chain, 0.4 * s).mean(axis=0) + rng.uniform(-0.02, 0.02, (others, 3))
+        w, near = float(rng.uniform(0.0, 0.006)), float(rng.uniform(1e-6, 0.004))
+        rows = [np.ascontiguousarray(np.resize(c, (3, 3))) for c in (core[:corners], fixed)]
+        begin = float(rng.choice([0.0, 0.1]))
+        found = walk_core(rows[0], corners, rows[1], others, w, chain, len(chain), near, begin, BEST, np.empty((6, 3)))
+        away = [
+            gap(engine_core(moved(core[:corners], chain, t)), np.eye(4), engine_core(fixed), np.eye(4)) - w
+            for t in np.linspace(begin, found, 40)
+        ]
+        assert begin <= found <= BEST
+        # Where it does not get on it says nothing.
+        assert min(away) >= -1e-12 or found == begin
+        seen.add("free" if found == BEST else "near" if away[-1] <= near + 1e-12 else "gave up")
+    assert {"free", "near"} <= seen
+
+
+def turned(core, chain, s):
+    """Turn about the y axis."""
+    c, d = np.cos(chain[0, 0] * s), np.sin(chain[0, 0] * s)
+    return np.asarray(core) @ np.array([[c, 0.0, d], [0.0, 1.0, 0.0], [-d, 0.0, c]])

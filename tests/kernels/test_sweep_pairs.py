@@ -16,11 +16,11 @@ BEST = 1.5
 PIVOT = np.array([[1.0, 0.0, 0.0]])
 
 
-def swept(core, fixed, w=0.0, best=BEST, chain=PIVOT, rough=False):
+def swept(core, fixed, w=0.0, best=BEST, chain=PIVOT):
     """Sweep a core that turns from x towards z about the origin, or as a chain does."""
     corners = [np.ascontiguousarray(np.resize(np.asarray(c, dtype=float), (3, 3))) for c in (core, fixed)]
     return sweep_pair(
-        corners[0], len(core), corners[1], len(fixed), w, chain, len(chain), TOUCH, best, rough, np.zeros((6, 3))
+        corners[0], len(core), corners[1], len(fixed), w, chain, len(chain), TOUCH, best, np.zeros((6, 3))
     )
 
 
@@ -105,10 +105,9 @@ def test_cores_that_cross_at_the_start_are_said_to_overlap(deep):
 
 
 def test_what_touches_at_the_start_has_met_where_only_balls_are_asked_for():
-    """A point on the x axis leaves the face below it; a rough sweep does not ask which way it goes."""
+    """A point on the x axis leaves the face below it."""
     face = [(-0.1, -0.1, -1e-12), (0.1, -0.1, -1e-12), (0.0, 0.1, -1e-12)]
     assert swept([(0.05, 0.0, 0.0)], face) > 0.5
-    assert swept([(0.05, 0.0, 0.0)], face, rough=True) == 0.0
 
 
 @pytest.mark.parametrize("below", [0.0, 1e-12])
@@ -170,7 +169,7 @@ def test_a_plane_that_is_told_keeps_the_cores_apart_on_the_whole_way():
         fixed[:, 2] += 0.03
         chain = np.column_stack([rng.uniform(0.5, 2.0, count), rng.uniform(-0.02, 0.02, (count, 2))])
         placed, there = np.zeros((6, 3)), np.zeros((6, 3))
-        found = sweep_pair(core, ka, fixed, kb, w, chain, count, TOUCH, 0.8, False, placed)
+        found = sweep_pair(core, ka, fixed, kb, w, chain, count, TOUCH, 0.8, placed)
         n = placed[5]
         if found < 0.8:
             met += 1

@@ -48,6 +48,10 @@ TESTS = {
     "spatial_motion": ["kernels/test_spatial_motion.py", "kernels/test_spatial_sweep.py"],
     "sweeping": ["kernels/test_nearness.py", "grasp/test_boxes.py", WIDTH],
     "translation": ["kernels/test_translation.py"],
+    "body_sweep": ["kernels/test_body_sweep.py"],
+    "parting": ["kernels/test_body_sweep.py"],
+    "pair_queue": ["kernels/test_body_sweep.py"],
+    "slabs": ["kernels/test_slabs.py", "grasp/test_boxes.py"],
 }
 #: A mutant that takes this many times as long as the kernel without a mistake never ends, which the tests notice.
 PATIENCE = 5.0

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .slabs import LIMB, SLAB, node_limbs, node_slabs
 from .tree import MeshTree, build_tree
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,8 @@ class BodyArrays(NamedTuple):
         ball: centre and radius of the ball around each element, its own radius included [m], (T, 4).
         source: number of each element in the caller's list, (T,).
         node: centre and radius of the ball around each node [m], (N, 4).
+        slab: box of any direction around each node, see `clench.kernels.slabs` [m], (N, 13).
+        limb: capsule around each node, see `node_limbs` [m], (N, 7).
         first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
         right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
         box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
@@ -42,6 +45,8 @@ class BodyArrays(NamedTuple):
     ball: Floats
     source: Ints
     node: Floats
+    slab: NDArray[np.float32]
+    limb: NDArray[np.float32]
     first: Ints
     count: Ints  # type: ignore[assignment]
     right: Ints
@@ -78,7 +83,9 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         tree = build_tree(body.vertices, body.elements)
         radius = body.radius[tree.original]
         ball = _balls(tree.vertices[tree.triangles], radius)
-        node = _node_balls(tree, radius)
+        begin, end, grown = _spans(tree, radius)
+        node = _node_balls(tree, grown)
+        slab = node_slabs(tree, begin, end, grown)
         inner = tree.count == 0
         rows.append(
             (
@@ -89,6 +96,8 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
                 ball,
                 tree.original,
                 node,
+                slab,
+                node_limbs(slab),
                 tree.first + elements,
                 tree.count,
                 np.where(inner, tree.right + nodes, -1),
@@ -98,8 +107,9 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         vertices += len(tree.vertices)
         elements += len(tree.triangles)
         nodes += len(tree.low)
-    shapes = ((0, 3), (0, 3), (0,), (0,), (0, 4), (0,), (0, 4), (0,), (0,), (0,))
-    kinds = (float, np.int32, np.int32, float, float, np.int32, float, np.int32, np.int32, np.int32)
+    shapes = ((0, 3), (0, 3), (0,), (0,), (0, 4), (0,), (0, 4), (0, SLAB), (0, LIMB), (0,), (0,), (0,))
+    whole, single = np.int32, np.float32
+    kinds = (float, whole, whole, float, float, whole, float, single, single, whole, whole, whole)
     joined = [
         np.concatenate([np.empty(shape, kind), *(row[k] for row in rows)]).astype(kind)
         for k, (shape, kind) in enumerate(zip(shapes, kinds, strict=True))
@@ -141,13 +151,18 @@ def _balls(points: Floats, radius: Floats) -> Floats:
     return np.column_stack([center, reach * (1.0 + 1e-12) + radius])
 
 
-def _node_balls(tree: MeshTree, radius: Floats) -> Floats:
-    """Return the ball around the box of each node, grown by the largest radius of its elements."""
+def _spans(tree: MeshTree, radius: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Return the first element of each node, the one after its last, and the largest radius of them."""
     # The elements of a node are those from its first leaf to its last one.
     leaves = np.flatnonzero(tree.count)
-    begin = tree.first[leaves[np.searchsorted(leaves, np.arange(len(tree.low)))]]
+    begin = tree.first[leaves[np.searchsorted(leaves, np.arange(len(tree.low)))]].astype(np.int64)
     last = leaves[np.searchsorted(leaves, tree.skip) - 1]
-    spans = np.column_stack([begin, tree.first[last] + tree.count[last]])
-    grown = np.maximum.reduceat(np.append(radius, 0.0), spans.ravel())[::2]
+    end = (tree.first[last] + tree.count[last]).astype(np.int64)
+    grown = np.maximum.reduceat(np.append(radius, 0.0), np.column_stack([begin, end]).ravel())[::2]
+    return begin, end, grown
+
+
+def _node_balls(tree: MeshTree, grown: Floats) -> Floats:
+    """Return the ball around the box of each node, grown by the largest radius of its elements."""
     reach = 0.5 * np.linalg.norm(tree.high - tree.low, axis=1) * (1.0 + 1e-12) + grown
     return np.column_stack([0.5 * (tree.low + tree.high), reach])

@@ -199,6 +199,7 @@ def _sweep_at(s: SweepWork, n: int) -> SweepWork:
         s.after[n],
         s.stack[n],
         s.keys[n],
+        s.since[n],
         s.plane[n],
         s.pair[n],
         s.winner[n],

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from .closest import above_face, edge_count, face_normal
+from .closest import crosses, separation
 from .compiling import inner_kernel
-from .core_motion import corner_motion, move_core
+from .core_motion import corner_motion, move_core, plane_offset
 from .layout import Floats
 from .sweep_pairs import step_to_plane
 
 #: A ball that comes this near to a core, as a fraction of the sum of their radii, is taken to meet it [-].
 NEAR = 0.125
-#: Steps of a ball along its arc towards a core at most, and of a plane's check.
+#: Steps of a core towards another one at most, and of a plane's check.
 STEPS = 8
 #: Of the squares that a distance comes from [-].
 ROUNDING = 1e-14
@@ -58,64 +58,50 @@ def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> flo
 
 
 @inner_kernel
-def point_to_core(x: float, y: float, z: float, core: Floats, corners: int) -> float:
-    """Return the distance from a point to a core: to its edges, and to its face where the point lies above it.
+def walk_core(
+    core: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    w: float,
+    chain: Floats,
+    count: int,
+    near: float,
+    begin: float,
+    best: float,
+    placed: Floats,
+) -> float:
+    """Return a travel up to which two cores, that are apart until `begin`, stay farther than `w` apart; at most `best`.
 
-    The edges alone hold for a triangle without area.
+    Every step goes to a plane between the two, as in `sweep_pair`, but ends where they are nearer than `near`, or after
+    some steps.
     """
-    least = math.inf
-    for k in range(edge_count(corners)):
-        m = (k + 1) % corners
-        qx, qy, qz = core[k, 0], core[k, 1], core[k, 2]
-        ux, uy, uz = core[m, 0] - qx, core[m, 1] - qy, core[m, 2] - qz
-        square = ux * ux + uy * uy + uz * uz
-        t = ((x - qx) * ux + (y - qy) * uy + (z - qz) * uz) / square if square > 0.0 else 0.0
-        t = min(max(t, 0.0), 1.0)
-        least = min(least, (x - qx - t * ux) ** 2 + (y - qy - t * uy) ** 2 + (z - qz - t * uz) ** 2)
-    if corners == 3:
-        nx, ny, nz, size = face_normal(core)
-        if size > 0.0 and above_face(core, nx, ny, nz, x, y, z):
-            height = nx * (x - core[0, 0]) + ny * (y - core[0, 1]) + nz * (z - core[0, 2])
-            least = min(least, height * height)
-    return math.sqrt(least)
-
-
-@inner_kernel
-def core_misses(p: Floats, core: Floats, corners: int, reach: float, sense: float, turn: float) -> bool:
-    """Say whether a point that turns about the y axis is seen to stay farther than `reach` from a core.
-
-    The point goes along its arc by as much as it is away from the core, some times over.
-
-    Args:
-        p: the point. core, corners: at rest. sense: 1 where the point turns from x to z, else -1. turn: how far [rad].
-    """
-    far = math.hypot(p[0], p[2])
-    x, y, z, at = p[0], p[1], p[2], 0.0
-    for _ in range(STEPS):
-        gap = point_to_core(x, y, z, core, corners) - reach
-        if gap <= NEAR * reach:
-            return False
-        if gap >= (turn - at) * far:
-            return True
-        at += gap / far
-        c, s = math.cos(at), sense * math.sin(at)
-        x, z = c * p[0] - s * p[2], c * p[2] + s * p[0]
-    return False
+    s = begin
+    for step in range(STEPS):
+        move_core(core, ka, chain, count, s, placed)
+        d, nx, ny, nz, _, _, _, _, _ = separation(placed, ka, fixed, kb)
+        if d - w <= near or (step == 0 and crosses(placed, ka, fixed, kb)):
+            return s
+        offset = plane_offset(fixed, kb, nx, ny, nz) + w
+        s += step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset + 0.5 * near, s, best - s)
+        if s >= best:
+            return best
+    return s
 
 
 @inner_kernel
 def walk_ball(
-    centre: Floats, other: Floats, reach: float, chain: Floats, count: int, limit: float, placed: Floats
+    centre: Floats, other: Floats, reach: float, chain: Floats, count: int, begin: float, limit: float, placed: Floats
 ) -> float:
     """Return a travel up to which a moving point, the first of `centre`, is farther than `reach` from a resting one.
 
     Every step is as long as the distance allows at the highest speed that the point can have.
 
     Args:
-        limit: what comes later is of no interest. placed: scratch space, (6, 3).
+        begin: up to here it is known to be. limit: what comes later is of no interest. placed: scratch space, (6, 3).
     """
     _, _, fastest, _ = corner_motion(centre, 0, chain, count, 1.0, 0.0, 0.0, 0.0)
-    s = 0.0
+    s = begin
     for _ in range(WALK):
         move_core(centre, 1, chain, count, s, placed)
         x, y, z = placed[0, 0] - other[0, 0], placed[0, 1] - other[0, 1], placed[0, 2] - other[0, 2]
@@ -139,10 +125,11 @@ def stays_above(
     ny: float,
     nz: float,
     offset: float,
+    begin: float,
     best: float,
 ) -> bool:
-    """Say whether a moving core is seen to stay beyond the plane `n·p = offset` until `best`."""
-    s = 0.0
+    """Say whether a moving core is seen to stay beyond the plane `n·p = offset` from `begin` until `best`."""
+    s = begin
     for _ in range(STEPS):
         move_core(core, corners, chain, count, s, placed)
         step = step_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best - s)

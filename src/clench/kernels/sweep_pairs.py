@@ -156,7 +156,6 @@ def sweep_pair(
     count: int,
     touch: float,
     best: float,
-    rough: bool,
     placed: Floats,
 ) -> float:
     """Return the first `s` before `best` at which two cores come within `w` of each other, else `best`.
@@ -170,7 +169,7 @@ def sweep_pair(
         w: sum of their radii [m].
         chain, count: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
             see `spatial_motion`.
-        touch: gaps up to this touch [m]. rough: what touches at the start has met, whichever way it goes.
+        touch: gaps up to this touch [m].
         placed: scratch space, (6, 3); its first rows are the moving core at the contact. Where nothing is
             met before a positive `best`, its last row is the normal of a plane that keeps the cores apart all the way
             from the start, or zero.
@@ -182,8 +181,6 @@ def sweep_pair(
         gap = d - w
         if s == 0.0 and crosses(placed, ka, fixed, kb):
             gap = -w
-        if level < 0.0 and rough and gap <= touch:
-            return s
         flat = level < 0.0 and gap <= FLAT * touch
         step = 0.0
         if not flat and (level < 0.0 or gap > CLOSE * level):

@@ -12,12 +12,14 @@ from .closest import crosses, separation
 from .compiling import inner_allocating_kernel, inner_kernel
 from .core_motion import plane_gap
 from .crossing import only_touch
-from .earliest import point_to_core
 from .layout import Floats, Ints
+from .slabs import slab_misses
 from .spatial_motion import SPATIAL
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
 PAIRS = 512
+#: Pairs that wait in the order in which they can meet at most; what is more waits in order of depth.
+QUEUE = 256
 
 
 class SweepWork(NamedTuple):
@@ -32,8 +34,10 @@ class SweepWork(NamedTuple):
         poses: `T_palm_link` of every link, (L, 3, 4).
         lane: extent of every link, and of the object last, along the axis that a segment turns about, (L + 1, 2).
         after: the first joint that moves and does not move a link, (L,).
-        stack, keys: pairs of items that wait, and when they can meet at the earliest, (PAIRS, 2) and (PAIRS,).
-        plane: normal and offset of one that keeps bodies apart, relative to the first pivot, (4,).
+        stack: pairs of items that wait, and whether `walk_core` has been there, (PAIRS, 3). keys: when they can meet at
+            the earliest, for one joint as a `turn_measure`; since: a travel before which they do not, (PAIRS,) each.
+        plane: normal and offset of one that keeps bodies apart, relative to the first pivot, then in the resting body's
+            frame, (8,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
@@ -51,6 +55,7 @@ class SweepWork(NamedTuple):
     after: Ints
     stack: Ints
     keys: Floats
+    since: Floats
     plane: Floats
     pair: Ints
     winner: Ints
@@ -72,9 +77,10 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((links, 3, 4)),
         np.empty((links + 1, 2)),
         np.empty(links, dtype=np.int64),
-        np.empty((PAIRS, 2), dtype=np.int64),
+        np.empty((PAIRS, 3), dtype=np.int64),
         np.empty(PAIRS),
-        np.empty(4),
+        np.empty(PAIRS),
+        np.empty(8),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(1, dtype=np.int64),
@@ -105,24 +111,45 @@ def put_ball(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> float:
 
 @inner_kernel
 def put_item(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> tuple[int, float]:
-    """Write the core of element `-1 - n`, or the centre of node `n`; return its corners and its radius."""
+    """Write the core of element `-1 - n`, or of the capsule around node `n`; return its corners and its radius."""
     if n >= 0:
-        put_point(T, bodies.node[n], out[0])
-        return 1, bodies.node[n, 3]
+        limb = bodies.limb[n]
+        put_point(T, limb, out[0])
+        if limb[3] == 0.0 and limb[4] == 0.0 and limb[5] == 0.0:
+            return 1, float(limb[6])
+        for k in range(3):
+            step = T[k, 0] * limb[3] + T[k, 1] * limb[4] + T[k, 2] * limb[5]
+            out[0, k], out[1, k] = out[0, k] - step, out[0, k] + step
+        return 2, float(limb[6])
     put_core(bodies, -1 - n, T, out)
     return bodies.corners[-1 - n], bodies.radius[-1 - n]
+
+
+@inner_kernel
+def item_of(bodies: BodyArrays, n: int) -> int:
+    """Return a node as an item; where it has one element that one."""
+    return -1 - bodies.first[n] if n >= 0 and bodies.count[n] == 1 else n
 
 
 @inner_kernel
 def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints, waiting: int) -> int:
     """Put the children of a node, or the elements of a leaf, on the stack against `other`; return its new height."""
     if bodies.count[n] == 0:
-        stack[waiting, column], stack[waiting, 1 - column] = bodies.right[n], other
-        stack[waiting + 1, column], stack[waiting + 1, 1 - column] = n + 1, other
+        stack[waiting, column], stack[waiting, 1 - column] = item_of(bodies, bodies.right[n]), other
+        stack[waiting + 1, column], stack[waiting + 1, 1 - column] = item_of(bodies, n + 1), other
         return waiting + 2
     for k in range(bodies.count[n]):
         stack[waiting + k, column], stack[waiting + k, 1 - column] = -1 - (bodies.first[n] + k), other
     return waiting + int(bodies.count[n])
+
+
+@inner_kernel
+def push_roots(moving: BodyArrays, m: int, resting: BodyArrays, r: int, stack: Ints) -> int:
+    """Put two bodies on the empty stack, unless one has no elements; return its height."""
+    if moving.root[m] < 0 or resting.root[r] < 0:
+        return 0
+    stack[0, 0], stack[0, 1] = item_of(moving, moving.root[m]), item_of(resting, resting.root[r])
+    return 1
 
 
 @inner_kernel
@@ -144,8 +171,7 @@ def body_gap(
             many pairs are about as close [-]. work: has `moving` and `resting`, the bodies' poses in one frame.
     """
     stack, best = work.stack, bound
-    stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
-    waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
+    waiting = push_roots(moving, m, resting, r, stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
@@ -210,8 +236,7 @@ def bodies_overlap(
             that lie in each other: only where depth is measured as well.
     """
     stack, nx, ny, nz = work.stack, 0.0, 0.0, 0.0
-    stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
-    waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
+    waiting = push_roots(moving, m, resting, r, stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
@@ -234,19 +259,12 @@ def bodies_overlap(
                 else:
                     nx, ny, nz = mx, my, mz
                 continue
-            if centre_distance(work, a >= 0, ka, kb) > wa + wb:
+            if a >= 0 and slab_misses(moving.slab[a], work.moving, work.fixed, kb, wb):
+                continue
+            if b >= 0 and slab_misses(resting.slab[b], work.resting, work.core, ka, wa):
                 continue
         waiting = split_pair(moving, a, resting, b, stack, waiting)
     return False
-
-
-@inner_kernel
-def centre_distance(work: SweepWork, moving: bool, ka: int, kb: int) -> float:
-    """Return the distance from the centre of a node's ball, of the `moving` body or the resting one, to the element."""
-    centre, core, corners = work.fixed[0], work.core, ka
-    if moving:
-        centre, core, corners = work.core[0], work.fixed, kb
-    return float(point_to_core(centre[0], centre[1], centre[2], core, corners))
 
 
 @inner_kernel
