@@ -1,5 +1,11 @@
 """Bodies of many elements: what their trees leave out changes nothing, against every pair of elements by itself."""
 
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -137,3 +143,55 @@ def test_a_queue_gives_the_earliest_first(keys):
         assert tuple(work.stack[size]) == (k, 2 * k, k % 2)
         given_back.append(keys[k])
     assert given_back == sorted(keys)
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0])
+@pytest.mark.parametrize("joints", [1, 2])
+def test_what_touches_at_the_start_does_not_hide_what_overlaps(rate, joints):
+    """Tents stand on a floor, which leaves nowhere to go; another one goes through it."""
+    grid = np.linspace(0.0, 1.0, 6)
+    floor = np.column_stack([0.02 + 0.18 * np.repeat(grid, 6), 0.1 * np.tile(grid, 6) - 0.05, np.zeros(36)])
+    k = np.array([6 * i + j for i in range(5) for j in range(5)])
+    resting = pack_bodies(
+        [Elements(floor, np.vstack([np.c_[k, k + 1, k + 6], np.c_[k + 1, k + 7, k + 6]]), np.zeros(50))]
+    )
+    tent = np.array([[0.0, 0.0, 0.0], [0.004, 0.002, 0.01], [-0.003, 0.004, 0.01]])
+    chain = np.array([[0.1 * rate, 0.01, 0.0], [rate, 0.0, 0.0]])[2 - joints :]
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        feet = np.column_stack([rng.uniform([0.04, -0.04], [0.19, 0.04], (12, 2)), np.zeros(12)])
+        feet[-1, 2] = -0.004
+        moving = pack_bodies(
+            [Elements((feet[:, None] + tent).reshape(-1, 3), np.arange(36).reshape(12, 3), np.zeros(12))]
+        )
+        work = make_sweep_work(0, 0)
+        work.moving[:] = work.resting[:] = np.eye(4)[:3]
+        assert sweep_body(moving, 0, resting, 0, chain, joints, TOUCH, 1.0, work) == OVERLAP
+        assert sweep_body(moving, 0, resting, 0, chain, joints, TOUCH, 0.0, work) == OVERLAP
+
+
+def crowded():
+    """Return how far a body of rods goes behind four joints before it meets another one, see `crowded.json`."""
+    given = json.loads((Path(__file__).parent / "crowded.json").read_text())
+    bodies = []
+    for part in (given["moving"], given["resting"]):
+        corners = np.array(part["corners"])
+        elements = np.arange(3 * len(corners)).reshape(-1, 3)
+        bodies.append(pack_bodies([Elements(corners.reshape(-1, 3), elements, np.array(part["radius"]))]))
+    work, chain = make_sweep_work(0, 0), np.array(given["chain"])
+    work.moving[:], work.resting[:] = given["T_moving"], given["T_resting"]
+    return sweep_body(bodies[0], 0, bodies[1], 0, chain, len(chain), given["touch"], given["best"], work)
+
+
+def test_what_does_not_fit_the_queue_is_met_as_well():
+    """With room for two pairs in the queue, interpreted, as the room of compiled kernels is fixed."""
+    code = (
+        "from clench.kernels import body_sweep; from kernels import test_body_sweep; "
+        "body_sweep.QUEUE = 2; print(test_body_sweep.crowded())"
+    )
+    tests = str(Path(__file__).parents[1])
+    path = os.pathsep.join([tests, *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert float(done.stdout) == pytest.approx(2.178088, abs=1e-6)
+    assert crowded() == pytest.approx(2.178088, abs=1e-6)

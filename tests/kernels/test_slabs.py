@@ -13,6 +13,9 @@ from kernels.kernel_entries import entry
 from kernels.test_body_sweep import KINDS, patch, pose
 
 slab_top, slab_misses = entry(slabs.slab_top), entry(slabs.slab_misses)
+put_slab_core = entry(slabs.put_slab_core)
+
+IDENTITY = np.eye(4)[:3]
 
 
 def below(body, node):
@@ -20,6 +23,14 @@ def below(body, node):
     if body.right[node] < 0:
         return list(range(body.first[node], body.first[node] + body.count[node]))
     return below(body, node + 1) + below(body, body.right[node])
+
+
+def capsule(slab, T=IDENTITY):
+    """Return the middle of a box's capsule, half of its axis, and its radius."""
+    core = np.zeros((3, 3))
+    corners, reach = put_slab_core(slab, T, core)
+    ends = core[[0, corners - 1]]
+    return ends.mean(axis=0), 0.5 * (ends[1] - ends[0]), reach
 
 
 def to_segment(points, middle, half):
@@ -42,8 +53,8 @@ def test_boxes_and_capsules_hold_all_elements(seed, kind, count, scale):
         radius = np.repeat(body.radius[members], 3)
         for n in directions / np.linalg.norm(directions, axis=1)[:, None]:
             assert (points @ n + radius).max() <= slab_top(body.slab[node], *n)
-        limb = body.limb[node].astype(float)
-        assert (to_segment(points, limb[:3], limb[3:6]) + radius <= limb[6]).all()
+        middle, half, reach = capsule(body.slab[node])
+        assert (to_segment(points, middle, half) + radius <= reach).all()
 
 
 def test_they_are_thin_where_the_surface_is():
@@ -54,13 +65,15 @@ def test_they_are_thin_where_the_surface_is():
     assert (high < 1e-5).all()
     assert (wide < 1e-3).all()
     assert (long > 0.02).all()
-    assert (slivers.limb[leaves, 6] < 0.02 * slivers.node[leaves, 3]).all()
+    assert all(capsule(slivers.slab[n])[2] < 0.02 * slivers.node[n, 3] for n in leaves)
     leaves = np.flatnonzero(sheet.count)
     assert (np.linalg.norm(sheet.slab[leaves, 9:12], axis=1) < 0.1 * sheet.node[leaves, 3]).all()
     # No capsule is much thinner than the ball around what is as wide and as high as long.
     cube = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     body = pack_bodies([Elements(cube, np.array([[k, 7 - k, 7 - k] for k in range(4)]), np.zeros(4))])
-    assert (body.limb[0, 3:6] == 0.0).all()
+    T = pose(np.random.default_rng(1), [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(capsule(body.slab[0], T)[0], [0.1, 0.2, 0.3], atol=1e-7)
+    assert not capsule(body.slab[0])[1].any()
 
 
 @pytest.mark.parametrize("size", [1e30, 1e-320, 0.0])
@@ -89,3 +102,18 @@ def test_what_is_said_to_miss_a_box_is_farther_away(seed, kind, corners, w):
     n = T[:, :3] @ (box[3:6] / np.linalg.norm(box[3:6]))
     far = T[:, :3] @ box[:3] + T[:, 3] + (np.linalg.norm(box[3:6]) + w + 0.02) * n
     assert slab_misses(body.slab[0], T, np.tile(far, (3, 1)), 1, w)
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3, 0.01])
+@pytest.mark.parametrize("grown", [0.0, 0.005])
+def test_what_lies_just_inside_a_box_is_not_said_to_miss_it(size, grown):
+    """Beyond each face in turn, by less than the box is grown by: single precision could not tell."""
+    rng = np.random.default_rng(2)
+    for _ in range(60):
+        rod = rng.normal(size=(3, 3)) * size + rng.uniform(-0.1, 0.1, 3)
+        body, T = pack_bodies([Elements(rod, np.array([[0, 1, 2]]), np.array([grown]))]), pose(rng, np.zeros(3))
+        box = body.slab[0].astype(float)
+        for k in (3, 6):
+            n = box[k : k + 3] / np.linalg.norm(box[k : k + 3])
+            inside = box[:3] + box[k : k + 3] + (grown - 1e-13) * n
+            assert not slab_misses(body.slab[0], T, np.tile(T[:, :3] @ inside, (3, 1)), 1, 0.0)

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .slabs import LIMB, SLAB, node_limbs, node_slabs
+from .slabs import SLAB, node_slabs
 from .tree import MeshTree, build_tree
 
 Floats = NDArray[np.float64]
@@ -32,7 +32,6 @@ class BodyArrays(NamedTuple):
         source: number of each element in the caller's list, (T,).
         node: centre and radius of the ball around each node [m], (N, 4).
         slab: box of any direction around each node, see `clench.kernels.slabs` [m], (N, 13).
-        limb: capsule around each node, see `node_limbs` [m], (N, 7).
         first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
         right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
         box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
@@ -46,7 +45,6 @@ class BodyArrays(NamedTuple):
     source: Ints
     node: Floats
     slab: NDArray[np.float32]
-    limb: NDArray[np.float32]
     first: Ints
     count: Ints  # type: ignore[assignment]
     right: Ints
@@ -85,7 +83,6 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         ball = _balls(tree.vertices[tree.triangles], radius)
         begin, end, grown = _spans(tree, radius)
         node = _node_balls(tree, grown)
-        slab = node_slabs(tree, begin, end, grown)
         inner = tree.count == 0
         rows.append(
             (
@@ -96,8 +93,7 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
                 ball,
                 tree.original,
                 node,
-                slab,
-                node_limbs(slab),
+                node_slabs(tree, begin, end, grown),
                 tree.first + elements,
                 tree.count,
                 np.where(inner, tree.right + nodes, -1),
@@ -107,9 +103,8 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         vertices += len(tree.vertices)
         elements += len(tree.triangles)
         nodes += len(tree.low)
-    shapes = ((0, 3), (0, 3), (0,), (0,), (0, 4), (0,), (0, 4), (0, SLAB), (0, LIMB), (0,), (0,), (0,))
-    whole, single = np.int32, np.float32
-    kinds = (float, whole, whole, float, float, whole, float, single, single, whole, whole, whole)
+    shapes = ((0, 3), (0, 3), (0,), (0,), (0, 4), (0,), (0, 4), (0, SLAB), (0,), (0,), (0,))
+    kinds = (float, np.int32, np.int32, float, float, np.int32, float, np.float32, np.int32, np.int32, np.int32)
     joined = [
         np.concatenate([np.empty(shape, kind), *(row[k] for row in rows)]).astype(kind)
         for k, (shape, kind) in enumerate(zip(shapes, kinds, strict=True))

@@ -146,7 +146,7 @@ def sweep_body(
             if stack[row, 2] == 0:
                 w, near = wa + wb + touch, touch + COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
                 s = walk_core(work.core, ka, work.fixed, kb, w, chain, count, near, since, best, work.placed)
-                if s >= best or (within and s > since and stays_beyond(ka, wa, chain, count, s, best, work)):
+                if s == math.inf or (within and s > since and stays_beyond(ka, wa, chain, count, s, best, work)):
                     continue
                 stack[row, 2], work.since[row], keys[row] = 1, s, max(keys[row], measure(s, chain, count))
                 # What others come before waits.
@@ -154,15 +154,16 @@ def sweep_body(
                     queue = take_in(work, queue, row)
                     continue
             since, floor, low = work.since[row], keys[row], height
+            known = beyond if since >= apart else NONE
             height = split_pair(moving, a, resting, b, stack, low)
-            height = keep_earliest(moving, resting, low, height, chain, count, touch, since, floor, limit, beyond, work)
+            height = keep_earliest(moving, resting, low, height, chain, count, touch, since, floor, limit, known, work)
             while low == QUEUE and queue < QUEUE and height > QUEUE:
                 height -= 1
                 queue = take_in(work, queue, height)
             continue
         found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, best, work.placed)
         if found >= best:
-            if not met and keep_plane(kb, wb, touch, work):
+            if best > 0.0 and not met and keep_plane(kb, wb, touch, work):
                 laid, beyond = True, NONE
             continue
         best = found

@@ -71,10 +71,10 @@ def walk_core(
     best: float,
     placed: Floats,
 ) -> float:
-    """Return a travel up to which two cores, that are apart until `begin`, stay farther than `w` apart; at most `best`.
+    """Return a travel up to which two cores, that are apart until `begin`, stay farther than `w` apart.
 
-    Every step goes to a plane between the two, as in `sweep_pair`, but ends where they are nearer than `near`, or after
-    some steps.
+    It is infinite where they do until `best`; what is near at the start never is. Every step goes to a plane between
+    the two, as in `sweep_pair`, but ends where they are nearer than `near`, or after some steps.
     """
     s = begin
     for step in range(STEPS):
@@ -85,7 +85,7 @@ def walk_core(
         offset = plane_offset(fixed, kb, nx, ny, nz) + w
         s += step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset + 0.5 * near, s, best - s)
         if s >= best:
-            return best
+            return math.inf
     return s
 
 
@@ -98,7 +98,8 @@ def walk_ball(
     Every step is as long as the distance allows at the highest speed that the point can have.
 
     Args:
-        begin: up to here it is known to be. limit: what comes later is of no interest. placed: scratch space, (6, 3).
+        begin: up to here it is known to be. limit: what comes later is of no interest, and told as infinite.
+        placed: scratch space, (6, 3).
     """
     _, _, fastest, _ = corner_motion(centre, 0, chain, count, 1.0, 0.0, 0.0, 0.0)
     s = begin
@@ -109,7 +110,7 @@ def walk_ball(
         if apart <= NEAR * reach:
             break
         if apart >= fastest * (limit - s):
-            return limit
+            return math.inf
         s += apart / fastest
     return s
 

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 Whole = NDArray[np.int64]
 #: Numbers of a box: its middle, three half edges, the shortest last, and by how much it is grown.
 SLAB: Final = 13
-#: Numbers of a capsule: its middle, half of its axis, and its radius.
-LIMB: Final = 7
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
 THIN: Final = 0.75
+#: More than how far from square the edges of a box are in single precision [-].
+ALMOST: Final = 1.0 + 1e-6
 #: More than rounding to single precision takes from the smallest numbers [m].
 TINY: Final = 1e-37
 
@@ -38,7 +38,9 @@ def node_slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats) -> NDArr
     """
     count = len(begin)
     spread, box = np.empty((count, 3, 3)), np.empty((count, 6))
-    measure_spread(tree.vertices, tree.triangles, begin, end, spread)
+    parts = np.column_stack([tree.first, tree.count, tree.right]).astype(np.int64)
+    middle = tree.vertices.mean(axis=0)
+    measure_spread(tree.vertices - middle, tree.triangles, parts, np.empty((count, 10)), spread)
     scale = np.abs(spread).max(axis=(1, 2), initial=0.0)
     usual = np.isfinite(scale) & (scale > 0.0)
     spread[usual] /= scale[usual, None, None]
@@ -54,48 +56,35 @@ def node_slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats) -> NDArr
     slab[:, :12] = exact
     lost = np.linalg.norm((slab[:, :12] - exact).reshape(-1, 4, 3), axis=2).sum(axis=1)
     size = np.abs(exact).sum(axis=1) + grown
-    slab[:, 12] = (grown + lost + 1e-12 * size) * (1.0 + 1e-6) + TINY
+    slab[:, 12] = (grown + lost + 1e-12 * size) * ALMOST + TINY
     return slab
 
 
-def node_limbs(slab: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a capsule around each node: middle, half axis (zero where a ball is as good) and radius [m], (N, 7)."""
-    box = slab.astype(np.float64)
-    length, width, height = (np.linalg.norm(box[:, k : k + 3], axis=1) for k in (3, 6, 9))
-    radius = np.sqrt(width**2 + height**2)
-    ball = np.sqrt(length**2 + radius**2)
-    long = radius < THIN * ball
-    limb = np.empty((len(slab), LIMB), dtype=np.float32)
-    limb[:, :3] = slab[:, :3]
-    limb[:, 3:6] = np.where(long[:, None], slab[:, 3:6], 0.0)
-    limb[:, 6] = (np.where(long, radius, ball) + box[:, 12]) * (1.0 + 1e-6) + TINY
-    return limb
-
-
 @kernel
-def measure_spread(vertices: Floats, elements: Any, begin: Any, end: Any, spread: Floats) -> None:
-    """Write the second moments of the corners of each node's elements about their mean, (N, 3, 3)."""
-    for n in range(begin.shape[0]):
+def measure_spread(vertices: Floats, elements: Any, tree_parts: Any, sums: Floats, spread: Floats) -> None:
+    """Write the second moments of the corners of each node's elements about their mean, (N, 3, 3).
+
+    Args:
+        vertices, elements: of the tree. tree_parts: first element, number of elements and right child of each node,
+            (N, 3). sums: how many corners, the sum of their coordinates, and of those' products, (N, 10), overwritten.
+    """
+    for n in range(sums.shape[0] - 1, -1, -1):
+        first, count, right = tree_parts[n, 0], tree_parts[n, 1], tree_parts[n, 2]
+        for k in range(10):
+            sums[n, k] = 0.0 if count > 0 else sums[n + 1, k] + sums[right, k]
+        for t in range(first, first + count):
+            for k in range(3):
+                p = vertices[elements[t, k]]
+                sums[n, 0] += 1.0
+                for i in range(3):
+                    sums[n, 1 + i] += p[i]
+                    for j in range(i + 1):
+                        sums[n, 4 + i * (i + 1) // 2 + j] += p[i] * p[j]
         for i in range(3):
-            for j in range(3):
-                spread[n, i, j] = 0.0
-        x, y, z, corners = 0.0, 0.0, 0.0, 3.0 * (end[n] - begin[n])
-        for t in range(begin[n], end[n]):
-            for k in range(3):
-                v = elements[t, k]
-                x, y, z = x + vertices[v, 0], y + vertices[v, 1], z + vertices[v, 2]
-        x, y, z = x / corners, y / corners, z / corners
-        for t in range(begin[n], end[n]):
-            for k in range(3):
-                v = elements[t, k]
-                dx, dy, dz = vertices[v, 0] - x, vertices[v, 1] - y, vertices[v, 2] - z
-                spread[n, 0, 0] += dx * dx
-                spread[n, 1, 1] += dy * dy
-                spread[n, 2, 2] += dz * dz
-                spread[n, 1, 0] += dx * dy
-                spread[n, 2, 0] += dx * dz
-                spread[n, 2, 1] += dy * dz
-        spread[n, 0, 1], spread[n, 0, 2], spread[n, 1, 2] = spread[n, 1, 0], spread[n, 2, 0], spread[n, 2, 1]
+            for j in range(i + 1):
+                product = sums[n, 1 + i] * sums[n, 1 + j] / sums[n, 0]
+                spread[n, i, j] = sums[n, 4 + i * (i + 1) // 2 + j] - product
+                spread[n, j, i] = spread[n, i, j]
 
 
 @kernel
@@ -115,11 +104,18 @@ def measure_extent(vertices: Floats, elements: Any, begin: Any, end: Any, axes: 
 
 
 @inner_kernel
+def slab_half(slab: Any, nx: float, ny: float, nz: float) -> float:
+    """Return half the extent of a box along a vector n, times the vector's length, without what it is grown by."""
+    half = 0.0
+    for k in range(3, 12, 3):
+        half += abs(nx * slab[k] + ny * slab[k + 1] + nz * slab[k + 2])
+    return half
+
+
+@inner_kernel
 def slab_top(slab: Any, nx: float, ny: float, nz: float) -> float:
     """Return the largest coordinate of a box along the unit vector n, in the box's frame."""
-    top: float = nx * slab[0] + ny * slab[1] + nz * slab[2] + slab[12]
-    for k in range(3, 12, 3):
-        top += abs(nx * slab[k] + ny * slab[k + 1] + nz * slab[k + 2])
+    top: float = nx * slab[0] + ny * slab[1] + nz * slab[2] + slab[12] + slab_half(slab, nx, ny, nz)
     return top
 
 
@@ -129,8 +125,9 @@ def slab_misses(slab: Any, T: Floats, core: Floats, corners: int, w: float) -> b
 
     A box without height is flat: the direction across its other edges takes the place of the third.
     """
-    ux, uy, uz = float(slab[3]), float(slab[4]), float(slab[5])
-    vx, vy, vz = float(slab[6]), float(slab[7]), float(slab[8])
+    # In double precision, which what is made of the numbers of a box alone would not be.
+    ux, uy, uz = np.float64(slab[3]), np.float64(slab[4]), np.float64(slab[5])
+    vx, vy, vz = np.float64(slab[6]), np.float64(slab[7]), np.float64(slab[8])
     for axis in range(3):
         x, y, z = ux, uy, uz
         if axis == 1:
@@ -142,7 +139,7 @@ def slab_misses(slab: Any, T: Floats, core: Floats, corners: int, w: float) -> b
         ny = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z
         nz = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z
         middle = x * slab[0] + y * slab[1] + z * slab[2]
-        half = slab_top(slab, x, y, z) - middle - slab[12]
+        half = slab_half(slab, x, y, z)
         middle += nx * T[0, 3] + ny * T[1, 3] + nz * T[2, 3]
         low, high = math.inf, -math.inf
         for k in range(corners):
@@ -151,3 +148,24 @@ def slab_misses(slab: Any, T: Floats, core: Floats, corners: int, w: float) -> b
         if max(low, -high) > half + size * (w + slab[12]):
             return True
     return False
+
+
+@inner_kernel
+def put_slab_core(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
+    """Write the core of the capsule around a box, in a pose: its axis, or its middle where a ball is as good.
+
+    Returns:
+        how many corners the core has, and the capsule's radius [m].
+    """
+    for r in range(3):
+        out[0, r] = T[r, 0] * slab[0] + T[r, 1] * slab[1] + T[r, 2] * slab[2] + T[r, 3]
+    long, wide = 0.0, 0.0
+    for k in range(3):
+        long += np.float64(slab[3 + k]) ** 2
+        wide += np.float64(slab[6 + k]) ** 2 + np.float64(slab[9 + k]) ** 2
+    if wide >= THIN * THIN * (long + wide):
+        return 1, math.sqrt(long + wide) * ALMOST + slab[12]
+    for r in range(3):
+        step = T[r, 0] * slab[3] + T[r, 1] * slab[4] + T[r, 2] * slab[5]
+        out[0, r], out[1, r] = out[0, r] - step, out[0, r] + step
+    return 2, math.sqrt(wide) * ALMOST + slab[12]

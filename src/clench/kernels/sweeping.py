@@ -13,7 +13,7 @@ from .compiling import inner_allocating_kernel, inner_kernel
 from .core_motion import plane_gap
 from .crossing import only_touch
 from .layout import Floats, Ints
-from .slabs import slab_misses
+from .slabs import put_slab_core, slab_misses
 from .spatial_motion import SPATIAL
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
@@ -113,14 +113,7 @@ def put_ball(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> float:
 def put_item(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> tuple[int, float]:
     """Write the core of element `-1 - n`, or of the capsule around node `n`; return its corners and its radius."""
     if n >= 0:
-        limb = bodies.limb[n]
-        put_point(T, limb, out[0])
-        if limb[3] == 0.0 and limb[4] == 0.0 and limb[5] == 0.0:
-            return 1, float(limb[6])
-        for k in range(3):
-            step = T[k, 0] * limb[3] + T[k, 1] * limb[4] + T[k, 2] * limb[5]
-            out[0, k], out[1, k] = out[0, k] - step, out[0, k] + step
-        return 2, float(limb[6])
+        return put_slab_core(bodies.slab[n], T, out)
     put_core(bodies, -1 - n, T, out)
     return bodies.corners[-1 - n], bodies.radius[-1 - n]
 
