@@ -19,6 +19,8 @@ Whole = NDArray[np.int64]
 SLAB: Final = 13
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
 THIN: Final = 0.75
+#: Nodes that boxes are laid around at once, which bounds the memory that it takes.
+AT_ONCE: Final = 16384
 #: More than how far from square the edges of a box are in single precision [-].
 ALMOST: Final = 1.0 + 1e-6
 #: More than rounding to single precision takes from the smallest numbers [m].
@@ -37,22 +39,31 @@ def node_slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats) -> NDArr
         see `SLAB` [m], (N, 13).
     """
     count = len(begin)
-    spread, box = np.empty((count, 3, 3)), np.empty((count, 6))
+    spread, slab = np.empty((count, 3, 3)), np.empty((count, SLAB), dtype=np.float32)
     parts = np.column_stack([tree.first, tree.count, tree.right]).astype(np.int64)
     middle = tree.vertices.mean(axis=0)
     measure_spread(tree.vertices - middle, tree.triangles, parts, np.empty((count, 10)), spread)
+    for low in range(0, count, AT_ONCE):
+        some = slice(low, low + AT_ONCE)
+        slab[some] = _slabs(tree, begin[some], end[some], grown[some], spread[some])
+    return slab
+
+
+def _slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats, spread: Floats) -> NDArray[np.float32]:
+    """Return what `node_slabs` does for some nodes, whose second moments are given and overwritten."""
     scale = np.abs(spread).max(axis=(1, 2), initial=0.0)
     usual = np.isfinite(scale) & (scale > 0.0)
     spread[usual] /= scale[usual, None, None]
     spread[~usual] = np.eye(3)
     axes = np.ascontiguousarray(np.linalg.eigh(spread)[1].transpose(0, 2, 1)[:, ::-1])
+    box = np.empty((len(begin), 6))
     measure_extent(tree.vertices, tree.triangles, begin, end, axes, box)
     middle = np.einsum("nk,nkj->nj", 0.5 * (box[:, :3] + box[:, 3:]), axes)
     half = 0.5 * (box[:, 3:] - box[:, :3])
     order = np.argsort(-half, axis=1, kind="stable")
     edges = np.take_along_axis(half[:, :, None] * axes, order[:, :, None], axis=1)
     exact = np.concatenate([middle, edges.reshape(-1, 9)], axis=1)
-    slab = np.empty((count, SLAB), dtype=np.float32)
+    slab = np.empty((len(begin), SLAB), dtype=np.float32)
     slab[:, :12] = exact
     lost = np.linalg.norm((slab[:, :12] - exact).reshape(-1, 4, 3), axis=2).sum(axis=1)
     size = np.abs(exact).sum(axis=1) + grown
