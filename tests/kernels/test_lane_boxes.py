@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import stage_sweep
+from clench.kernels import parting, stage_sweep
 from kernels.kernel_entries import entry
 
-lane_of, lanes_apart = entry(stage_sweep.lane_of), entry(stage_sweep.lanes_apart)
+lane_of, lanes_apart = entry(stage_sweep.lane_of), entry(parting.lanes_apart)
 
 number = st.floats(-1.0, 1.0)
 box = st.tuples(number, number, number, *[st.floats(0.0, 0.5)] * 3)

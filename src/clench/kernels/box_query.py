@@ -10,8 +10,8 @@ import numpy as np
 from .bodies import Elements
 from .closest import crosses, separation
 from .compiling import inner_allocating_kernel, inner_kernel
+from .family_pose import put_point
 from .layout import Floats, Ints
-from .sweeping import put_point
 from .tree import build_tree
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.

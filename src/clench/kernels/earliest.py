@@ -10,7 +10,7 @@ from .core_motion import corner_motion, move_core, plane_offset
 from .layout import Floats
 from .sweep_pairs import step_to_plane
 
-#: A ball that comes this near to a core, as a fraction of the sum of their radii, is taken to meet it [-].
+#: A ball that comes this near to another one, as a fraction of the sum of their radii, is taken to meet it [-].
 NEAR = 0.125
 #: Steps of a core towards another one at most, and of a plane's check.
 STEPS = 8

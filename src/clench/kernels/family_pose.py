@@ -18,6 +18,13 @@ def copy_pose(T: Floats, out: Floats) -> None:
 
 
 @inner_kernel
+def put_point(T: Floats, p: Floats, out: Floats) -> None:
+    """Write a point in the frame that a pose leads to."""
+    for r in range(3):
+        out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
+
+
+@inner_kernel
 def back(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Map a point by the inverse of a pose, (3, 4)."""
     x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]

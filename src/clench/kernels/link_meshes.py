@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .depth import CROSSINGS, penetration
 from .distance import is_inside
-from .family_pose import back, compose_inverse
+from .family_pose import back, compose_inverse, put_point
 from .layout import Floats
 from .layout import Ints as Numbers
-from .sweeping import put_point
 from .tree import STACK_SIZE, Ints, MeshTree
 
 

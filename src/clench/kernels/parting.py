@@ -53,37 +53,42 @@ def stays_beyond(ka: int, wa: float, chain: Floats, count: int, begin: float, be
 
 
 @inner_kernel
-def lies_within(resting: BodyArrays, b: int, work: SweepWork) -> bool:
-    """Say whether a resting item lies on the near side of the plane of `work`: a node's box, or an element."""
-    nx, ny, nz, offset = work.plane[4], work.plane[5], work.plane[6], work.plane[7]
-    if b >= 0:
-        return bool(slab_top(resting.slab[b], nx, ny, nz) <= offset)
-    below = True
-    for k in range(resting.corners[-1 - b]):
-        p = resting.vertices[resting.elements[-1 - b, k]]
-        below = below and nx * p[0] + ny * p[1] + nz * p[2] + resting.radius[-1 - b] <= offset
-    return below
-
-
-@inner_kernel
-def extent(bodies: BodyArrays, n: int, T: Floats) -> tuple[float, float]:
-    """Return the smallest and largest coordinate of an item along the axis that everything turns about."""
-    x, y, z = T[1, 0], T[1, 1], T[1, 2]
+def span(bodies: BodyArrays, n: int, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the smallest and largest coordinate of an item, a node's box or an element, along a unit vector."""
     if n >= 0:
         slab = bodies.slab[n]
         middle = x * slab[0] + y * slab[1] + z * slab[2]
-        half = slab_top(slab, x, y, z) - middle
-        return T[1, 3] + middle - half, T[1, 3] + middle + half
+        top = slab_top(slab, x, y, z)
+        return middle - (top - middle), top
     low, high = math.inf, -math.inf
     for k in range(bodies.corners[-1 - n]):
         p = bodies.vertices[bodies.elements[-1 - n, k]]
         at = x * p[0] + y * p[1] + z * p[2]
         low, high = min(low, at), max(high, at)
-    return T[1, 3] + low - bodies.radius[-1 - n], T[1, 3] + high + bodies.radius[-1 - n]
+    return low - bodies.radius[-1 - n], high + bodies.radius[-1 - n]
+
+
+@inner_kernel
+def lies_within(resting: BodyArrays, b: int, work: SweepWork) -> bool:
+    """Say whether a resting item lies on the near side of the plane of `work`."""
+    plane = work.plane
+    return bool(span(resting, b, plane[4], plane[5], plane[6])[1] <= plane[7])
+
+
+@inner_kernel
+def item_lane(bodies: BodyArrays, n: int, T: Floats) -> tuple[float, float]:
+    """Return the smallest and largest coordinate of an item along the axis that everything turns about."""
+    low, high = span(bodies, n, T[1, 0], T[1, 1], T[1, 2])
+    return T[1, 3] + low, T[1, 3] + high
+
+
+@inner_kernel
+def lanes_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Say whether two extents lie apart along the axis that everything turns about: then nothing meets."""
+    return bool(one[0] > other[1] or other[0] > one[1])
 
 
 @inner_kernel
 def passes_beside(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> bool:
     """Say whether two items lie apart along the axis that everything turns about: they never meet."""
-    one, other = extent(moving, a, work.moving), extent(resting, b, work.resting)
-    return bool(one[0] > other[1] or other[0] > one[1])
+    return bool(lanes_apart(item_lane(moving, a, work.moving), item_lane(resting, b, work.resting)))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiling import inner_kernel, kernel
+from .family_pose import put_point
 from .layout import Floats
 
 if TYPE_CHECKING:
@@ -168,8 +169,7 @@ def put_slab_core(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
     Returns:
         how many corners the core has, and the capsule's radius [m].
     """
-    for r in range(3):
-        out[0, r] = T[r, 0] * slab[0] + T[r, 1] * slab[1] + T[r, 2] * slab[2] + T[r, 3]
+    put_point(T, slab, out[0])
     long, wide = 0.0, 0.0
     for k in range(3):
         long += np.float64(slab[3 + k]) ** 2

@@ -17,6 +17,7 @@ from .compiling import inner_kernel
 from .exact import ExactArrays, keep_pair, last_mover, place_axes, pose_movers
 from .family_pose import compose_inverse, copy_pose
 from .layout import ChainArrays, Floats, Work
+from .parting import lanes_apart
 from .sweeping import SweepWork
 
 
@@ -98,12 +99,6 @@ def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float
         middle += along * box[k]
         half += abs(along) * box[3 + k]
     return middle - half, middle + half
-
-
-@inner_kernel
-def lanes_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Say whether two extents lie apart along the axis that everything turns about: then nothing meets."""
-    return bool(one[0] > other[1] or other[0] > one[1])
 
 
 @inner_kernel

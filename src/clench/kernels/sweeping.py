@@ -12,6 +12,7 @@ from .closest import crosses, separation
 from .compiling import inner_allocating_kernel, inner_kernel
 from .core_motion import plane_gap
 from .crossing import only_touch
+from .family_pose import put_point
 from .layout import Floats, Ints
 from .slabs import put_slab_core, slab_misses
 from .spatial_motion import SPATIAL
@@ -85,13 +86,6 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.zeros(4, dtype=np.int64),
         np.zeros(1, dtype=np.int64),
     )
-
-
-@inner_kernel
-def put_point(T: Floats, p: Floats, out: Floats) -> None:
-    """Write a point in the frame that a pose leads to."""
-    for r in range(3):
-        out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
 
 
 @inner_kernel
