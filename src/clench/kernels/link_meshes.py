@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .apart import PAIRS, boxes_apart, surfaces_apart
 from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .depth import CROSSINGS, penetration
 from .distance import is_inside
@@ -126,10 +127,16 @@ def depth_of(
     compose_inverse(T_palm_object, T_palm_link, T)
     if not may_touch(meshes, k, T, solid.tree):
         return 0.0, 0.0, 0.0, 0.0
+    mesh, closed = mesh_of(meshes, k), meshes.closed[k] != 0
+    if boxes_apart(mesh, 0, solid.tree, 0, T):
+        return 0.0, 0.0, 0.0, 0.0
+    # Where an open mesh has an inside, a surface gets into it without crossing.
+    apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, np.empty((PAIRS, 2), dtype=np.int32))
+    if apart and not has_contained(meshes, k, T, solid, np.empty(3)):
+        return 0.0, 0.0, 0.0, 0.0
     compose_inverse(T_palm_link, T_palm_object, T_link_object)
-    closed = meshes.closed[k] != 0
     found: tuple[float, float, float, float] = penetration(
-        mesh_of(meshes, k),
+        mesh,
         meshes.owners[meshes.triangle_first[k] : meshes.triangle_first[k + 1]],
         closed,
         solid.tree,
@@ -150,19 +157,26 @@ def find_contained(
     """Return a link that has a part inside the object or around a part of it, or -1; as in `measure_depths`."""
     T, p = np.empty((3, 4)), np.empty(3)
     for k in range(meshes.link.shape[0]):
-        if not wanted[k]:
-            continue
-        compose_inverse(T_palm_object, poses[meshes.link[k]], T)
-        if solid.tree.low.shape[0] > 0 and may_fit(meshes, k, T, solid.tree, p):
-            for i in range(meshes.point_first[k], meshes.point_first[k + 1]):
-                put_point(T, meshes.points[i], p)
-                if is_inside(solid.tree, (p[0], p[1], p[2]), solid.closed):
-                    return int(meshes.link[k])
-        for i in range(solid.points.shape[0]):
-            part = back(T, solid.points[i, 0], solid.points[i, 1], solid.points[i, 2])
-            if is_inside(mesh_of(meshes, k), part, meshes.closed[k] != 0):
+        if wanted[k]:
+            compose_inverse(T_palm_object, poses[meshes.link[k]], T)
+            if has_contained(meshes, k, T, solid, p):
                 return int(meshes.link[k])
     return -1
+
+
+@inner_allocating_kernel
+def has_contained(meshes: LinkMeshArrays, k: int, T_object_link: Floats, solid: ObjectMesh, p: Floats) -> bool:
+    """Say whether a link has a part inside the object, or around a part of it; `p` is overwritten."""
+    if solid.tree.low.shape[0] > 0 and may_fit(meshes, k, T_object_link, solid.tree, p):
+        for i in range(meshes.point_first[k], meshes.point_first[k + 1]):
+            put_point(T_object_link, meshes.points[i], p)
+            if is_inside(solid.tree, (p[0], p[1], p[2]), solid.closed):
+                return True
+    for i in range(solid.points.shape[0]):
+        part = back(T_object_link, solid.points[i, 0], solid.points[i, 1], solid.points[i, 2])
+        if is_inside(mesh_of(meshes, k), part, meshes.closed[k] != 0):
+            return True
+    return False
 
 
 @inner_kernel
