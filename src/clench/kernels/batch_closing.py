@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from .advance import make_work
 from .closing import close_item
-from .compiling import allocating_kernel, inner_allocating_kernel
+from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays
 from .family_section import cut_first_families
-from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays
+from .handing import whole
+from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays, Work
 from .overlap import look_for_overlaps
-from .sweeping import make_sweep_work
+from .sweeping import SweepWork, make_sweep_work
 from .tree import MeshTree
 
 
@@ -29,7 +30,7 @@ def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
     )
 
 
-@inner_allocating_kernel
+@inner_kernel
 def clear_answer(answer: ClosingArrays, i: int) -> None:
     """Make an item's answer what the closing starts from."""
     answer.travel[i] = 0.0
@@ -44,8 +45,8 @@ def with_links(exact: ExactArrays, link_pose: Floats) -> ExactArrays:
     return ExactArrays(
         exact.joint_first,
         exact.wanted,
-        exact.links,
-        exact.object,
+        whole(exact.links),
+        whole(exact.object),
         exact.mover_first,
         exact.mover_link,
         exact.mover_joint,
@@ -65,7 +66,7 @@ def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
         hand.entry_group,
         hand.entry_family,
         ChainArrays(c.joint_family, c.joint_group, c.pivot, c.rate, c.start, c.stop, length, c.speed, c.breaks),
-        hand.outlines,
+        whole(hand.outlines),
         hand.family_pose,
         hand.family_plane,
         hand.plane_offset,
@@ -111,26 +112,49 @@ def close_poses(
             continue
         look_for_overlaps(hand, tree, rounds, closed, T, shared, overlaps[n], work)
         fingers, placed = with_lengths(hand, length[one]), with_links(exact, link_pose[one])
-        for i in range(items.entry.shape[0]):
-            if not asked[n, i]:
-                continue
-            clear_answer(answer, i)
-            if overlaps[n, items.entry[i]] >= 0:
-                continue
-            close_item(
-                fingers,
-                placed,
-                tree,
-                rounds,
-                closed,
-                T,
-                shared,
-                own,
-                items,
-                i,
-                1,
-                False,
-                work,
-                sweep,
-                answer,
-            )
+        close_pose(
+            fingers, placed, tree, rounds, closed, T, items, asked[n], shared, own, overlaps[n], work, sweep, answer
+        )
+
+
+@inner_kernel
+def close_pose(
+    hand: HandArrays,
+    exact: ExactArrays,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    closed: bool,
+    T_palm_object: Floats,
+    items: ItemArrays,
+    asked: Ints,
+    shared: SectionArrays,
+    own: SectionArrays,
+    overlaps: Ints,
+    work: Work,
+    sweep: SweepWork,
+    answer: ClosingArrays,
+) -> None:
+    """Close the items that are asked for at one pose, (I,), and overlap nothing at the start; see `close_poses`."""
+    for i in range(items.entry.shape[0]):
+        if not asked[i]:
+            continue
+        clear_answer(answer, i)
+        if overlaps[items.entry[i]] >= 0:
+            continue
+        close_item(
+            hand,
+            exact,
+            tree,
+            rounds,
+            closed,
+            T_palm_object,
+            shared,
+            own,
+            items,
+            i,
+            1,
+            False,
+            work,
+            sweep,
+            answer,
+        )

@@ -268,22 +268,44 @@ def judge_poses(
     )
     for n in range(T_palm_object.shape[0]):
         T, answer = T_palm_object[n], answer_at(answers, n)
-        choose_sets(hand, frames, surface, T, items, wanted, answer, scratch)
-        write_fingers(hand, frames, wanted, answer, blocked[n], scratch, solved, n)
-        touching, stuck = 0, 0
-        for entry in range(entries):
-            touching += 1 if solved.fingers[n, entry] == TOUCH else 0
-            stuck += 1 if blocked[n, entry] else 0
-        solved.certified[n] = 0
-        free = not any_deep(meshes, wanted.fixed, wanted.start_pose, mesh, T)
-        if wanted.whole and free and stuck == 0:
-            certified = is_certified(exact, frames, mesh, meshes, T, wanted, answer, solved.angles[n], scratch)
-            solved.certified[n] = 1 if certified else 0
-        if not free or stuck == entries + wanted.idle:
-            solved.status[n] = ALL_BLOCKED
-        elif touching == 0:
-            solved.status[n] = NO_CONTACT
-        elif touching == entries + wanted.idle or opposed(answer, wanted, scratch):
-            solved.status[n] = GRASP
-        else:
-            solved.status[n] = PARTIAL
+        judge_pose(hand, exact, frames, surface, mesh, meshes, items, wanted, T, answer, blocked[n], scratch, solved, n)
+
+
+@inner_allocating_kernel
+def judge_pose(
+    hand: HandArrays,
+    exact: ExactArrays,
+    frames: FrameArrays,
+    surface: SurfaceArrays,
+    mesh: ObjectMesh,
+    meshes: LinkMeshArrays,
+    items: ItemArrays,
+    wanted: Wanted,
+    T_palm_object: Floats,
+    answer: ClosingArrays,
+    blocked: Ints,
+    scratch: Scratch,
+    solved: Solved,
+    n: int,
+) -> None:
+    """Choose, read and judge the answer for one pose, the one with number `n`; see `judge_poses`."""
+    choose_sets(hand, frames, surface, T_palm_object, items, wanted, answer, scratch)
+    write_fingers(hand, frames, wanted, answer, blocked, scratch, solved, n)
+    entries, touching, stuck = blocked.shape[0], 0, 0
+    for entry in range(entries):
+        touching += 1 if solved.fingers[n, entry] == TOUCH else 0
+        stuck += 1 if blocked[entry] else 0
+    solved.certified[n] = 0
+    free = not any_deep(meshes, wanted.fixed, wanted.start_pose, mesh, T_palm_object)
+    if wanted.whole and free and stuck == 0:
+        angles = solved.angles[n]
+        certified = is_certified(exact, frames, mesh, meshes, T_palm_object, wanted, answer, angles, scratch)
+        solved.certified[n] = 1 if certified else 0
+    if not free or stuck == entries + wanted.idle:
+        solved.status[n] = ALL_BLOCKED
+    elif touching == 0:
+        solved.status[n] = NO_CONTACT
+    elif touching == entries + wanted.idle or opposed(answer, wanted, scratch):
+        solved.status[n] = GRASP
+    else:
+        solved.status[n] = PARTIAL

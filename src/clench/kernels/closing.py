@@ -315,6 +315,29 @@ def close_items(
     """
     work = make_work(hand.chain.rate.shape[0], hand.outlines)
     sweep = make_sweep_work(hand.chain.rate.shape[0], exact.checked.shape[0])
+    close_each(
+        hand, exact, tree, rounds, closed, T_palm_object, shared, own, items, times, together, work, sweep, answer
+    )
+
+
+@inner_kernel
+def close_each(
+    hand: HandArrays,
+    exact: ExactArrays,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    closed: bool,
+    T_palm_object: Floats,
+    shared: SectionArrays,
+    own: SectionArrays,
+    items: ItemArrays,
+    times: int,
+    together: bool,
+    work: Work,
+    sweep: SweepWork,
+    answer: ClosingArrays,
+) -> None:
+    """Close one item after another; see `close_items`."""
     for i in range(items.entry.shape[0]):
         close_item(
             hand,

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import njit, types
+from numba import njit
+
+from .handing import handed
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -47,10 +49,9 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
     choose = dispatcher.get_call_template
-    plain: Any = types.unliteral
 
-    def choose_plain(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-        return choose(tuple(map(plain, args)), {name: plain(a) for name, a in kws.items()})
+    def choose_handed(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        return choose(tuple(map(handed, args)), {name: handed(a) for name, a in kws.items()})
 
-    dispatcher.get_call_template = choose_plain
+    dispatcher.get_call_template = choose_handed
     return cast(Kernel, dispatcher)
