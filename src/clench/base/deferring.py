@@ -1,9 +1,12 @@
-"""Mappings and sequences that are made when they are first read."""
+"""Values, mappings and sequences that are made when they are first read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import Any, ClassVar, Generic, TypeVar
+
+Value = TypeVar("Value")
 
 
 class _Deferred:
@@ -59,3 +62,15 @@ class DeferredSequence(_Deferred, Sequence[Any]):
     """A sequence that is made when it is first read; its copies are plain tuples."""
 
     _kind = tuple
+
+
+class Deferred(Generic[Value]):
+    """A value that is made when it is first read."""
+
+    def __init__(self, make: Callable[[], Value]) -> None:
+        self._make = make
+
+    @cached_property
+    def value(self) -> Value:
+        """The value."""
+        return self._make()

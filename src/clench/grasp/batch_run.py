@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,14 +49,38 @@ def solve_packed(problem: PackedProblem, T_palm_object: FloatArray, threads: int
     return solved
 
 
+class PoseAnswer(NamedTuple):
+    """Hold what the kernels gave for one pose.
+
+    Args:
+        solved: the answer, for one pose. closed: of the items at this pose. blocked: a finger overlaps the object
+            before anything moves. anew: whether an item was closed again, with other fingers in its way, (I,).
+    """
+
+    solved: Solved
+    closed: ClosingArrays
+    blocked: bool
+    anew: NDArray[np.bool_]
+
+
+def solve_pose(problem: PackedProblem, T_palm_object: FloatArray) -> PoseAnswer:
+    """Solve for one pose of the object, shape (3, 4)."""
+    solved = _empty_solved(problem, 1)
+    run = _Range(problem, T_palm_object[None], False)
+    run.solve(solved)
+    columns: list[Any] = [column[0] for column in run.answers]
+    return PoseAnswer(solved, type(run.answers)(*columns), bool(run.blocked.any()), run.anew[0])
+
+
 class _Range:
-    """Solve a range of poses, stage after stage."""
+    """Solve a range of poses, stage after stage; then it has the `answers`, what is `blocked`, and closed `anew`."""
 
     def __init__(self, problem: PackedProblem, T_palm_object: FloatArray, on_device: bool) -> None:
         self._problem, self._T, self._on_device = problem, T_palm_object, on_device
         self._count, self._items = len(T_palm_object), len(problem.items.entry)
-        self._blocked = np.zeros((self._count, len(problem.frames.posture)), dtype=np.int64)
-        self._answers = _empty_answers(problem, self._count)
+        self.blocked = np.zeros((self._count, len(problem.frames.posture)), dtype=np.int64)
+        self.answers = _empty_answers(problem, self._count)
+        self.anew = np.zeros((self._count, self._items), dtype=np.bool_)
         self._arenas: dict[tuple[int, int], tuple[SectionArrays, SectionArrays]] = {}
 
     def solve(self, solved: Solved) -> None:
@@ -75,8 +99,8 @@ class _Range:
             p.mesh,
             self._T,
             overlaps,
-            self._answers,
-            self._blocked,
+            self.answers,
+            self.blocked,
         )
         if p.wanted.whole and not p.alone:
             self._close_in_sequence()
@@ -90,8 +114,8 @@ class _Range:
             p.items,
             p.wanted,
             self._T,
-            self._answers,
-            self._blocked,
+            self.answers,
+            self.blocked,
             solved,
         )
 
@@ -106,18 +130,18 @@ class _Range:
             overlaps at the start, (len(poses), E).
         """
         p = self._problem
-        overlaps = np.empty((len(poses), self._blocked.shape[1]), dtype=np.int64)
+        overlaps = np.empty((len(poses), self.blocked.shape[1]), dtype=np.int64)
         waiting, arena = np.arange(len(poses)), arena_of(p.target.tree)
         while len(waiting):
             rows = poses[waiting]
             everyone = len(rows) == self._count
-            answers = self._answers if everyone else _rows(self._answers, rows)
+            answers = self.answers if everyone else _rows(self.answers, rows)
             found = np.empty((len(rows), overlaps.shape[1]), dtype=np.int64)
             links = p.exact.link_pose[None] if placed is None else placed[waiting]
             exact = p.exact if placed is None else p.exact._replace(checked=p.bodies.across)
             length = np.repeat(p.hand.chain.group_length[None], len(links), axis=0)
             self._run(exact, p.target, rows, links, length, asked[waiting], arena.capacity, found, answers)
-            for column, values in () if everyone else zip(self._answers, answers, strict=True):
+            for column, values in () if everyone else zip(self.answers, answers, strict=True):
                 column[rows] = values
             overlaps[waiting] = found
             wanted = (answers.overflow * asked[waiting]).max(axis=1, initial=0)
@@ -175,12 +199,13 @@ class _Range:
         entry = np.arange(self._items)
         while len(waiting):
             placed, length = self._place(waiting)
-            asked = ((self._blocked[waiting] == 0) & (entry >= first[:, None])).astype(np.int64)
+            asked = ((self.blocked[waiting] == 0) & (entry >= first[:, None])).astype(np.int64)
             meets = self._meeting(waiting, placed, length, asked)
             again = meets.any(axis=1)
             waiting, placed = waiting[again], placed[again]
             chosen = meets[again].argmax(axis=1)
             self._close(waiting, (entry == chosen[:, None]).astype(np.int64), placed)
+            self.anew[waiting, chosen] = True
             first = chosen + 1
 
     def _place(self, poses: Whole) -> tuple[FloatArray, FloatArray]:
@@ -190,7 +215,7 @@ class _Range:
         p = self._problem
         placed = np.empty((len(poses), *p.exact.link_pose.shape))
         length = np.zeros((len(poses), len(p.hand.chain.group_length)))
-        place_fingers(p.hand, p.frames, p.wanted, self._answers.travel[poses], placed, length)
+        place_fingers(p.hand, p.frames, p.wanted, self.answers.travel[poses], placed, length)
         return placed, length
 
     def _meeting(self, poses: Whole, placed: FloatArray, length: FloatArray, asked: Whole) -> NDArray[np.bool_]:
@@ -198,7 +223,7 @@ class _Range:
         p, none = self._problem, nothing_to_close()
         exact = p.exact._replace(object=none.bodies, checked=p.bodies.across - p.bodies.within)
         answers = _empty_answers(p, len(poses))
-        overlaps = np.empty((len(poses), self._blocked.shape[1]), dtype=np.int64)
+        overlaps = np.empty((len(poses), self.blocked.shape[1]), dtype=np.int64)
         self._run(exact, none, poses, placed, length, asked, 0, overlaps, answers)
         meets: NDArray[np.bool_] = (asked != 0) & ((answers.contacts > 0) | (answers.skipped > 0))
         return meets

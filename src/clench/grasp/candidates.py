@@ -129,18 +129,27 @@ def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandi
 
 
 def read_candidates(
-    hand: Hand, plan: HandPlan, packed: PackedObject, closed: ClosedHand, overlaps: Sequence[LinkDepth | None]
+    hand: Hand,
+    plan: HandPlan,
+    packed: PackedObject,
+    answer: ClosingArrays,
+    T_palm_object: FloatArray,
+    overlaps: Sequence[LinkDepth | None],
 ) -> list[FingerCandidate]:
-    """Return one candidate per item, in item order; `overlaps` as `start_overlaps` gives them, per entry."""
+    """Return one candidate per item, in item order.
+
+    Args:
+        hand, plan: what closed. packed, T_palm_object: the object, shape (4, 4). answer: what the kernels computed.
+        overlaps: as `start_overlaps` gives them, per entry.
+    """
     entries = plan.items.entry.tolist()
     blocked = [overlaps[entry] is not None for entry in entries]
-    answer = closed.answer
     if any(blocked):
         still = np.array(blocked)
         travel, contacts = answer.travel.copy(), np.where(still, 0, answer.contacts)
         travel[still] = 0.0
         answer = answer._replace(travel=travel, contacts=contacts)
-    touches, postures = _read_items(hand, plan, packed, closed.T_palm_object, answer)
+    touches, postures = _read_items(hand, plan, packed, T_palm_object, answer)
     groups, low, skipped = plan.arrays.entry_group.tolist(), plan.items.low.tolist(), answer.skipped.tolist()
     candidates = []
     for i, entry in enumerate(entries):
@@ -175,7 +184,8 @@ def closed_anew(
     """Return a set closed again, with what stands in its way now; the arguments are those of `close_items_again`."""
     again = close_items_again(plan, exact, packed, closed, [candidate.item], rounds)
     nowhere = [None] * len(plan.plans)
-    (found,) = read_candidates(hand, only_items(plan, [candidate.item]), packed, again, nowhere)
+    one, T = only_items(plan, [candidate.item]), closed.T_palm_object
+    (found,) = read_candidates(hand, one, packed, again.answer, T, nowhere)
     return replace(found, item=candidate.item)
 
 

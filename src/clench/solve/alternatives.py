@@ -51,7 +51,7 @@ def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> C
     closed = close_hand(plan, made.exact, packed, T, problem.rounds)
     lap("close")
     overlaps = start_overlaps(hand, plan, made.exact.link_pose, closed, packed, T, problem.source)
-    sets = read_candidates(hand, plan, packed, closed, overlaps)
+    sets = read_candidates(hand, plan, packed, closed.answer, T, overlaps)
     _judge(problem, sets)
     lap("sets")
     return ClosedSets(closed, overlaps, sets)
@@ -68,7 +68,7 @@ def with_planes(
     """Return the sets of every finger, the full widths as they were closed already, with what overlaps per entry."""
     made, T = planned(problem).planes, problem.T_palm_object
     closed = close_hand(made.plan, made.exact, problem.packed, T, problem.rounds)
-    sets = read_candidates(problem.hand, made.plan, problem.packed, closed, overlaps)
+    sets = read_candidates(problem.hand, made.plan, problem.packed, closed.answer, T, overlaps)
     _judge(problem, [*sets, *full_width])
     groups = group_by_finger(made.plan, sets)
     return [[*group, whole] for group, whole in zip(groups, full_width, strict=True)]

@@ -17,7 +17,7 @@ from clench.grasp.depths import LinkDepth, retreat_distance
 from clench.grasp.motion import asked_fingers, decompose
 from clench.grasp.scene import hash_hand
 from clench.grasp.surface import nearest_body
-from clench.models.command import ClosingOrder
+from clench.models.command import ClosingOrder, GraspCommand
 
 from .causes import finger_cause, no_closing_joint
 from .certificate import Certificate
@@ -110,9 +110,14 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         timing=dict(timing),
         speeds=dict(command.speeds),
         rounds=command.rounds,
-        next_steps=tuple({name: float(angle) for name, angle in step.items()} for step in command.next_steps),
+        next_steps=plain_steps(command),
         joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
     )
+
+
+def plain_steps(command: GraspCommand) -> tuple[dict[str, float], ...]:
+    """Return the postures that the hand goes to after the grasp, as plain numbers."""
+    return tuple({name: float(angle) for name, angle in step.items()} for step in command.next_steps)
 
 
 def _opened(answer: Answer, problem: Problem) -> FloatArray:

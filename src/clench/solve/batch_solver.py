@@ -10,17 +10,16 @@ import numpy as np
 
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.batch_run import solve_packed
-from clench.grasp.batching import PackedProblem, is_covered, pack_problem
+from clench.grasp.batching import PackedProblem
 from clench.grasp.calibration import calibration_of
-from clench.grasp.exact import hand_bodies
 from clench.grasp.motion import asked_fingers, palm_pose
 from clench.grasp.plan import closing_joints
-from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.command import GraspCommand
 
 from .controller import solve
 from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
-from .planning import planned
+from .packing import packed_problem
 from .problem import make_problem, make_setting
 from .solution import FingerStatus, GraspSolution
 
@@ -62,22 +61,7 @@ class BatchSolver:
             return None
         calibration = calibration_of(command.criteria)
         make_setting(problem, calibration)
-        made = planned(problem)
-        plan, exact = made.plan, made.exact
-        usual = command.order == ClosingOrder.PROXIMAL_FIRST and command.rounds == 1 and not command.check_sets
-        if not (usual and is_covered(problem.hand, plan, calibration)):
-            return None
-        return pack_problem(
-            problem.hand,
-            plan,
-            exact,
-            problem.packed,
-            problem.start,
-            problem.source,
-            hand_bodies(problem.hand, problem.source),
-            calibration,
-            len(self._idle),
-        )
+        return packed_problem(problem, calibration)
 
     def solve(
         self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int, device: str = CPU

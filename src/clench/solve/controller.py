@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from clench.base.deferring import DeferredMapping
-from clench.grasp.calibration import calibration_of
+from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, combined_posture
+from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import score_sets
 from clench.grasp.depths import hand_depths
 from clench.grasp.exact import hand_bodies
@@ -26,6 +24,8 @@ from clench.models.objects.grasp_object import GraspObject
 from .alternatives import Alternatives, close_sets, decided, group_by_finger, with_planes
 from .assembly import Answer, assemble
 from .certificate import certify
+from .clock import Clock
+from .directly import solve_directly
 from .orders import best_order
 from .planning import Planned, planned
 from .problem import Problem, make_problem, make_setting
@@ -63,11 +63,18 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
 
 def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSolution:
     """Solve a command in its one closing order."""
-    clock = _Clock()
+    clock = Clock()
     problem = make_problem(hand, obj, command)
     calibration = calibration_of(command.criteria)
     setting = make_setting(problem, calibration)
     clock.lap("read")
+    in_full = partial(_answer, problem, calibration, setting, clock)
+    solution = solve_directly(problem, calibration, setting, in_full, clock)
+    return solution or assemble(in_full(), problem, clock.stages())
+
+
+def _answer(problem: Problem, calibration: Calibration, setting: Setting, clock: Clock) -> Answer:
+    """Close what is asked for, choose, close again what is in each other's way, and judge it."""
     full_width = decided(problem, calibration)
     made = full_width or planned(problem)
     clock.lap("plan")
@@ -93,7 +100,7 @@ def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSo
     explained = DeferredMapping(partial(alternatives.explained, best, changed))
     answer = _judged(problem, made, alternatives, chosen, best, explained)
     clock.lap("judge")
-    return assemble(answer, problem, clock.stages())
+    return answer
 
 
 def _with_each_other(
@@ -125,21 +132,3 @@ def _judged(
     if at_end is None and problem.command.measure:
         at_end = hand_depths(hand, final, packed, T, problem.source)
     return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
-
-
-class _Clock:
-    """Time the stages of a solve [s]."""
-
-    def __init__(self) -> None:
-        self._last = time.perf_counter()
-        self._stages: dict[str, float] = {}
-
-    def lap(self, stage: str) -> None:
-        """Note the time since the last lap under a name."""
-        now = time.perf_counter()
-        self._stages[stage] = now - self._last
-        self._last = now
-
-    def stages(self) -> dict[str, float]:
-        """Return the stages, with their total."""
-        return {**self._stages, "total": float(np.sum(list(self._stages.values())))}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, HandError
+from clench.base.pose import FloatArray
 from clench.grasp.closing import HandPlan, make_hand_plan, only_items
 from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
 from clench.grasp.motion import alternatives, asked_fingers
 from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
 from clench.models.command import GraspCommand
-from clench.models.hand.hand import Hand
+from clench.models.hand.hand import Finger, Hand
+from clench.models.shapes import CollisionSource
 
 from .problem import Problem
 
@@ -29,11 +31,19 @@ _KEPT_PLANS = 64
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """Hold the plan of a hand and what its exact sweeps need."""
+    """Hold the plan of a hand and what its exact sweeps need.
+
+    Args:
+        start: posture before closing, shape (J,) [rad]. source: geometry of the hand. plan, exact: of its fingers.
+        idle: fingers asked for that no joint closes.
+    """
 
     hand: Hand
+    start: FloatArray
+    source: CollisionSource
     plan: HandPlan
     exact: ExactArrays
+    idle: tuple[Finger, ...]
 
     @cached_property
     def full_width(self) -> Planned | None:
@@ -55,7 +65,7 @@ class Planned:
 
     def _only(self, items: NDArray[np.intp]) -> Planned:
         exact = self.exact._replace(wanted=np.ascontiguousarray(self.exact.wanted[items]))
-        return Planned(self.hand, only_items(self.plan, items.tolist()), exact)
+        return replace(self, plan=only_items(self.plan, items.tolist()), exact=exact)
 
 
 _plans: OrderedDict[tuple[object, ...], Planned] = OrderedDict()
@@ -85,9 +95,11 @@ def planned(problem: Problem) -> Planned:
     kept = _plans.get(key)
     if kept is not None and kept.hand is hand:
         return kept
-    plans, finger, posture = [], [], []
+    plans, finger, posture, idle = [], [], [], []
     for f, asked in enumerate(asked_fingers(hand, command)):
-        if closing_joints(hand, asked):
+        if not closing_joints(hand, asked):
+            idle.append(asked)
+        else:
             for p, q in enumerate(alternatives(hand, asked, problem.start, command)):
                 plans.append(plan_finger(hand, asked, q, command.planes, problem.source, command.speeds))
                 finger.append(f)
@@ -100,7 +112,7 @@ def planned(problem: Problem) -> Planned:
     exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
     if problem.together:
         exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
-    made = _plans[key] = Planned(hand, plan, exact)
+    made = _plans[key] = Planned(hand, problem.start, problem.source, plan, exact, tuple(idle))
     while len(_plans) > _KEPT_PLANS:
         _plans.popitem(last=False)
     return made

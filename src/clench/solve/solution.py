@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from clench.base.deferring import DeferredMapping
 from clench.base.pose import FloatArray, Pose
 
 
@@ -226,6 +227,34 @@ class GraspSolution:
     speeds: Mapping[str, float] = field(default_factory=dict)
     rounds: int = 1
     next_steps: tuple[Mapping[str, float], ...] = ()
+
+    @classmethod
+    def deferred(cls, make: Callable[[], GraspSolution], **known: Any) -> GraspSolution:
+        """Return a solution of which some fields are known; the others are made when one of them is first read.
+
+        Args:
+            make: returns the whole solution, always the same. known: of its fields, those that may be left out when
+                one is made, too, but for the mappings among them.
+        """
+        late = {
+            "certificate": DeferredMapping(lambda: make().certificate or {}),
+            "choice": DeferredMapping(lambda: make().choice or {}),
+            "joint_limits": DeferredMapping(lambda: make().joint_limits),
+        }
+        solution = object.__new__(cls)
+        solution.__dict__.update({**late, **known}, _make=make)
+        return solution
+
+    def __getattr__(self, name: str) -> Any:
+        make: Callable[[], GraspSolution] | None = self.__dict__.get("_make")
+        if make is None or name not in self.__dataclass_fields__:
+            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
+        value = self.__dict__[name] = getattr(make(), name)
+        return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Be copied and pickled with all fields."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""

@@ -1,0 +1,125 @@
+"""One solve by the kernels of a batch, whose answer says at once what a control loop asks; the rest is made when read.
+
+A pose, angles, status and what is promised are known when the kernels are done. Contacts, reasons and scores are made
+of the kernels' numbers when one of them is first read; what was not chosen, and why, by closing it then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from threading import Lock
+
+import numpy as np
+
+from clench.base.deferring import Deferred, DeferredMapping
+from clench.grasp.batch_run import PoseAnswer, solve_pose
+from clench.grasp.batching import PackedProblem
+from clench.grasp.calibration import Calibration
+from clench.grasp.candidates import FingerCandidate, read_candidates
+from clench.grasp.criteria import Setting
+from clench.grasp.criterion_registry import is_built_in, score_sets
+from clench.grasp.depths import hand_depths
+from clench.grasp.feasibility import judge_sets
+
+from .assembly import Answer, assemble, plain_steps
+from .certificate import certify, promised
+from .clock import Clock
+from .grasp_batch import STATUSES
+from .packing import packed_problem
+from .planning import Planned, planned
+from .problem import Problem
+from .solution import GraspSolution, SolutionStatus
+
+
+def solve_directly(
+    problem: Problem,
+    calibration: Calibration,
+    setting: Setting,
+    in_full: Callable[[], Answer],
+    clock: Clock,
+) -> GraspSolution | None:
+    """Return the solution where the kernels of a batch give it, and nothing overlaps before anything moves.
+
+    Args:
+        problem, calibration, setting: what is asked. in_full: solves it with all alternatives and reasons.
+        clock: of the solve.
+    """
+    packed = packed_problem(problem, calibration) if is_built_in(calibration.criteria) else None
+    clock.lap("plan")
+    if packed is None:
+        return None
+    answer = solve_pose(packed, problem.T_palm_object[:3])
+    clock.lap("close")
+    status = STATUSES[int(answer.solved.status[0])]
+    certified = bool(answer.solved.certified[0])
+    # Why something is blocked, or not promised, takes more to say than these numbers.
+    if status is SolutionStatus.BLOCKED or answer.blocked or certified != packed.wanted.whole:
+        return None
+    command, stages = problem.command, clock.stages()
+    return GraspSolution.deferred(
+        _Direct(problem, calibration, setting, packed, answer, in_full, stages).solution,
+        status=status,
+        joint_angles=dict(zip(problem.hand.joint_names, answer.solved.angles[0].tolist(), strict=True)),
+        certified=certified,
+        hand_pose=problem.T_world_palm,
+        object_pose=problem.T_world_object,
+        timing=stages,
+        quality=None,
+        squeeze=None,
+        pregrasp=None,
+        speeds=dict(command.speeds),
+        rounds=command.rounds,
+        next_steps=plain_steps(command),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Direct:
+    """Hold what the kernels gave, and make of it what a solution says."""
+
+    problem: Problem
+    calibration: Calibration
+    setting: Setting
+    packed: PackedProblem
+    answer: PoseAnswer
+    in_full: Callable[[], Answer]
+    stages: Mapping[str, float]
+    _made: list[GraspSolution] = field(default_factory=list)
+    #: Threads that read at once for the first time get the same.
+    _lock: Lock = field(default_factory=Lock)
+
+    def solution(self) -> GraspSolution:
+        """Return the whole solution, made once, but for what is made when that is read."""
+        with self._lock:
+            if not self._made:
+                self._made.append(assemble(self._answer(), self.problem, self.stages))
+            return self._made[0]
+
+    def _answer(self) -> Answer:
+        problem, whole = self.problem, self.packed.wanted.whole
+        hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
+        complete = planned(problem)
+        made = (complete.full_width if whole else None) or complete
+        items = self.answer.solved.chosen[0].tolist()
+        chosen = complete.plane_counts if whole else made.plan.items.low[items].tolist()
+        best, final = self._best(made, items), self.answer.solved.angles[0]
+        at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
+        promise = promised(problem) if whole else certify(problem, best, at_start, final, made.exact)
+        at_end = at_start if promise.holds else None
+        if at_end is None and problem.command.measure:
+            at_end = hand_depths(hand, final, packed, T, problem.source)
+        full = Deferred(self.in_full)
+        choice = DeferredMapping(lambda: full.value.choice)
+        return Answer(lambda k: full.value.sets(k), chosen, best, final, at_start, at_end, promise, choice)
+
+    def _best(self, made: Planned, items: list[int]) -> list[FingerCandidate]:
+        """Return the chosen sets; those that the other fingers made close again were never judged alone."""
+        p, closed, nowhere = self.problem, self.answer.closed, [None] * len(made.plan.plans)
+        sets = read_candidates(p.hand, made.plan, p.packed, closed, p.T_palm_object, nowhere)
+        judge_sets(p.hand, sets, p.packed, p.T_palm_object, p.source, measure=False)
+        for i in np.flatnonzero(self.answer.anew):
+            sets[i].feasible = sets[i].penetration = None
+        best = [sets[i] for i in items]
+        score_sets(best, self.calibration.criteria, self.setting)
+        return best
