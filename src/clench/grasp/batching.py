@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Finger, Hand
@@ -15,7 +16,7 @@ from clench.models.shapes import CollisionSource
 
 from .blocking import link_masks
 from .calibration import Calibration
-from .closing import HandPlan, KernelObject, object_for_closing
+from .closing import HandPlan, object_for_closing
 from .containment import link_within_link
 from .criterion_registry import ALWAYS
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
@@ -24,7 +25,7 @@ from .scene import PackedObject
 from .surface import object_surface
 
 if TYPE_CHECKING:
-    from clench.kernels.batch_layout import Wanted
+    from clench.kernels.batch_layout import ObjectArrays, Wanted
     from clench.kernels.exact import ExactArrays
     from clench.kernels.frames import FrameArrays
     from clench.kernels.layout import HandArrays, ItemArrays
@@ -51,11 +52,16 @@ class PackedProblem:
     frames: FrameArrays
     meshes: LinkMeshArrays
     wanted: Wanted
-    target: KernelObject
+    target: ObjectArrays
     mesh: ObjectMesh
     surface: SurfaceArrays
     bodies: HandBodies
     alone: bool
+
+    @cached_property
+    def apart(self) -> NDArray[np.int64]:
+        """Whether a moving link may not overlap a resting one of another finger, (L, L)."""
+        return np.asarray(self.bodies.across - self.bodies.within)
 
     @cached_property
     def most_planes(self) -> int:

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from .scene import KEPT_OBJECTS, PackedObject
 from .surface import round_arrays
 
 if TYPE_CHECKING:
-    from clench.kernels.bodies import BodyArrays
+    from clench.kernels.batch_layout import ObjectArrays
     from clench.kernels.exact import ExactArrays
     from clench.kernels.frames import FrameArrays
-    from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, RoundArrays, SectionArrays
+    from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays, SectionArrays
     from clench.kernels.tree import MeshTree
 
 Part = TypeVar("Part")
@@ -165,34 +165,28 @@ def arena_of(tree: MeshTree) -> Arena:
     return Arena(CAPACITY)
 
 
-class KernelObject(NamedTuple):
-    """Hold an object as the closing kernels take it."""
-
-    tree: MeshTree
-    rounds: RoundArrays
-    closed: bool
-    bodies: BodyArrays
-
-
-def object_for_closing(packed: PackedObject) -> KernelObject:
+def object_for_closing(packed: PackedObject) -> ObjectArrays:
     """Return an object as the closing kernels take it."""
-    return KernelObject(packed.tree, round_arrays(packed), packed.closed, packed.bodies)
+    from clench.kernels.batch_layout import ObjectArrays
+
+    return ObjectArrays(packed.tree, round_arrays(packed), packed.closed, packed.bodies)
 
 
 @lru_cache(maxsize=1)
-def nothing_to_close() -> KernelObject:
+def nothing_to_close() -> ObjectArrays:
     """Return an object that is nowhere."""
+    from clench.kernels.batch_layout import ObjectArrays
     from clench.kernels.bodies import no_body
     from clench.kernels.layout import no_rounds
     from clench.kernels.tree import build_tree
 
-    return KernelObject(build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True, no_body())
+    return ObjectArrays(build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True, no_body())
 
 
 def _close_plan(
     plan: HandPlan,
     exact: ExactArrays,
-    obj: KernelObject,
+    obj: ObjectArrays,
     T: FloatArray,
     shared: SectionArrays,
     rounds: int,
@@ -265,7 +259,7 @@ def _entry_ranges(plan: HandPlan) -> list[tuple[int, int]]:
 def _close_range(
     plan: HandPlan,
     exact: ExactArrays,
-    obj: KernelObject,
+    obj: ObjectArrays,
     T: FloatArray,
     shared: SectionArrays,
     capacity: int,

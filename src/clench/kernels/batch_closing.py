@@ -1,16 +1,13 @@
-"""Close the fingers of a hand for many poses of an object in one call (METHOD.md section 4)."""
+"""Close the fingers of a hand at one of many poses of an object (METHOD.md section 4)."""
 
 from __future__ import annotations
 
-from .advance import make_work
 from .closing import close_item
-from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
+from .compiling import inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays
-from .family_section import cut_first_families
 from .handing import whole
 from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays, Work
-from .overlap import look_for_overlaps
-from .sweeping import SweepWork, make_sweep_work
+from .sweeping import SweepWork
 from .tree import MeshTree
 
 
@@ -76,47 +73,6 @@ def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
     )
 
 
-@allocating_kernel
-def close_poses(
-    hand: HandArrays,
-    exact: ExactArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    link_pose: Floats,
-    length: Floats,
-    items: ItemArrays,
-    asked: Ints,
-    shared: SectionArrays,
-    own: SectionArrays,
-    overlaps: Ints,
-    answers: ClosingArrays,
-) -> None:
-    """Cut the object, look for overlaps at the start, and close items once, joint after joint, for every pose.
-
-    Args:
-        hand, exact, tree, rounds, closed, items: see `close_items`. T_palm_object: where the object is, (N, 3, 4).
-        link_pose, length: that of `exact` and of the chain for every pose, (N, ...), or for all of them, (1, ...).
-        asked: whether an item is to be closed at a pose, (N, I); answers of others are left as they are.
-        shared, own: arenas of sections. overlaps: see `look_for_overlaps`, (N, E); such entries are not closed.
-        answers: see `ClosingArrays`, with the poses first; `overflow` is written for all items of a pose.
-    """
-    work = make_work(hand.chain.rate.shape[0], hand.outlines)
-    sweep = make_sweep_work(hand.chain.rate.shape[0], exact.checked.shape[0])
-    for n in range(T_palm_object.shape[0]):
-        answer, T, one = answer_at(answers, n), T_palm_object[n], min(n, link_pose.shape[0] - 1)
-        overflow = cut_first_families(hand, tree, rounds, T, shared, work.pose)
-        if overflow > 0:
-            answer.overflow[:] = overflow
-            continue
-        look_for_overlaps(hand, tree, rounds, closed, T, shared, overlaps[n], work)
-        fingers, placed = with_lengths(hand, length[one]), with_links(exact, link_pose[one])
-        close_pose(
-            fingers, placed, tree, rounds, closed, T, items, asked[n], shared, own, overlaps[n], work, sweep, answer
-        )
-
-
 @inner_kernel
 def close_pose(
     hand: HandArrays,
@@ -134,7 +90,13 @@ def close_pose(
     sweep: SweepWork,
     answer: ClosingArrays,
 ) -> None:
-    """Close the items that are asked for at one pose, (I,), and overlap nothing at the start; see `close_poses`."""
+    """Close items once, joint after joint.
+
+    Args:
+        hand, exact, tree, rounds, closed, T_palm_object, items, shared, own: see `close_items`.
+        asked: whether an item is to be closed, (I,); answers of others are left as they are.
+        overlaps: see `look_for_overlaps`, (E,); such entries are not closed. answer: written.
+    """
     for i in range(items.entry.shape[0]):
         if not asked[i]:
             continue

@@ -48,6 +48,18 @@ class Scratch(NamedTuple):
     touches: TouchArrays
 
 
+@inner_allocating_kernel
+def make_scratch(entries: int, joints: int, links: int, items: int, contacts: int) -> Scratch:
+    """Allocate what judging writes over."""
+    numbers = np.empty((items, contacts, TOUCH_INTEGERS), dtype=np.int64)
+    return Scratch(
+        np.empty(entries, dtype=np.int64),
+        np.empty(joints),
+        np.empty((links, 3, 4)),
+        TouchArrays(numbers, np.empty((items, contacts, TOUCH_FLOATS))),
+    )
+
+
 @inner_kernel
 def holds(touches: TouchArrays, i: int, n: int) -> bool:
     """Say whether a touch is one with what is to be grasped, and still there."""
@@ -256,16 +268,8 @@ def judge_poses(
         exact: links and object, and which links may not overlap. frames: kinematics of the hand.
         surface, mesh: the object. meshes: of the links. wanted: what is asked for. answers, blocked: of the fingers.
     """
-    entries, links = blocked.shape[1], frames.parent.shape[0]
-    count, contacts = items.entry.shape[0], solved.number.shape[2]
-    scratch = Scratch(
-        np.empty(entries, dtype=np.int64),
-        np.empty(frames.lower.shape[0]),
-        np.empty((links, 3, 4)),
-        TouchArrays(
-            np.empty((count, contacts, TOUCH_INTEGERS), dtype=np.int64), np.empty((count, contacts, TOUCH_FLOATS))
-        ),
-    )
+    joints, links, count = frames.lower.shape[0], frames.parent.shape[0], items.entry.shape[0]
+    scratch = make_scratch(blocked.shape[1], joints, links, count, solved.number.shape[2])
     for n in range(T_palm_object.shape[0]):
         T, answer = T_palm_object[n], answer_at(answers, n)
         judge_pose(hand, exact, frames, surface, mesh, meshes, items, wanted, T, answer, blocked[n], scratch, solved, n)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .layout import Floats, Ints
+from .bodies import BodyArrays
+from .layout import Floats, Ints, RoundArrays
+from .tree import MeshTree
 
 
 class Wanted(NamedTuple):
@@ -37,6 +39,15 @@ class Wanted(NamedTuple):
     whole: bool
     nested: bool
     idle: int
+
+
+class ObjectArrays(NamedTuple):
+    """Hold an object as the closing kernels take it: triangles, round primitives, whether closed, and its body."""
+
+    tree: MeshTree
+    rounds: RoundArrays
+    closed: bool
+    bodies: BodyArrays
 
 
 class Solved(NamedTuple):

@@ -40,7 +40,7 @@ BLOCK = 64
 
 
 class Job(NamedTuple):
-    """Hold what the device reads and writes: see `clench.kernels.batch_closing.close_poses`.
+    """Hold what the device reads and writes: see `close_poses_on_device`.
 
     Args:
         shared, work: of every pose. own, item_work, sweep: of every pose and item, pose after pose.
@@ -88,7 +88,15 @@ def close_poses_on_device(
     overlaps: Ints,
     answers: ClosingArrays,
 ) -> None:
-    """Do what `close_poses` does, on the device. `shared` and `own` say only how large an arena is."""
+    """Cut the object, look for overlaps at the start, and close items once, joint after joint, for every pose.
+
+    Args:
+        hand, exact, tree, rounds, closed, items: see `close_items`. T_palm_object: where the object is, (N, 3, 4).
+        link_pose, length: that of `exact` and of the chain for every pose, (N, ...), or for all of them, (1, ...).
+        asked: whether an item is to be closed at a pose, (N, I); answers of others are left as they are.
+        shared, own: say how large an arena is. overlaps: see `look_for_overlaps`, (N, E); such entries are not closed.
+        answers: see `ClosingArrays`, with the poses first; `overflow` is written for all items of a pose.
+    """
     poses, count = asked.shape
     joints = hand.chain.rate.shape[0]
     work = _plain(make_work)(joints, hand.outlines)

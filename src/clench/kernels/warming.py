@@ -156,9 +156,9 @@ def announce(batch: bool = False) -> None:
     if _is_cold():
         sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
     if batch:
-        from .batch_closing import close_poses
+        from .batch_solving import solve_poses
 
-        if _is_cold(close_poses):
+        if _is_cold(solve_poses):
             sys.stderr.write("clench: compiling the kernels of a batch, once on this machine; about a minute more.\n")
 
 
