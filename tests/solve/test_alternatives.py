@@ -23,7 +23,14 @@ ASKED: dict[str, dict[str, Any]] = {
     "box:x=0.05,y=0.06,z=0.08": {"planes": 2, "criteria": "steady"},
     "cylinder:r=0.004,h=0.2": {"planes": 2, "order": "together"},
     "mug": {"planes": 2, "criteria": {"pose_sensitivity": 1.0, "limit_distance": 0.5}},
+    "sphere:r=0.035": {"planes": 3, "full_width": False, "measure": False},
 }
+
+
+def in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let solves close all sets, choose among them, and say everything at once."""
+    monkeypatch.setattr(controller, "solve_directly", lambda *given: None)
+    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
 
 
 def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.GraspCommand]) -> list[dict[str, Any]]:
@@ -42,7 +49,7 @@ def test_documents_are_those_of_a_choice_among_all_sets(name: str, model: str, m
     hand, obj = HANDS[name], clench.GraspObject.load(model)
     asked = commands(hand, obj, **ASKED[model])
     late = documents(hand, obj, asked)
-    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
+    in_full(monkeypatch)
     assert late == documents(hand, obj, asked)
 
 
@@ -52,23 +59,26 @@ def test_fingers_that_the_others_made_close_again_are_said_to_be(monkeypatch: py
     asked = [clench.GraspCommand(hand_pose=pose, planes=2, criteria="steady") for pose in poses]
     late = documents(hand, obj, asked)
     assert any(f["closed_again"] for d in late for f in d["choice"]["fingers"].values())
-    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
+    in_full(monkeypatch)
     assert late == documents(hand, obj, asked)
 
 
 @pytest.mark.parametrize(
-    ("asked", "closed"),
+    ("asked", "at_once", "when_read"),
     [
-        ({}, "full width"),
-        ({"criteria": "steady"}, "full width"),
-        ({"full_width": False}, "all"),
-        ({"check_sets": True}, "all"),
-        ({"open_variants": (0.0, 0.2)}, "all"),
-        ({"criteria": {"own": 1.0}}, "all"),
+        ({}, [], ["full width", "planes"]),
+        ({"criteria": "steady"}, [], ["full width", "planes"]),
+        ({"full_width": False}, [], ["all"]),
+        ({"check_sets": True}, ["all"], []),
+        ({"open_variants": (0.0, 0.2)}, ["all"], []),
+        ({"rounds": 2}, ["full width"], ["planes"]),
+        ({"criteria": {"own": 1.0}}, ["all"], []),
     ],
     ids=str,
 )
-def test_only_what_may_be_chosen_is_closed(asked: dict[str, Any], closed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_may_be_chosen_is_closed(
+    asked: dict[str, Any], at_once: list[str], when_read: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     register(monkeypatch, "own", lambda: 1.0)
     hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
     command = commands(hand, obj, planes=2, **asked)[0]
@@ -80,14 +90,18 @@ def test_only_what_may_be_chosen_is_closed(asked: dict[str, Any], closed: str, m
         return close(plan, *rest)
 
     monkeypatch.setattr(alternatives, "close_hand", counted)
-    every = len(planned(make_problem(hand, obj, command)).plan.items.entry)
+    every, fingers = len(planned(make_problem(hand, obj, command)).plan.items.entry), len(hand.fingers)
+    numbers = {"all": every, "full width": fingers, "planes": every - fingers}
     solution = clench.solve(hand, obj, command)
-    assert items == [every if closed == "all" else len(hand.fingers)]
+    assert solution.contacts
     for finger in solution.fingers.values():
-        angles = finger.candidates[finger.chosen].joint_angles
-        assert all(solution.joint_angles[name] == angle for name, angle in angles.items())
+        best = finger.best
+        assert best is not None
+        assert all(solution.joint_angles[name] == angle for name, angle in best.joint_angles.items())
+    assert items == [numbers[what] for what in at_once]
     assert solution.choice is not None
-    assert items == ([every] if closed == "all" else [len(hand.fingers), every - len(hand.fingers)])
+    assert len(solution.choice["fingers"]) == fingers
+    assert items == [numbers[what] for what in (*at_once, *when_read)]
 
 
 def test_threads_that_read_at_once_get_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
