@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
 
-from .batching import PackedProblem
-from .closing import arena_of, nothing_to_close, share_out
+from .batching import PackedProblem, empty_answers
+from .closing import arena_of, share_out
 
 if TYPE_CHECKING:
     from clench.kernels.batch_layout import Solved
-    from clench.kernels.batch_solving import Arenas, Closed
+    from clench.kernels.batch_solving import Closed
     from clench.kernels.layout import ClosingArrays
 
 
@@ -71,40 +71,14 @@ def _solve_range(problem: PackedProblem, T_palm_object: FloatArray, solved: Solv
     """Solve a range of poses, with arenas that grow until they are large enough; `solved` is written."""
     from clench.kernels.batch_solving import solve_poses
 
-    p, arena, closed = problem, arena_of(problem.target.tree), _empty_closed(problem, len(T_palm_object))
+    arena, closed = arena_of(problem.target.tree), _empty_closed(problem, len(T_palm_object))
     while True:
-        solve_poses(
-            p.hand,
-            p.exact,
-            p.target,
-            nothing_to_close(),
-            p.frames,
-            p.surface,
-            p.mesh,
-            p.meshes,
-            p.items,
-            p.wanted,
-            p.bodies.across,
-            p.apart,
-            T_palm_object,
-            _arenas(p, arena.capacity),
-            closed,
-            solved,
-        )
+        with problem.room(arena.capacity) as room:
+            solve_poses(problem.asked, problem.wanted, T_palm_object, room, closed, solved)
         wanted = int(closed.overflow.max(initial=0))
         if not wanted:
             return closed
         arena.grow(wanted)
-
-
-def _arenas(problem: PackedProblem, capacity: int) -> Arenas:
-    from clench.kernels.batch_solving import Arenas
-    from clench.kernels.family_section import make_sections
-
-    rounds, planes = len(problem.target.rounds.kind), (len(problem.hand.plane_offset), problem.most_planes)
-    room = [make_sections(count, capacity, rounds) for count in planes]
-    none = [make_sections(count, 0, 0) for count in planes]
-    return Arenas(*room, *none)
 
 
 def _empty_closed(problem: PackedProblem, count: int) -> Closed:
@@ -113,28 +87,9 @@ def _empty_closed(problem: PackedProblem, count: int) -> Closed:
     items = len(problem.items.entry)
     return Closed(
         empty_answers(problem, count),
-        empty_answers(problem, 1),
         np.zeros((count, len(problem.frames.posture)), dtype=np.int64),
         np.zeros((count, items), dtype=np.int64),
         np.ones(count, dtype=np.int64),
-    )
-
-
-def empty_answers(problem: PackedProblem, count: int) -> ClosingArrays:
-    """Return the arrays that the closing of so many poses writes."""
-    from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
-
-    items, contacts, chain = len(problem.items.entry), problem.most_contacts, problem.hand.chain
-    return ClosingArrays(
-        travel=np.zeros((count, items, len(chain.group_length))),
-        turn=np.zeros((count, items, len(chain.rate))),
-        contacts=np.zeros((count, items), dtype=np.int64),
-        hit=np.zeros((count, items, contacts, HIT_INTEGERS), dtype=np.int64),
-        point=np.zeros((count, items, contacts, HIT_FLOATS)),
-        pose=np.zeros((count, items, len(problem.hand.family_pose), 3, 4)),
-        overflow=np.zeros((count, items), dtype=np.int64),
-        overlap=np.full((count, items), -1, dtype=np.int64),
-        skipped=np.zeros((count, items), dtype=np.int64),
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +17,7 @@ from clench.models.shapes import CollisionSource
 
 from .blocking import link_masks
 from .calibration import Calibration
-from .closing import HandPlan, object_for_closing
+from .closing import HandPlan, nothing_to_close, object_for_closing
 from .containment import link_within_link
 from .criterion_registry import ALWAYS
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
@@ -26,9 +27,10 @@ from .surface import object_surface
 
 if TYPE_CHECKING:
     from clench.kernels.batch_layout import ObjectArrays, Wanted
+    from clench.kernels.batch_solving import Asked, Room
     from clench.kernels.exact import ExactArrays
     from clench.kernels.frames import FrameArrays
-    from clench.kernels.layout import HandArrays, ItemArrays
+    from clench.kernels.layout import ClosingArrays, HandArrays, ItemArrays
     from clench.kernels.link_meshes import LinkMeshArrays, ObjectMesh
     from clench.kernels.touches import SurfaceArrays
 
@@ -57,6 +59,50 @@ class PackedProblem:
     surface: SurfaceArrays
     bodies: HandBodies
     alone: bool
+
+    @cached_property
+    def asked(self) -> Asked:
+        """What does not change from pose to pose, as the kernel of a batch takes it."""
+        from clench.kernels.batch_solving import Asked
+        from clench.kernels.handing import kept
+
+        parts = (self.hand, self.exact, self.items, self.target, nothing_to_close(), self.frames, self.surface)
+        return kept(Asked(*parts, self.mesh, self.meshes, self.bodies.across, self.apart))
+
+    @contextmanager
+    def room(self, capacity: int) -> Iterator[Room]:
+        """Lend scratch space for the kernel of a batch, with so many segments per plane; threads get each their own."""
+        try:
+            lent = self._rooms.pop()
+        except IndexError:
+            lent = (0, None)
+        room = lent[1] if lent[0] == capacity else None
+        if room is None:
+            room = self._make_room(capacity)
+        yield room
+        self._rooms.append((capacity, room))
+
+    @cached_property
+    def _rooms(self) -> list[tuple[int, Room | None]]:
+        return []
+
+    def _make_room(self, capacity: int) -> Room:
+        from clench.kernels.batch_solving import Room
+        from clench.kernels.family_section import make_sections
+        from clench.kernels.handing import kept
+
+        rounds, planes = len(self.target.rounds.kind), (len(self.hand.plane_offset), self.most_planes)
+        shared, own = (make_sections(count, capacity, rounds) for count in planes)
+        no_shared, no_own = (make_sections(count, 0, 0) for count in planes)
+        answers = empty_answers(self, 1)
+        columns: list[Any] = [column[0] for column in answers]
+        return kept(Room(shared, own, no_shared, no_own, type(answers)(*columns)))
+
+    def wanting(self, wanted: Wanted) -> PackedProblem:
+        """Return the same problem, of which something else is wanted."""
+        other = replace(self, wanted=wanted)
+        other.__dict__.update(asked=self.asked, _rooms=self._rooms)
+        return other
 
     @cached_property
     def apart(self) -> NDArray[np.int64]:
@@ -169,3 +215,21 @@ def _own_joints(fingers: Sequence[Finger]) -> np.ndarray:
     for row, finger in zip(joints, fingers, strict=True):
         row[: len(finger.joints)] = finger.joints
     return joints
+
+
+def empty_answers(problem: PackedProblem, count: int) -> ClosingArrays:
+    """Return the arrays that the closing of so many poses writes."""
+    from clench.kernels.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
+
+    items, contacts, chain = len(problem.items.entry), problem.most_contacts, problem.hand.chain
+    return ClosingArrays(
+        travel=np.zeros((count, items, len(chain.group_length))),
+        turn=np.zeros((count, items, len(chain.rate))),
+        contacts=np.zeros((count, items), dtype=np.int64),
+        hit=np.zeros((count, items, contacts, HIT_INTEGERS), dtype=np.int64),
+        point=np.zeros((count, items, contacts, HIT_FLOATS)),
+        pose=np.zeros((count, items, len(problem.hand.family_pose), 3, 4)),
+        overflow=np.zeros((count, items), dtype=np.int64),
+        overlap=np.full((count, items), -1, dtype=np.int64),
+        skipped=np.zeros((count, items), dtype=np.int64),
+    )

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
 
-from .batch_run import empty_answers
-from .batching import PackedProblem
+from .batching import PackedProblem, empty_answers
 from .closing import arena_of, nothing_to_close
 
 if TYPE_CHECKING:

@@ -24,27 +24,54 @@ from .sweeping import SweepWork, make_sweep_work
 from .touches import SurfaceArrays
 
 
-class Arenas(NamedTuple):
-    """Hold sections: of all first families, of an entry's later ones, and the same two of no object."""
+class Asked(NamedTuple):
+    """Hold what does not change from pose to pose.
+
+    Args:
+        hand, exact, items: see `close_items`. target: the object; nothing: none. frames: kinematics of the hand.
+        surface, mesh: the object, as contacts are read and depths measured. meshes: of the links.
+        across, apart: see `close_in_turn`.
+    """
+
+    hand: HandArrays
+    exact: ExactArrays
+    items: ItemArrays
+    target: ObjectArrays
+    nothing: ObjectArrays
+    frames: FrameArrays
+    surface: SurfaceArrays
+    mesh: ObjectMesh
+    meshes: LinkMeshArrays
+    across: Ints
+    apart: Ints
+
+
+class Room(NamedTuple):
+    """Hold what is written over and over.
+
+    Args:
+        shared, own: sections of all first families, and of an entry's later ones. no_shared, no_own: of no object.
+        spare: answers of all items.
+    """
 
     shared: SectionArrays
     own: SectionArrays
     no_shared: SectionArrays
     no_own: SectionArrays
+    spare: ClosingArrays
 
 
 class Closed(NamedTuple):
     """Hold how the fingers closed; N poses, I items, E entries.
 
     Args:
-        answers: of all items, with the poses first. spare: of all items at one pose, overwritten.
+        answers: of all items, with the poses first.
         blocked: whether an entry overlaps the object before anything moves, (N, E).
         anew: whether an item was closed again, with other fingers in its way, (N, I).
         overflow: 0 for a pose that is solved; else the capacity wanted, or anything where it was not yet tried, (N,).
     """
 
     answers: ClosingArrays
-    spare: ClosingArrays
     blocked: Ints
     anew: Ints
     overflow: Ints
@@ -88,31 +115,16 @@ def among(exact: ExactArrays, obj: ObjectArrays, link_pose: Floats, checked: Int
 
 @allocating_kernel
 def solve_poses(
-    hand: HandArrays,
-    exact: ExactArrays,
-    target: ObjectArrays,
-    nothing: ObjectArrays,
-    frames: FrameArrays,
-    surface: SurfaceArrays,
-    mesh: ObjectMesh,
-    meshes: LinkMeshArrays,
-    items: ItemArrays,
-    wanted: Wanted,
-    across: Ints,
-    apart: Ints,
-    T_palm_object: Floats,
-    arenas: Arenas,
-    closed: Closed,
-    solved: Solved,
+    asked: Asked, wanted: Wanted, T_palm_object: Floats, room: Room, closed: Closed, solved: Solved
 ) -> None:
     """Close the fingers, each with the earlier ones in its way, and judge the answers, for poses that are not solved.
 
     Args:
-        hand, exact, items: see `close_items`. target: the object; nothing: none. frames: kinematics of the hand.
-        surface, mesh: the object, as contacts are read and depths measured. meshes: of the links.
-        wanted: what is asked for. across, apart: see `close_in_turn`.
-        T_palm_object: where the object is, (N, 3, 4). arenas: scratch space. closed, solved: written.
+        asked, wanted: what is asked. T_palm_object: where the object is, (N, 3, 4). room: scratch space.
+        closed, solved: written.
     """
+    hand, exact, items, frames, target = asked.hand, asked.exact, asked.items, asked.frames, asked.target
+    meshes, mesh, surface = asked.meshes, asked.mesh, asked.surface
     joints, links, entries = hand.chain.rate.shape[0], exact.checked.shape[0], wanted.thumb.shape[0]
     work, sweep = make_work(joints, hand.outlines), make_sweep_work(joints, links)
     scratch = make_scratch(entries, frames.lower.shape[0], links, items.entry.shape[0], solved.number.shape[2])
@@ -125,36 +137,17 @@ def solve_poses(
         np.empty(items.entry.shape[0], dtype=np.int64),
         np.empty(entries, dtype=np.int64),
     )
-    judged = among(exact, target, exact.link_pose, across)
+    judged = among(exact, target, exact.link_pose, asked.across)
     for n in range(T_palm_object.shape[0]):
         if closed.overflow[n] == 0:
             continue
-        T, answer, spare = T_palm_object[n], answer_at(closed.answers, n), answer_at(closed.spare, 0)
+        T, answer = T_palm_object[n], answer_at(closed.answers, n)
         blocked, anew = closed.blocked[n], closed.anew[n]
         closed.overflow[n] = close_free(
-            hand, exact, target, mesh, meshes, items, wanted, T, arenas, turn, work, sweep, answer, blocked
+            hand, exact, target, mesh, meshes, items, wanted, T, room, turn, work, sweep, answer, blocked
         )
         if closed.overflow[n] == 0 and wanted.whole:
-            closed.overflow[n] = close_in_turn(
-                hand,
-                exact,
-                target,
-                nothing,
-                frames,
-                items,
-                wanted,
-                across,
-                apart,
-                T,
-                arenas,
-                turn,
-                work,
-                sweep,
-                answer,
-                spare,
-                blocked,
-                anew,
-            )
+            closed.overflow[n] = close_in_turn(asked, wanted, T, room, turn, work, sweep, answer, blocked, anew)
         if closed.overflow[n] == 0:
             judge_pose(
                 hand, judged, frames, surface, mesh, meshes, items, wanted, T, answer, blocked, scratch, solved, n
@@ -171,7 +164,7 @@ def close_free(
     items: ItemArrays,
     wanted: Wanted,
     T_palm_object: Floats,
-    arenas: Arenas,
+    room: Room,
     turn: Turn,
     work: Work,
     sweep: SweepWork,
@@ -183,13 +176,13 @@ def close_free(
     Where too much was wanted nothing else that is written is of use.
     """
     tree, rounds = target.tree, target.rounds
-    overflow = cut_first_families(hand, tree, rounds, T_palm_object, arenas.shared, work.pose)
+    overflow = cut_first_families(hand, tree, rounds, T_palm_object, room.shared, work.pose)
     if overflow > 0:
         return int(overflow)
-    look_for_overlaps(hand, tree, rounds, target.closed, T_palm_object, arenas.shared, turn.overlaps, work)
+    look_for_overlaps(hand, tree, rounds, target.closed, T_palm_object, room.shared, turn.overlaps, work)
     for i in range(items.entry.shape[0]):
         turn.asked[i] = 1
-    close_asked(hand, exact, target, T_palm_object, items, arenas.shared, arenas.own, turn, work, sweep, answer)
+    close_asked(hand, exact, target, T_palm_object, items, room.shared, room.own, turn, work, sweep, answer)
     for i in range(items.entry.shape[0]):
         overflow = max(overflow, answer.overflow[i])
     block_pose(exact.link_pose, meshes, items, wanted, mesh, T_palm_object, turn.overlaps, answer, blocked)
@@ -231,22 +224,14 @@ def close_asked(
 
 @inner_allocating_kernel
 def close_in_turn(
-    hand: HandArrays,
-    exact: ExactArrays,
-    target: ObjectArrays,
-    nothing: ObjectArrays,
-    frames: FrameArrays,
-    items: ItemArrays,
+    asked: Asked,
     wanted: Wanted,
-    across: Ints,
-    apart: Ints,
     T_palm_object: Floats,
-    arenas: Arenas,
+    room: Room,
     turn: Turn,
     work: Work,
     sweep: SweepWork,
     answer: ClosingArrays,
-    spare: ClosingArrays,
     blocked: Ints,
     anew: Ints,
 ) -> int:
@@ -255,27 +240,26 @@ def close_in_turn(
     Items are entries here: the full width of each. A finger's set stands once those before it do.
 
     Args:
-        across: which links may not overlap, those of different fingers among them; apart: those alone, (L, L).
-        answer: written. spare: overwritten. anew: written with which items were closed again, (I,).
+        asked: `across` says which links may not overlap, those of different fingers among them, and `apart` says those
+            alone, (L, L). answer: written. anew: written with which items were closed again, (I,).
 
     Returns:
         the capacity wanted, or 0.
     """
+    hand, exact, items, target, nothing = asked.hand, asked.exact, asked.items, asked.target, asked.nothing
     first, count = 0, items.entry.shape[0]
     for i in range(count):
         anew[i] = 0
     while True:
-        place_one(hand, frames, wanted, answer.travel, turn.placed, turn.length, turn.q, turn.angles, turn.poses)
-        bounded, others = with_lengths(hand, turn.length), among(exact, nothing, turn.placed, apart)
-        k = first_meeting(bounded, others, nothing, T_palm_object, items, arenas, first, work, sweep, spare, blocked)
+        place_one(hand, asked.frames, wanted, answer.travel, turn.placed, turn.length, turn.q, turn.angles, turn.poses)
+        bounded, others = with_lengths(hand, turn.length), among(exact, nothing, turn.placed, asked.apart)
+        k = first_meeting(bounded, others, nothing, T_palm_object, items, room, first, work, sweep, blocked)
         if k < 0:
             return 0
         for i in range(count):
             turn.asked[i] = 1 if i == k else 0
-        everything = among(exact, target, turn.placed, across)
-        close_asked(
-            hand, everything, target, T_palm_object, items, arenas.shared, arenas.own, turn, work, sweep, answer
-        )
+        everything = among(exact, target, turn.placed, asked.across)
+        close_asked(hand, everything, target, T_palm_object, items, room.shared, room.own, turn, work, sweep, answer)
         if answer.overflow[k] > 0:
             return int(answer.overflow[k])
         anew[k], first = 1, k + 1
@@ -288,14 +272,14 @@ def first_meeting(
     nothing: ObjectArrays,
     T_palm_object: Floats,
     items: ItemArrays,
-    arenas: Arenas,
+    room: Room,
     first: int,
     work: Work,
     sweep: SweepWork,
-    spare: ClosingArrays,
     blocked: Ints,
 ) -> int:
     """Return the first item from `first` on that meets another finger's links on the path to its set, or -1."""
+    spare = room.spare
     for i in range(first, items.entry.shape[0]):
         if blocked[items.entry[i]]:
             continue
@@ -307,8 +291,8 @@ def first_meeting(
             nothing.rounds,
             nothing.closed,
             T_palm_object,
-            arenas.no_shared,
-            arenas.no_own,
+            room.no_shared,
+            room.no_own,
             items,
             i,
             1,

@@ -1,19 +1,23 @@
 """How kernels hand arrays on: a pointer to a tuple of arrays instead of every number of every array.
 
 A hand, an object and the scratch space are hundreds of numbers: handing them over took longer than what many short
-functions do. So a kernel that calls another one hands over where a tuple is.
+functions do. So a kernel that calls another one hands over where a tuple is. Python does the same with what it `keeps`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cached_property
+from typing import Any, TypeVar, cast
 
+import numba
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
+    NativeValue,
     infer_getattr,
     intrinsic,
     lower_cast,
@@ -21,7 +25,11 @@ from numba.extending import (
     models,
     overload,
     register_model,
+    typeof_impl,
+    unbox,
 )
+
+Content = TypeVar("Content")
 
 
 class Handed(types.Type):
@@ -35,6 +43,18 @@ class Handed(types.Type):
     def key(self) -> Any:
         """What two equal types have in common."""
         return self.content
+
+    @cached_property
+    def _hash(self) -> int:
+        return super().__hash__()
+
+    def __hash__(self) -> int:
+        """Be found in sets without asking every array of the tuple: every call of a kernel does so."""
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Be kept on disk without the hash, which is another one in every process."""
+        return {name: value for name, value in self.__dict__.items() if name != "_hash"}
 
 
 @register_model(Handed)
@@ -110,3 +130,81 @@ def read_whole(context: Any, pointed: Handed) -> Any:
         return impl_ret_borrowed(context, builder, signature.return_type, builder.load(given[0]))
 
     return pointed.content(pointed), read
+
+
+class Kept:
+    """A tuple of arrays where kernels find it by one pointer; the arrays live as long as this does."""
+
+    def __init__(self, content: Any) -> None:
+        self.content = content
+        self.kind = Handed(numba.typeof(content))
+        self._room = np.empty(room_for(content), dtype=np.uint8)
+        self.address = self._room.ctypes.data
+        put(content, self.address)
+
+
+def kept(content: Content) -> Content:
+    """Return a tuple so that a kernel called with it reads no more than a pointer; without compiling it is itself."""
+    config: Any = numba.config
+    return content if config.DISABLE_JIT else cast(Content, Kept(content))
+
+
+@typeof_impl.register(Kept)
+def type_of_kept(value: Kept, context: Any) -> Handed:
+    """Return what kernels take it for."""
+    return value.kind
+
+
+@unbox(Handed)
+def point_to(kind: Handed, value: Any, c: Any) -> Any:
+    """Return the pointer to a tuple that is kept."""
+    number = c.pyapi.object_getattr_string(value, "address")
+    address = c.pyapi.long_as_longlong(number)
+    c.pyapi.decref(number)
+    return NativeValue(c.builder.inttoptr(address, c.context.get_value_type(kind)))
+
+
+@numba.njit(cache=True)
+def room_for(content: Any) -> Any:
+    """Return how many bytes a tuple takes."""
+    return read_size(content)
+
+
+@numba.njit(cache=True)
+def put(content: Any, address: int) -> None:
+    """Write a tuple to an address."""
+    write(content, address)
+
+
+@intrinsic
+def read_size(context: Any, content: Any) -> Any:
+    """Return how many bytes a value takes."""
+
+    def read(context: Any, builder: ir.IRBuilder, signature: Any, given: Any) -> Any:
+        return context.get_constant(types.int64, context.get_abi_sizeof(context.get_value_type(content)))
+
+    return types.int64(content), read
+
+
+@intrinsic
+def write(context: Any, content: Any, address: Any) -> Any:
+    """Write a value to an address, without who owns its arrays."""
+
+    def store(context: Any, builder: ir.IRBuilder, signature: Any, given: Any) -> Any:
+        place = builder.inttoptr(given[1], context.get_value_type(content).as_pointer())
+        builder.store(_disowned(builder, content, given[0]), place)
+        return context.get_dummy_value()
+
+    return types.none(content, types.int64), store
+
+
+def _disowned(builder: Any, kind: Any, value: Any) -> Any:
+    """Return a value whose arrays name no owner: kernels that count references leave them alone."""
+    if isinstance(kind, types.Array):
+        for field in (0, 1):
+            value = builder.insert_value(value, value.type.elements[field](None), field)
+    elif isinstance(kind, types.BaseTuple):
+        parts: Any = kind
+        for i, part in enumerate(parts.types):
+            value = builder.insert_value(value, _disowned(builder, part, builder.extract_value(value, i)), i)
+    return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -85,4 +84,4 @@ class Tracker:
         planes = answer.planes[0, : len(entries)]
         here = (packed.items.entry == entries[:, None]) & (packed.items.low == planes[:, None])
         wanted = packed.wanted._replace(present=here.argmax(axis=1), margin=self._margin / SAME_TOTAL)
-        self._solver.packed = replace(packed, wanted=wanted)
+        self._solver.packed = packed.wanting(wanted)
