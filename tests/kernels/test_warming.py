@@ -8,7 +8,7 @@ import pytest
 import clench
 from clench.apps.cli.demo import MUG_POSE
 from clench.base.pose import Pose
-from clench.kernels import closing, family_section, frames, link_meshes, overlap, touches, warming
+from clench.kernels import batch_solving, closing, family_section, frames, link_meshes, overlap, touches, warming
 
 
 @pytest.mark.parametrize("kernel", [*warming.HERE, *warming.THERE], ids=lambda kernel: kernel.__name__)
@@ -18,14 +18,18 @@ def test_every_parameter_has_a_sample(kernel):
 
 def test_what_is_compiled_is_what_a_solve_calls():
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
-    clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE))
+    clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE)).to_dict()
     values = warming.sample_values()
     called = (
-        *(family_section.cut_first_families, overlap.find_overlaps, closing.close_items, frames.relate_poses),
-        *(frames.place_links, link_meshes.measure_depths, link_meshes.find_contained, touches.read_touches),
+        *(batch_solving.solve_poses, family_section.cut_first_families, overlap.find_overlaps, closing.close_items),
+        *(frames.relate_poses, frames.place_links),
+        *(link_meshes.measure_depths, link_meshes.find_contained, touches.read_touches),
     )
     for kernel in called:
         assert warming.argument_types(kernel, values) in kernel.signatures
+    for kernel in filter(warming.is_inner, (*warming.HERE, *warming.THERE)):
+        kernel.compile(warming.argument_types(kernel, values))
+        assert not kernel.stats.cache_misses, kernel
 
 
 def test_the_first_call_says_that_it_compiles(monkeypatch, capsys):
@@ -37,12 +41,13 @@ def test_the_first_call_says_that_it_compiles(monkeypatch, capsys):
     assert capsys.readouterr().err == ""  # they are compiled by now
     monkeypatch.setattr(warming, "_is_cold", lambda kernel=None: True)
     warming.announce.cache_clear()
-    warming.announce(batch=True)
-    warming.announce(batch=True)
+    for _ in range(2):
+        warming.announce()
+        warming.announce(in_full=True)
     sentences = capsys.readouterr().err.splitlines()
     assert [s.split(",")[0] for s in sentences] == [
         "clench: compiling its kernels",
-        "clench: compiling the kernels of a batch",
+        "clench: compiling the kernels of all sets",
     ]
     warming.announce.cache_clear()
 
@@ -51,7 +56,7 @@ def test_a_cache_without_the_closing_is_cold(monkeypatch, tmp_path):
     assert not warming._is_cold()
 
     class Elsewhere:
-        py_func = closing.close_items.py_func
+        py_func = batch_solving.solve_poses.py_func
 
         class stats:  # noqa: N801
             cache_path = str(tmp_path)

@@ -133,6 +133,9 @@ def close_hand(
     """
     from clench.kernels.family_section import cut_first_families, make_sections
     from clench.kernels.overlap import find_overlaps
+    from clench.kernels.warming import announce
+
+    announce(in_full=True)
 
     T = np.ascontiguousarray(T_palm_object[:3])
     obj = object_for_closing(packed)

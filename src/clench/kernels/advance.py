@@ -32,8 +32,8 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
     """Allocate the scratch space for a hand."""
     rows = joints + 1
     return Work(
-        np.zeros((joints, 3)),
-        np.zeros((joints, 3)),
+        np.zeros((joints, 5)),
+        np.zeros((joints, 5)),
         np.zeros(joints),
         np.empty((outlines.vertex.shape[0], 3)),
         np.empty((outlines.side.shape[0], 5)),
@@ -51,15 +51,15 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
 
 @inner_kernel
 def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) -> None:
-    """Write where the joints of a family are when each has turned by `turns` [rad]."""
-    x, z, angle = 0.0, 0.0, 0.0
+    """Write where the joints of a family are when each has turned by `turns` [rad]; see `Work`."""
+    x, z, angle, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
     for j in range(turns.shape[0]):
         if chain.joint_family[j] == family:
-            c, s = math.cos(angle), math.sin(angle)
             x += c * chain.pivot[j, 0] - s * chain.pivot[j, 1]
             z += s * chain.pivot[j, 0] + c * chain.pivot[j, 1]
             angle += turns[j]
-            place[j, 0], place[j, 1], place[j, 2] = x, z, angle
+            c, s = math.cos(angle), math.sin(angle)
+            place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4] = x, z, angle, c, s
 
 
 @inner_kernel
@@ -67,8 +67,7 @@ def put_outline(
     outlines: OutlineArrays, o: int, j: int, place: Floats, cx: float, cz: float, mirror: float, work: Work
 ) -> Outline:
     """Write an outline's features at its placed joint `j` about a centre, mirrored in z for clockwise turns."""
-    dx, dz, angle = place[j, 0] - cx, place[j, 1] - cz, place[j, 2]
-    c, s = math.cos(angle), math.sin(angle)
+    dx, dz, c, s = place[j, 0] - cx, place[j, 1] - cz, place[j, 3], place[j, 4]
     v0, v1 = outlines.vertex_first[o], outlines.vertex_first[o + 1]
     for i in range(v0, v1):
         x, z = outlines.vertex[i, 0], outlines.vertex[i, 1]

@@ -16,7 +16,7 @@ from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays, find_link_overlap
 from .frames import FrameArrays, couple, place_links, put_angles
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
-from .link_meshes import LinkMeshArrays, ObjectMesh, find_contained
+from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, make_depth_work
 from .start_overlap import any_deep
 from .touches import (
     TOUCH_FLOATS,
@@ -40,12 +40,13 @@ SAME_TOTAL = 1e-9
 
 
 class Scratch(NamedTuple):
-    """Hold what is written over and over: the chosen item per entry, postures, poses of the links, touches."""
+    """Hold what is written over and over: the chosen item per entry, postures, poses of the links, touches, depths."""
 
     chosen: Ints
     angles: Floats
     poses: Floats
     touches: TouchArrays
+    depth: DepthWork
 
 
 @inner_allocating_kernel
@@ -57,6 +58,7 @@ def make_scratch(entries: int, joints: int, links: int, items: int, contacts: in
         np.empty(joints),
         np.empty((links, 3, 4)),
         TouchArrays(numbers, np.empty((items, contacts, TOUCH_FLOATS))),
+        make_depth_work(),
     )
 
 
@@ -300,7 +302,7 @@ def judge_pose(
         touching += 1 if solved.fingers[n, entry] == TOUCH else 0
         stuck += 1 if blocked[entry] else 0
     solved.certified[n] = 0
-    free = not any_deep(meshes, wanted.fixed, wanted.start_pose, mesh, T_palm_object)
+    free = not any_deep(meshes, wanted.fixed, wanted.start_pose, mesh, T_palm_object, scratch.depth)
     if wanted.whole and free and stuck == 0:
         angles = solved.angles[n]
         certified = is_certified(exact, frames, mesh, meshes, T_palm_object, wanted, answer, angles, scratch)

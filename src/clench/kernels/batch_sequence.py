@@ -6,10 +6,10 @@ import numpy as np
 
 from .batch_closing import answer_at, clear_answer
 from .batch_layout import Wanted
-from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
+from .compiling import allocating_kernel, inner_kernel
 from .frames import FrameArrays, put_angles, put_links
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
-from .link_meshes import LinkMeshArrays, ObjectMesh
+from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, make_depth_work
 from .start_overlap import start_overlap
 
 
@@ -31,12 +31,13 @@ def find_blocked(
         link_pose: see `ExactArrays`. meshes: of the links. items, wanted: what is asked for. solid: the object.
         T_palm_object: where it is, (N, 3, 4). overlaps, answers: see `close_poses_on_device`.
     """
+    work = make_depth_work()
     for n in range(T_palm_object.shape[0]):
         answer, T = answer_at(answers, n), T_palm_object[n]
-        block_pose(link_pose, meshes, items, wanted, solid, T, overlaps[n], answer, blocked[n])
+        block_pose(link_pose, meshes, items, wanted, solid, T, overlaps[n], work, answer, blocked[n])
 
 
-@inner_allocating_kernel
+@inner_kernel
 def block_pose(
     link_pose: Floats,
     meshes: LinkMeshArrays,
@@ -45,17 +46,18 @@ def block_pose(
     solid: ObjectMesh,
     T_palm_object: Floats,
     overlaps: Ints,
+    work: DepthWork,
     answer: ClosingArrays,
     blocked: Ints,
 ) -> None:
-    """Do as `find_blocked` at one pose."""
+    """Do as `find_blocked` at one pose; `work` is overwritten."""
     for entry in range(blocked.shape[0]):
         crossed = overlaps[entry] >= 0
         for i in range(items.entry.shape[0]):
             crossed = crossed or (items.entry[i] == entry and answer.overlap[i] >= 0)
         if not crossed:
             own, resting = wanted.own[entry], wanted.resting[entry]
-            crossed = start_overlap(link_pose[entry], meshes, own, resting, solid, T_palm_object) != 0
+            crossed = start_overlap(link_pose[entry], meshes, own, resting, solid, T_palm_object, work) != 0
         blocked[entry] = 1 if crossed else 0
     for i in range(items.entry.shape[0]):
         if blocked[items.entry[i]]:

@@ -18,7 +18,7 @@ from .family_section import cut_first_families
 from .frames import FrameArrays
 from .handing import whole
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, SectionArrays, Work
-from .link_meshes import LinkMeshArrays, ObjectMesh
+from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh
 from .overlap import look_for_overlaps
 from .sweeping import SweepWork, make_sweep_work
 from .touches import SurfaceArrays
@@ -115,13 +115,13 @@ def among(exact: ExactArrays, obj: ObjectArrays, link_pose: Floats, checked: Int
 
 @allocating_kernel
 def solve_poses(
-    asked: Asked, wanted: Wanted, T_palm_object: Floats, room: Room, closed: Closed, solved: Solved
+    asked: Asked, wanted: Wanted, T_palm_objects: Floats, room: Room, found: Closed, solved: Solved
 ) -> None:
     """Close the fingers, each with the earlier ones in its way, and judge the answers, for poses that are not solved.
 
     Args:
-        asked, wanted: what is asked. T_palm_object: where the object is, (N, 3, 4). room: scratch space.
-        closed, solved: written.
+        asked, wanted: what is asked. T_palm_objects: where the object is, (N, 3, 4). room: scratch space.
+        found, solved: written.
     """
     hand, exact, items, frames, target = asked.hand, asked.exact, asked.items, asked.frames, asked.target
     meshes, mesh, surface = asked.meshes, asked.mesh, asked.surface
@@ -138,23 +138,23 @@ def solve_poses(
         np.empty(entries, dtype=np.int64),
     )
     judged = among(exact, target, exact.link_pose, asked.across)
-    for n in range(T_palm_object.shape[0]):
-        if closed.overflow[n] == 0:
+    for n in range(T_palm_objects.shape[0]):
+        if found.overflow[n] == 0:
             continue
-        T, answer = T_palm_object[n], answer_at(closed.answers, n)
-        blocked, anew = closed.blocked[n], closed.anew[n]
-        closed.overflow[n] = close_free(
-            hand, exact, target, mesh, meshes, items, wanted, T, room, turn, work, sweep, answer, blocked
+        T, answer = T_palm_objects[n], answer_at(found.answers, n)
+        blocked, anew = found.blocked[n], found.anew[n]
+        found.overflow[n] = close_free(
+            hand, exact, target, mesh, meshes, items, wanted, T, room, turn, work, sweep, scratch.depth, answer, blocked
         )
-        if closed.overflow[n] == 0 and wanted.whole:
-            closed.overflow[n] = close_in_turn(asked, wanted, T, room, turn, work, sweep, answer, blocked, anew)
-        if closed.overflow[n] == 0:
+        if found.overflow[n] == 0 and wanted.whole:
+            found.overflow[n] = close_in_turn(asked, wanted, T, room, turn, work, sweep, answer, blocked, anew)
+        if found.overflow[n] == 0:
             judge_pose(
                 hand, judged, frames, surface, mesh, meshes, items, wanted, T, answer, blocked, scratch, solved, n
             )
 
 
-@inner_allocating_kernel
+@inner_kernel
 def close_free(
     hand: HandArrays,
     exact: ExactArrays,
@@ -168,6 +168,7 @@ def close_free(
     turn: Turn,
     work: Work,
     sweep: SweepWork,
+    depth: DepthWork,
     answer: ClosingArrays,
     blocked: Ints,
 ) -> int:
@@ -185,7 +186,8 @@ def close_free(
     close_asked(hand, exact, target, T_palm_object, items, room.shared, room.own, turn, work, sweep, answer)
     for i in range(items.entry.shape[0]):
         overflow = max(overflow, answer.overflow[i])
-    block_pose(exact.link_pose, meshes, items, wanted, mesh, T_palm_object, turn.overlaps, answer, blocked)
+    link_pose, overlaps = exact.link_pose, turn.overlaps
+    block_pose(link_pose, meshes, items, wanted, mesh, T_palm_object, overlaps, depth, answer, blocked)
     return int(overflow)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from .advance import place_joints
 from .compiling import inner_kernel
 from .layout import Floats, HandArrays, Work
@@ -77,7 +75,7 @@ def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, work:
     for j in range(turns.shape[0]):
         if hand.chain.joint_family[j] == family - 1:
             last = j
-    c, s = math.cos(place[last, 2]), math.sin(place[last, 2])
+    c, s = place[last, 3], place[last, 4]
     step[0, 0], step[0, 1], step[0, 2], step[0, 3] = c, 0.0, -s, place[last, 0]
     step[1, 0], step[1, 1], step[1, 2], step[1, 3] = 0.0, 1.0, 0.0, 0.0
     step[2, 0], step[2, 1], step[2, 2], step[2, 3] = s, 0.0, c, place[last, 1]

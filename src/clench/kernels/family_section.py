@@ -89,20 +89,20 @@ def cut_first_families(
     rounds: RoundArrays,
     T_palm_object: Floats,
     sections: SectionArrays,
-    scratch: Floats,
+    two: Floats,
 ) -> int:
     """Cut the object by the planes of every entry's first family, which no turn moves; row = global plane.
 
     Args:
-        scratch: two poses, (2, 3, 4). The others as for `close_items`.
+        two: poses, overwritten, (2, 3, 4). The others as for `close_items`.
 
     Returns:
         0, or the capacity that the arena should have had.
     """
-    wanted, T = 0, scratch[0]
+    wanted, T = 0, two[0]
     for entry in range(hand.entry_family.shape[0] - 1):
         family = hand.entry_family[entry]
         compose_inverse(hand.family_pose[family], T_palm_object, T)
         low, high = hand.family_plane[family], hand.family_plane[family + 1]
-        wanted = max(wanted, cut_planes(hand, family, low, high, tree, rounds, T, sections, 0, scratch[1]))
+        wanted = max(wanted, cut_planes(hand, family, low, high, tree, rounds, T, sections, 0, two[1]))
     return wanted

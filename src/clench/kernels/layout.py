@@ -111,8 +111,8 @@ class Work(NamedTuple):
     """Hold the scratch space of one item, so that closing allocates nothing.
 
     Args:
-        place: joints at the start of the segment, rows (x, z, turn), (J, 3). moved, turns: joints at a later place,
-            (J, 3), and their turns, (J,).
+        place: joints at the start of the segment, rows (x, z, turn, its cosine and sine), (J, 5). moved, turns: joints
+            at a later place, (J, 5), and their turns, (J,).
         vertex, side: the moving outlines' features about their turning centre, as in `OutlineArrays`; the third column
             of `vertex` is the distance from that centre. stadium: likewise; see `put_stadium`, (O, 6).
         chain: rows (Ω, e_x, e_z), (J + 1, 3). terms: sums of `coupled`, (N, 3). ellipse: one, relative, (8,).

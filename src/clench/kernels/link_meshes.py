@@ -50,7 +50,7 @@ class ObjectMesh(NamedTuple):
     points: Floats
 
 
-@inner_allocating_kernel
+@inner_kernel
 def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
     """Return the tree of one link."""
     v0, v1 = meshes.vertex_first[k], meshes.vertex_first[k + 1]
@@ -81,49 +81,70 @@ def in_box(obj: MeshTree, p: Floats) -> bool:
     return bool(inside)
 
 
-@inner_allocating_kernel
+@inner_kernel
 def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree) -> bool:
     """Say whether the ball around a link meets the box around the object."""
     if obj.low.shape[0] == 0:
         return False
-    center, outside = np.empty(3), 0.0
-    put_point(T_object_link, meshes.center[k], center)
+    T, center, outside = T_object_link, meshes.center, 0.0
     for r in range(3):
-        outside += max(max(obj.low[0, r] - center[r], center[r] - obj.high[0, r]), 0.0) ** 2
+        c = T[r, 0] * center[k, 0] + T[r, 1] * center[k, 1] + T[r, 2] * center[k, 2] + T[r, 3]
+        outside += max(max(obj.low[0, r] - c, c - obj.high[0, r]), 0.0) ** 2
     return bool(outside <= meshes.radius[k] ** 2)
+
+
+class DepthWork(NamedTuple):
+    """Hold the scratch space of `depth_of`: for `penetration`, two poses, two points, and pairs of nodes."""
+
+    crossings: Floats
+    stack: Ints
+    poses: Floats
+    points: Floats
+    pairs: Ints
+
+
+@inner_allocating_kernel
+def make_depth_work() -> DepthWork:
+    """Allocate the scratch space of `depth_of`."""
+    return DepthWork(
+        np.empty(CROSSINGS),
+        np.empty(STACK_SIZE, dtype=np.int32),
+        np.empty((2, 3, 4)),
+        np.empty((2, 3)),
+        np.empty((PAIRS, 2), dtype=np.int32),
+    )
 
 
 @allocating_kernel
 def measure_depths(
-    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, out: Floats
+    meshes: LinkMeshArrays, which: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, out: Floats
 ) -> None:
-    """Write depth and place of the links that are wanted, (M, 4), zeros where nothing overlaps; see `penetration`.
+    """Write depth and place of links, (M, 4), zeros where nothing overlaps; see `penetration`.
 
     Args:
-        meshes: of the links. wanted: which, (M,). poses: `T_palm_link` of every link, (L, 3, 4).
+        meshes: of the links. which: of them, (M,). poses: `T_palm_link` of every link, (L, 3, 4).
         solid: the object. T_palm_object: where it is, (3, 4).
     """
-    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
+    work = make_depth_work()
     for k in range(meshes.link.shape[0]):
         out[k] = 0.0
-        if wanted[k]:
+        if which[k]:
             out[k, 0], out[k, 1], out[k, 2], out[k, 3] = depth_of(
-                meshes, k, poses[meshes.link[k]], solid, T_palm_object, crossings, stack
+                meshes, k, poses[meshes.link[k]], solid, T_palm_object, work
             )
 
 
-@inner_allocating_kernel
+@inner_kernel
 def depth_of(
     meshes: LinkMeshArrays,
     k: int,
     T_palm_link: Floats,
     solid: ObjectMesh,
     T_palm_object: Floats,
-    crossings: Floats,
-    stack: Ints,
+    work: DepthWork,
 ) -> tuple[float, float, float, float]:
     """Return depth and place of one link."""
-    T, T_link_object = np.empty((3, 4)), np.empty((3, 4))
+    T, T_link_object = work.poses[0], work.poses[1]
     compose_inverse(T_palm_object, T_palm_link, T)
     if not may_touch(meshes, k, T, solid.tree):
         return 0.0, 0.0, 0.0, 0.0
@@ -131,8 +152,8 @@ def depth_of(
     if boxes_apart(mesh, 0, solid.tree, 0, T):
         return 0.0, 0.0, 0.0, 0.0
     # Where an open mesh has an inside, a surface gets into it without crossing.
-    apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, np.empty((PAIRS, 2), dtype=np.int32))
-    if apart and not has_contained(meshes, k, T, solid, np.empty(3)):
+    apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, work.pairs)
+    if apart and not has_contained(meshes, k, T, solid, work.points[0]):
         return 0.0, 0.0, 0.0, 0.0
     compose_inverse(T_palm_link, T_palm_object, T_link_object)
     found: tuple[float, float, float, float] = penetration(
@@ -144,27 +165,27 @@ def depth_of(
         solid.closed,
         T,
         T_link_object,
-        crossings,
-        stack,
+        work.crossings,
+        work.stack,
     )
     return found
 
 
 @allocating_kernel
 def find_contained(
-    meshes: LinkMeshArrays, wanted: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats
+    meshes: LinkMeshArrays, which: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats
 ) -> int:
     """Return a link that has a part inside the object or around a part of it, or -1; as in `measure_depths`."""
     T, p = np.empty((3, 4)), np.empty(3)
     for k in range(meshes.link.shape[0]):
-        if wanted[k]:
+        if which[k]:
             compose_inverse(T_palm_object, poses[meshes.link[k]], T)
             if has_contained(meshes, k, T, solid, p):
                 return int(meshes.link[k])
     return -1
 
 
-@inner_allocating_kernel
+@inner_kernel
 def has_contained(meshes: LinkMeshArrays, k: int, T_object_link: Floats, solid: ObjectMesh, p: Floats) -> bool:
     """Say whether a link has a part inside the object, or around a part of it; `p` is overwritten."""
     if solid.tree.low.shape[0] > 0 and may_fit(meshes, k, T_object_link, solid.tree, p):
@@ -194,10 +215,12 @@ def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree
     return True
 
 
-@inner_allocating_kernel
-def may_hold_part(meshes: LinkMeshArrays, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
-    """Say whether a part of the object may lie inside a link, as the links' balls tell."""
-    p, c = np.empty(3), np.empty(3)
+@inner_kernel
+def may_hold_part(
+    meshes: LinkMeshArrays, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, points: Floats
+) -> bool:
+    """Say whether a part of the object may lie inside a link, as the links' balls tell; `points` is scratch, (2, 3)."""
+    p, c = points[0], points[1]
     for i in range(solid.points.shape[0]):
         put_point(T_palm_object, solid.points[i], p)
         for k in range(meshes.link.shape[0]):

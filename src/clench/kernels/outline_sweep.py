@@ -97,6 +97,13 @@ def deferred_blocks(
 
 
 @inner_kernel
+def turned(x: float, z: float, turn: float) -> tuple[float, float]:
+    """Return a point after a turn about the origin [rad]."""
+    c, s = math.cos(turn), math.sin(turn)
+    return c * x - s * z, s * x + c * z
+
+
+@inner_kernel
 def nearest_turn(
     outline: Outline,
     sections: SectionArrays,
@@ -106,6 +113,8 @@ def nearest_turn(
     mirror: float,
     cx: float,
     cz: float,
+    ex: float,
+    ez: float,
     d: float,
     reach: float,
     turn: float,
@@ -116,10 +125,9 @@ def nearest_turn(
 
     Args:
         cx, cz, reach: the circle around the outline, whose centre is `d` from the pivot. turn: the last of interest.
+        ex, ez: where the centre is then.
     """
-    segments, nearest, least = sections.segments, -1, math.inf
-    c, s = math.cos(turn), math.sin(turn)
-    ex, ez, wide = c * cx - s * cz, s * cx + c * cz, turn >= 3.0
+    segments, nearest, least, wide = sections.segments, -1, math.inf, turn >= 3.0
     for i in range(sections.counts[row, 0]):
         ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
         bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
@@ -153,16 +161,18 @@ def turn_outline(
     cx, cz = stadium[o, 0] + 0.5 * stadium[o, 2], stadium[o, 1] + 0.5 * stadium[o, 3]
     reach = 0.5 * math.sqrt(stadium[o, 2] ** 2 + stadium[o, 3] ** 2) + stadium[o, 5] + touch
     d = math.sqrt(cx * cx + cz * cz)
-    nearest = nearest_turn(outline, sections, row, px, pz, mirror, cx, cz, d, reach, best * rate, touch, work)
-    before, ex, ez, wide = -1.0, 0.0, 0.0, False
+    nearest, before, ex, ez, wide = -1, -1.0, 0.0, 0.0, False
+    if sections.counts[row, 0] > 0:
+        before, turn = best, best * rate
+        ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
+        nearest = nearest_turn(outline, sections, row, px, pz, mirror, cx, cz, ex, ez, d, reach, turn, touch, work)
     for k in range(-1 if nearest >= 0 else sections.counts[row, 0], sections.counts[row, 0]):
         i = nearest if k < 0 else k
         if k == nearest:
             continue
         if best != before:
             before, turn = best, best * rate
-            c, s = math.cos(turn), math.sin(turn)
-            ex, ez, wide = c * cx - s * cz, s * cx + c * cz, turn >= 3.0
+            ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
         ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
         bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
         mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)

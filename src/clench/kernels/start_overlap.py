@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from clench.base.tolerances import ALLOWED_PENETRATION
 
-from .compiling import allocating_kernel, inner_allocating_kernel
-from .depth import CROSSINGS
+from .compiling import allocating_kernel, inner_kernel
 from .layout import Floats, Ints
-from .link_meshes import LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
-from .tree import STACK_SIZE
+from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, depth_of, make_depth_work, may_hold_part
 
 #: No link overlaps, as far as planes do not tell; one does that closing does not move; one of all of them.
 FREE, RESTING_LINK, ANY_LINK = 0, 1, 2
 
 
-@inner_allocating_kernel
-def any_deep(meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectMesh, T_palm_object: Floats) -> bool:
+@inner_kernel
+def any_deep(
+    meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, work: DepthWork
+) -> bool:
     """Say whether a link that is wanted overlaps the object by more than is allowed."""
-    crossings, stack = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
     for k in range(meshes.link.shape[0]):
         if wanted[k]:
-            depth = depth_of(meshes, k, poses[meshes.link[k]], solid, T_palm_object, crossings, stack)[0]
+            depth = depth_of(meshes, k, poses[meshes.link[k]], solid, T_palm_object, work)[0]
             if depth > ALLOWED_PENETRATION:
                 return True
     return False
 
 
-@inner_allocating_kernel
+@inner_kernel
 def start_overlap(
-    link_pose: Floats, meshes: LinkMeshArrays, own: Ints, resting: Ints, solid: ObjectMesh, T_palm_object: Floats
+    link_pose: Floats,
+    meshes: LinkMeshArrays,
+    own: Ints,
+    resting: Ints,
+    solid: ObjectMesh,
+    T_palm_object: Floats,
+    work: DepthWork,
 ) -> int:
     """Return whether links of a finger that the planes do not tell of overlap the object; see the codes below."""
-    around = may_hold_part(meshes, link_pose, solid, T_palm_object)
-    if not any_deep(meshes, own if around else resting, link_pose, solid, T_palm_object):
+    around = may_hold_part(meshes, link_pose, solid, T_palm_object, work.points)
+    if not any_deep(meshes, own if around else resting, link_pose, solid, T_palm_object, work):
         return FREE
     return ANY_LINK if around else RESTING_LINK
 
@@ -58,5 +61,6 @@ def find_start_overlaps(
         link_pose: see `ExactArrays`. meshes: of the links. own, resting: which are each finger's, and which of those
             closing does not move, (E, M). solid: the object. T_palm_object: where it is, (3, 4).
     """
+    work = make_depth_work()
     for entry in range(blocked.shape[0]):
-        blocked[entry] = start_overlap(link_pose[entry], meshes, own[entry], resting[entry], solid, T_palm_object)
+        blocked[entry] = start_overlap(link_pose[entry], meshes, own[entry], resting[entry], solid, T_palm_object, work)

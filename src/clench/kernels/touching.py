@@ -45,15 +45,15 @@ def outline_point(outlines: OutlineArrays, work: Work, o: int, v: int) -> tuple[
     """Return where a vertex of an outline is at the placed joints."""
     j = outlines.joint[o]
     x, z = outlines.vertex[v, 0], outlines.vertex[v, 1]
-    c, s = math.cos(work.place[j, 2]), math.sin(work.place[j, 2])
+    c, s = work.place[j, 3], work.place[j, 4]
     return c * x - s * z + work.place[j, 0], s * x + c * z + work.place[j, 1]
 
 
 @inner_kernel
 def side_normal(outlines: OutlineArrays, work: Work, o: int, side: int, which: int) -> tuple[float, float]:
     """Return the outward normal of a touching link side at the placed joints; `which` >= 2 is its other face."""
-    angle = work.place[outlines.joint[o], 2]
-    c, s = math.cos(angle), math.sin(angle)
+    j = outlines.joint[o]
+    c, s = work.place[j, 3], work.place[j, 4]
     if which >= 2:
         c, s = -c, -s
     return c * outlines.side[side, 0] - s * outlines.side[side, 1], s * outlines.side[side, 0] + c * outlines.side[

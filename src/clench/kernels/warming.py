@@ -20,10 +20,14 @@ import numba
 import numpy as np
 
 from .advance import advance
-from .closing import close_items
+from .batch_judging import Scratch, judge_pose
+from .batch_layout import ObjectArrays, Solved, Wanted
+from .batch_solving import Asked, Closed, Room, solve_poses
+from .closing import close_item, close_items
 from .exact import planes_only
 from .family_section import cut_first_families
 from .frames import FrameArrays, place_links, relate_poses
+from .handing import handed, kept
 from .layout import (
     ChainArrays,
     ClosingArrays,
@@ -34,7 +38,7 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .link_meshes import LinkMeshArrays, ObjectMesh, find_contained, measure_depths
+from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, measure_depths
 from .nearness import smallest_gap
 from .overlap import find_overlaps
 from .settling import settle_pair
@@ -44,23 +48,23 @@ from .touches import SurfaceArrays, TouchArrays, read_touches
 from .touching import describe_hit, settle_hit
 from .tree import MeshTree, build_tree
 
-#: What each process compiles, in this order. What both need, like the cutting of sections, is first in one of them
-#: and late in the other.
+#: What each process compiles, in this order: first the parts of what both end with.
 HERE: tuple[Any, ...] = (
-    cut_first_families,
     sweep_stage,
     settle_pair,
     settle_hit,
     describe_hit,
+    judge_pose,
     find_overlaps,
-    smallest_gap,
     relate_poses,
     place_links,
     measure_depths,
     find_contained,
     read_touches,
+    smallest_gap,
+    close_items,
 )
-THERE: tuple[Any, ...] = (advance, close_items)
+THERE: tuple[Any, ...] = (cut_first_families, advance, close_item, solve_poses)
 
 #: The second process is given up after this long [s].
 PATIENCE = 300.0
@@ -99,7 +103,13 @@ def compile_ahead(kernels: Iterable[Any]) -> None:
 def argument_types(kernel: Any, values: dict[str, Any]) -> tuple[Any, ...]:
     """Return the types of a kernel's arguments, which its parameters' names tell."""
     typeof: Any = numba.typeof
-    return tuple(typeof(values[name]) for name in inspect.signature(kernel.py_func).parameters)
+    kinds = (typeof(values[name]) for name in inspect.signature(kernel.py_func).parameters)
+    return tuple(map(handed, kinds) if is_inner(kernel) else kinds)
+
+
+def is_inner(kernel: Any) -> bool:
+    """Say whether only other kernels call a kernel."""
+    return bool(kernel.targetoptions.get("no_cpython_wrapper"))
 
 
 def sample_values() -> dict[str, Any]:
@@ -124,21 +134,43 @@ def sample_values() -> dict[str, Any]:
     owners = _arrays("b1")[0]
     values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1"), tree, owners])
     values["solid"] = ObjectMesh(tree, owners, True, _arrays("f2")[0])
+    values["mesh"] = values["solid"]
     values["surface"] = SurfaceArrays(*[*_arrays("f2 s1"), values["rounds"], *_arrays("s1 s1 i1")])
     values["touches"] = TouchArrays(*_arrays("i3 f3"))
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values["tree"] = tree
     values |= dict.fromkeys(("closed", "together"), True)
-    values |= dict.fromkeys(("family", "start", "base", "low", "high", "times", "group", "plane", "entry"), 0)
+    values |= dict.fromkeys(("family", "start", "base", "low", "high", "times", "group", "plane", "entry", "i", "n"), 0)
+    values |= _batch_values(values)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
         "f2": ("T_palm_object", "first", "second", "out", "postures"),
-        "i1": ("overlaps", "hit", "wanted"),
-        "f3": ("poses", "placed", "scratch", "families"),
+        "i1": ("overlaps", "hit", "which", "blocked"),
+        "f3": ("poses", "placed", "two", "families"),
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])
     return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
+
+
+def _batch_values(values: dict[str, Any]) -> dict[str, Any]:
+    """Return values of what `solve_poses` alone takes."""
+    target = ObjectArrays(values["tree"], values["rounds"], True, values["exact"].object)
+    parts: list[Any] = [values[name] for name in ("hand", "exact", "items")]
+    parts += [target, target, *(values[name] for name in ("frames", "surface", "mesh", "meshes")), *_arrays("i2 i2")]
+    counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 f1 i1 i1"), 0.0, True, True, 0]
+    answers = ClosingArrays(*_arrays("f3 f3 i2 i4 f4 f5 i2 i2 i2"))
+    sections = values["sections"]
+    written: list[Any] = [*_arrays("i1 f1 f3"), values["touches"], DepthWork(*_arrays("f1 s1 f3 f2 s2"))]
+    return {
+        "asked": kept(Asked(*parts)),
+        "room": kept(Room(sections, sections, sections, sections, values["answer"])),
+        "wanted": Wanted(*counts),
+        "found": Closed(answers, *_arrays("i2 i2 i1")),
+        "solved": Solved(*_arrays("f2 i1 i1 i2 i2 i2 i4 f4")),
+        "scratch": Scratch(*written),
+        "T_palm_objects": _arrays("f3")[0],
+    }
 
 
 def _arrays(kinds: str) -> list[Any]:
@@ -147,22 +179,19 @@ def _arrays(kinds: str) -> list[Any]:
 
 
 @cache
-def announce(batch: bool = False) -> None:
+def announce(*, in_full: bool = False) -> None:
     """Say on standard error that what comes compiles, where it does; once per process.
 
     Args:
-        batch: the kernels of a batch are asked for, too.
+        in_full: it is what only some questions need: why a set was chosen, other orders than joint after joint.
     """
-    if _is_cold():
+    if not in_full and _is_cold():
         sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
-    if batch:
-        from .batch_solving import solve_poses
-
-        if _is_cold(solve_poses):
-            sys.stderr.write("clench: compiling the kernels of a batch, once on this machine; about a minute more.\n")
+    if in_full and _is_cold(close_items):
+        sys.stderr.write("clench: compiling the kernels of all sets, once on this machine; up to a minute more.\n")
 
 
-def _is_cold(kernel: Any = close_items) -> bool:
+def _is_cold(kernel: Any = solve_poses) -> bool:
     """Say whether the cache on disk has no closing yet; never where NUMBA_DISABLE_JIT leaves functions as they are."""
     stats = getattr(kernel, "stats", None)
     if stats is None:

@@ -111,10 +111,10 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
         )
     _check_speeds(hand, command)
     _count(command.planes, "planes")
-    _numbers(command.yaw_grid, "yaw_grid", "offsets in rad")
-    _numbers(command.open_variants, "open_variants", "offsets in rad")
-    _numbers(command.opposition_grid, "opposition_grid", "offsets in rad")
-    check_steps(hand, command.next_steps)
+    for key in ("yaw_grid", "open_variants", "opposition_grid"):
+        _numbers(getattr(command, key), key, "offsets in rad")
+    if command.next_steps != ():
+        check_steps(hand, command.next_steps)
     if command.task_wrenches:
         _wrenches(command.task_wrenches, "task_wrenches")
     if command.collision_source is not None:
@@ -128,9 +128,12 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
 
 
 def _check_speeds(hand: Hand, command: GraspCommand) -> None:
+    speeds = _weights(command.speeds, "speeds", "a relative speed above 0")
+    if not speeds:
+        return
     followers = {c.follower for c in hand.couplings}
     closing = [j for j, x in enumerate(hand.joints) if x.role is JointRole.CLOSING and j not in followers]
-    for name, speed in _weights(command.speeds, "speeds", "a relative speed above 0").items():
+    for name, speed in speeds.items():
         joint = hand.joint_index(name)
         if speed <= 0.0:
             raise CommandError(f"speeds.{name}: expected a relative speed above 0, got {speed:.6g}.")

@@ -42,7 +42,7 @@ class BatchSolver:
     def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
         from clench.kernels.warming import announce
 
-        announce(batch=True)
+        announce()
         self._question = Question(hand, obj, command, {})
         self._start = make_problem(hand, obj, command)
         asked = asked_fingers(hand, command)

@@ -88,7 +88,7 @@ def batch(
         raise CommandError(f"--count: expected at least 1, got {count}.")
     # A file that cannot be read is told before anything is compiled.
     read = None if poses is None else _read(poses)
-    announce(batch=True)
+    announce()
     warm_up()
     rows = clench.approach_poses(the_hand, the_object, count, seed) if read is None else read
     began = time.perf_counter()
