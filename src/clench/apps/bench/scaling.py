@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from .memory import solve_memory
 from .refined import base_mesh, refinements
 from .report import BenchReport, describe_place, timed
 from .scaling_picture import draw_scaling, scaling_table
-from .solving import listening
+from .solving import close_in_parts, listening
 
 PLANES: Final = (1, 2, 3, 5, 9, 17, 33)
 BATCHES: Final = (1, 4, 16, 64, 256, 1024)
@@ -225,22 +225,18 @@ class _Bench:
                 return
 
     def _times(self, obj: GraspObject, commands: Sequence[GraspCommand]) -> dict[str, float]:
-        """Return times of a whole solve and of its kernels [s]: of every pose the quickest pass, then the median."""
+        """Return times of a solve and of its parts by themselves [s]: of every pose the quickest pass, then the median."""
         rows: list[list[dict[str, float]]] = [[] for _ in commands]
         with listening() as spent:
             for _ in range(self.passes):
                 for row, command in zip(rows, commands, strict=True):
-                    row.append(dict(_parts(partial(clench.solve, self.hand, obj, command), spent)))
+                    for times in spent.values():
+                        times.clear()
+                    whole = timed(partial(clench.solve, self.hand, obj, command))[1]
+                    close_in_parts(self.hand, obj, command)
+                    row.append({"whole": whole, **{part: sum(times) for part, times in spent.items()}})
         quickest = [{part: min(one[part] for one in row) for part in row[0]} for row in rows]
         return {part: float(np.median([one[part] for one in quickest])) for part in quickest[0]}
-
-
-def _parts(solve: Callable[[], object], spent: Mapping[str, list[float]]) -> Iterator[tuple[str, float]]:
-    for times in spent.values():
-        times.clear()
-    yield "whole", timed(solve)[1]
-    for part, times in spent.items():
-        yield part, sum(times)
 
 
 def _command(pose: Pose, fingers: tuple[str, ...]) -> GraspCommand:

@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 
 import clench
+from clench.grasp.calibration import calibration_of
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.solve.alternatives import close_sets, decided
+from clench.solve.planning import planned
+from clench.solve.problem import make_problem
 from clench.solve.solution import GraspSolution
 
 from .checking import Checked, Surface, check_answer
@@ -21,7 +25,7 @@ from .report import BenchReport, describe_place, timed
 
 #: Wrong answers told before the rest is only counted.
 _TOLD = 5
-#: The kernels that stage `close` calls: name of the part, module, function.
+#: The kernels that close sets part by part: name of the part, module, function.
 _KERNELS = (
     ("cut", "clench.kernels.family_section", "cut_first_families"),
     ("overlap", "clench.kernels.overlap", "find_overlaps"),
@@ -132,6 +136,8 @@ def _time_solves(
     report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
 ) -> None:
     whole: list[float] = []
+    contacts: list[float] = []
+    everything: list[float] = []
     stages: dict[str, list[float]] = defaultdict(list)
     for command in [command for _ in range(passes) for command in commands]:
         solution, seconds = timed(lambda command=command: clench.solve(hand, obj, command))  # type: ignore[misc]
@@ -139,7 +145,11 @@ def _time_solves(
         for stage, taken in solution.timing.items():
             stages[stage].append(taken)
         stages["assemble"].append(seconds - solution.timing["total"])
+        contacts.append(timed(lambda solution=solution: solution.contacts)[1])  # type: ignore[misc]
+        everything.append(timed(solution.to_dict)[1])
     report.distribution("solve", whole)
+    report.distribution("then_read_contacts", contacts)
+    report.distribution("then_read_everything", everything)
     for stage, taken in stages.items():
         if stage != "total":
             report.values[f"stage_{stage}_median_ms"] = float(np.median(taken)) * 1e3
@@ -150,14 +160,21 @@ def _time_kernels(
 ) -> None:
     with listening() as spent:
         for command in [command for _ in range(passes) for command in commands]:
-            clench.solve(hand, obj, command)
+            close_in_parts(hand, obj, command)
     for part, times in spent.items():
         report.distribution(f"close_{part}", times)
 
 
+def close_in_parts(hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
+    """Close the sets that a solve closes, kernel by kernel; the solve itself does it, and more, in one."""
+    problem = make_problem(hand, obj, command)
+    made = decided(problem, calibration_of(command.criteria)) or planned(problem)
+    close_sets(problem, made, lambda stage: None)
+
+
 @contextmanager
 def listening() -> Iterator[dict[str, list[float]]]:
-    """Put a stop watch around every kernel that stage `close` calls; the lists fill while the context lasts."""
+    """Put a stop watch around the kernels that `close_in_parts` calls; the lists fill while the context lasts."""
     import importlib
 
     spent: dict[str, list[float]] = {part: [] for part, _, _ in _KERNELS}
