@@ -7,11 +7,11 @@ import pytest
 from kernel_entries import entry
 from scipy.spatial import cKDTree
 
-from clench.kernels import outline_gap
-from clench.kernels.layout import KIND_EDGE, KIND_SIDE, KIND_TIP, Outline, SectionArrays, Work
+from clench.kernels import family_section, outline_gap
+from clench.kernels.layout import KIND_EDGE, KIND_SIDE, KIND_TIP, RUN, Outline, SectionArrays, Work
 
 outline_distance, core_distance = entry(outline_gap.outline_distance), entry(outline_gap.core_distance)
-round_distance = entry(outline_gap.round_distance)
+round_distance, put_circles = entry(outline_gap.round_distance), entry(family_section.put_circles)
 SIZE = 0.03
 TOUCH = 1e-10
 DENSE = 300
@@ -46,7 +46,9 @@ def sections(segments=(), disks=(), ellipses=()):
     disks, ellipses = np.array(disks, dtype=float).reshape(1, -1, 3), np.array(ellipses, dtype=float).reshape(1, -1, 8)
     counts = np.array([[rows.shape[1], disks.shape[1], ellipses.shape[1]]])
     none = np.zeros((1, 1), dtype=np.int64)
-    return SectionArrays(rows, none, disks, none, ellipses, none, counts)
+    made = SectionArrays(rows, none, disks, none, ellipses, none, counts, np.empty((1, len(rows[0]) // RUN + 1, 3)))
+    put_circles(made, 0)
+    return made
 
 
 def between(a, b, count=DENSE):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from clench.grasp.outlines import RoundedOutline
 from clench.grasp.packing import enclosing
-from clench.kernels import outline_sweep
+from clench.kernels import family_section, outline_sweep
 from clench.kernels.layout import Outline, SectionArrays, Work
 from kernels.kernel_entries import entry
 from oracle.adapter import solve_planar
@@ -19,6 +19,7 @@ from oracle.planar import gap_at
 from oracle.scene import PlanarCurve
 from oracle.shapes import turned
 
+put_circles = entry(family_section.put_circles)
 put_stadium, stadium_gap, farthest, first_near = (
     entry(f)
     for f in (outline_sweep.put_stadium, outline_sweep.stadium_gap, outline_sweep.farthest, outline_sweep.first_near)
@@ -78,7 +79,8 @@ def test_a_travel_that_is_said_to_be_free_reaches_no_point_of_a_segment(ax, az, 
     segment = np.array([[[ax, az, bx, bz, 0.0, 1.0]]])
     none, rows = np.zeros((1, 0, 3)), np.zeros((1, 1), dtype=np.int64)
     counts = np.array([[1, 0, 0]])
-    sections = SectionArrays(segment, rows, none, rows, np.zeros((1, 0, 8)), rows, counts)
+    sections = SectionArrays(segment, rows, none, rows, np.zeros((1, 0, 8)), rows, counts, np.empty((1, 1, 3)))
+    put_circles(sections, 0)
     free, nearest = first_near(Outline(0, 0, 0, 0, 0, radius, False, 1), sections, 0, x, z, speed, touch, work)
     t = np.linspace(0.0, 1.0, 1001)
     away = np.hypot(ax + t * (bx - ax) - x, az + t * (bz - az) - z).min()

@@ -5,6 +5,7 @@ import numpy.typing as npt
 
 from clench.grasp.outlines import RoundedOutline
 from clench.grasp.packing import enclosing
+from clench.kernels import family_section
 from clench.kernels.closing import close_items
 from clench.kernels.exact import planes_only
 from clench.kernels.family_section import make_sections
@@ -19,11 +20,13 @@ from clench.kernels.layout import (
     no_rounds,
 )
 from clench.kernels.tree import build_tree
+from kernels.kernel_entries import entry
 
 from .compiled import Floats, Ints
 from .planar import StageAnswer
 from .scene import PlanarCurve, PlanarFinger, PlanarOutline
 
+put_circles = entry(family_section.put_circles)
 EMPTY_TREE = build_tree(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
 
 
@@ -103,6 +106,7 @@ def pack_curve(curve: PlanarCurve) -> SectionArrays:
     sections.disks[0, : len(curve.disks)] = curve.disks
     sections.disk_sources[0] = -1
     sections.counts[0] = segments, len(curve.disks), 0
+    put_circles(sections, 0)
     return sections
 
 

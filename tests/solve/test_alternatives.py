@@ -13,7 +13,7 @@ import clench
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
 from clench.grasp import criterion_registry
-from clench.solve import alternatives, controller
+from clench.solve import alternatives, controller, packing
 from clench.solve.planning import planned
 from clench.solve.problem import make_problem
 
@@ -68,7 +68,7 @@ def test_fingers_that_the_others_made_close_again_are_said_to_be(monkeypatch: py
     [
         ({}, [], ["full width", "planes"]),
         ({"criteria": "steady"}, [], ["full width", "planes"]),
-        ({"full_width": False}, [], ["all"]),
+        ({"full_width": False}, [], []),
         ({"check_sets": True}, ["all"], []),
         ({"open_variants": (0.0, 0.2)}, ["all"], []),
         ({"rounds": 2}, ["full width"], ["planes"]),
@@ -142,3 +142,42 @@ def register(monkeypatch: pytest.MonkeyPatch, called: str, value: Callable[[], f
 
     monkeypatch.setattr(criterion_registry, "_registry", dict(criterion_registry._registry))
     clench.register_criterion(Own())
+
+
+@pytest.mark.parametrize("full_width", [True, False])
+def test_changes_of_what_was_given_do_not_reach_what_is_read_later(full_width: bool) -> None:
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
+    pose = commands(hand, obj)[0].hand_pose
+    fingers, grid, preshape = ["thumb", "index"], [0.0], {hand.joints[hand.fingers[0].joints[-1]].name: 0.1}
+    given: dict[str, Any] = {"fingers": fingers, "open_variants": grid, "preshape": preshape}
+    command = clench.GraspCommand(hand_pose=pose, planes=2, full_width=full_width, **given)
+    right = documents(hand, obj, [command])[0]
+    solution = clench.solve(hand, obj, command)
+    fingers.reverse()
+    fingers.append("middle")
+    grid.append(0.2)
+    preshape.clear()
+    assert {**solution.to_dict(), "timing": {}} == right
+
+
+def test_problems_are_packed_once_whatever_their_criteria_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
+    pose, made = commands(hand, obj)[0].hand_pose, []
+    pack = packing.pack_problem
+    monkeypatch.setattr(packing, "pack_problem", lambda *given: made.append(1) or pack(*given))
+    joint = hand.joints[hand.fingers[0].joints[-1]].name
+    several = [{joint: 0.01 * k} for k in range(1, 13)]
+    for full_width, criteria in ((True, {"limit_distance": 1.0}), (False, {"limit_distance": 2.0})):
+        for _ in range(2):
+            for preshape in several:
+                asked: dict[str, Any] = {"criteria": dict(criteria), "preshape": preshape, "full_width": full_width}
+                clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=4, **asked))
+    assert len(made) == 2 * len(several)
+
+
+def test_a_certificate_and_limits_are_plain_values() -> None:
+    hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
+    solution = clench.solve(hand, obj, commands(hand, obj, planes=2)[0])
+    assert solution.certified
+    assert type(solution.joint_limits) is dict
+    assert type(solution.certificate) is dict

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -36,6 +38,11 @@ if TYPE_CHECKING:
 
 #: Sums of more numbers are added up in another order by NumPy.
 _MOST_JOINTS: Final = 7
+
+#: Scratch space that no thread uses, by what its arrays' shapes depend on, the latest used last.
+_ROOMS: Final[OrderedDict[tuple[int, ...], list[Room]]] = OrderedDict()
+_KEPT_ROOMS: Final = 16
+_LENDING: Final = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,19 +79,28 @@ class PackedProblem:
     @contextmanager
     def room(self, capacity: int) -> Iterator[Room]:
         """Lend scratch space for the kernel of a batch, with so many segments per plane; threads get each their own."""
+        shape = (*self._room_shape, capacity)
         try:
-            lent = self._rooms.pop()
-        except IndexError:
-            lent = (0, None)
-        room = lent[1] if lent[0] == capacity else None
-        if room is None:
+            room = _ROOMS[shape].pop()
+        except (KeyError, IndexError):
             room = self._make_room(capacity)
         yield room
-        self._rooms.append((capacity, room))
+        with _LENDING:
+            _ROOMS.setdefault(shape, []).append(room)
+            _ROOMS.move_to_end(shape)
+            while sum(map(len, _ROOMS.values())) > _KEPT_ROOMS:
+                oldest = next(iter(_ROOMS))
+                if _ROOMS[oldest]:
+                    _ROOMS[oldest].pop()
+                else:
+                    del _ROOMS[oldest]
 
     @cached_property
-    def _rooms(self) -> list[tuple[int, Room | None]]:
-        return []
+    def _room_shape(self) -> tuple[int, ...]:
+        chain, items = self.hand.chain, len(self.items.entry)
+        planes = (len(self.hand.plane_offset), self.most_planes, len(self.target.rounds.kind))
+        groups, families = len(chain.group_length), len(self.hand.family_pose)
+        return (*planes, items, self.most_contacts, groups, len(chain.rate), families)
 
     def _make_room(self, capacity: int) -> Room:
         from clench.kernels.batch_solving import Room
@@ -101,7 +117,7 @@ class PackedProblem:
     def wanting(self, wanted: Wanted) -> PackedProblem:
         """Return the same problem, of which something else is wanted."""
         other = replace(self, wanted=wanted)
-        other.__dict__.update(asked=self.asked, _rooms=self._rooms)
+        other.__dict__.update(asked=self.asked)
         return other
 
     @cached_property
@@ -127,6 +143,12 @@ def sums_alone(calibration: Calibration) -> bool:
     return set(calibration.criteria) <= set(ALWAYS) and not calibration.limits and not weighs_joints
 
 
+def choosing_terms(calibration: Calibration) -> tuple[tuple[int, float], ...]:
+    """Return the criteria that are always scored of a calibration: which, and what one unit adds to the sum."""
+    terms = [name for name in calibration.criteria if name in ALWAYS]
+    return tuple((ALWAYS.index(name), calibration.worth(name, 1.0)) for name in terms)
+
+
 def is_covered(hand: Hand, plan: HandPlan, calibration: Calibration) -> bool:
     """Say whether the kernels of a batch solve what a plan asks for: one open posture per finger, nothing unusual.
 
@@ -149,14 +171,14 @@ def pack_problem(
     start: FloatArray,
     source: CollisionSource,
     bodies: HandBodies,
-    calibration: Calibration,
+    terms: tuple[tuple[int, float], ...],
     idle: int,
 ) -> PackedProblem:
     """Pack a problem; `is_covered` has to hold.
 
     Args:
         hand: the hand. plan, exact: of its fingers. packed: the object. start: posture before closing [rad], (J,).
-        source: geometry of the hand. bodies: see `hand_bodies`. calibration: what counts.
+        source: geometry of the hand. bodies: see `hand_bodies`. terms: see `choosing_terms`.
         idle: fingers asked for that no joint closes.
     """
     obj = object_for_closing(packed)
@@ -168,7 +190,7 @@ def pack_problem(
         items=type(plan.items)(*columns),
         frames=plan.frames(hand),
         meshes=link_mesh_arrays(hand, source),
-        wanted=_wanted(hand, plan, start, source, bodies, calibration, idle),
+        wanted=_wanted(hand, plan, start, source, bodies, terms, idle),
         target=obj,
         mesh=object_mesh(packed),
         surface=object_surface(packed),
@@ -183,14 +205,13 @@ def _wanted(
     start: FloatArray,
     source: CollisionSource,
     bodies: HandBodies,
-    calibration: Calibration,
+    terms: tuple[tuple[int, float], ...],
     idle: int,
 ) -> Wanted:
     from clench.kernels.batch_layout import Wanted
 
     meshes, masks = link_mesh_arrays(hand, source), link_masks(hand, plan.plans, source)
     fingers = [p.finger for p in plan.plans]
-    terms = [name for name in calibration.criteria if name in ALWAYS]
     return Wanted(
         start=start,
         start_pose=np.ascontiguousarray(hand.link_poses(start)[:, :3]),
@@ -200,8 +221,8 @@ def _wanted(
         resting=masks.resting,
         joints=_own_joints(fingers),
         thumb=np.array([finger.is_thumb for finger in fingers], dtype=np.int64),
-        worth=np.array([calibration.worth(name, 1.0) for name in terms], dtype=np.float64),
-        term=np.array([ALWAYS.index(name) for name in terms], dtype=np.int64),
+        worth=np.array([worth for _, worth in terms], dtype=np.float64),
+        term=np.array([term for term, _ in terms], dtype=np.int64),
         present=np.full(len(fingers), -1, dtype=np.int64),
         margin=0.0,
         whole=any(plan.whole),

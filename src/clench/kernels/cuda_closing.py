@@ -167,7 +167,14 @@ _answer_at, _with_lengths, _with_links = _inlined(answer_at), _inlined(with_leng
 @_inlined
 def _sections_at(s: SectionArrays, n: int) -> SectionArrays:
     return SectionArrays(
-        s.segments[n], s.sources[n], s.disks[n], s.disk_sources[n], s.ellipses[n], s.ellipse_sources[n], s.counts[n]
+        s.segments[n],
+        s.sources[n],
+        s.disks[n],
+        s.disk_sources[n],
+        s.ellipses[n],
+        s.ellipse_sources[n],
+        s.counts[n],
+        s.circles[n],
     )
 
 

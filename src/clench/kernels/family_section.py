@@ -2,27 +2,54 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .compiling import inner_kernel, kernel
 from .family_pose import compose, compose_inverse
-from .layout import Floats, HandArrays, RoundArrays, SectionArrays
+from .layout import RUN, Floats, HandArrays, RoundArrays, SectionArrays
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
 from .section import cut
 from .tree import MeshTree
 
+#: What rounding takes from the radius of a circle [-].
+WIDER = 1.0 + 1e-12
+
 
 def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
     """Allocate an arena; a round primitive gives at most four segments, three disks and one ellipse."""
+    segments = capacity + 4 * rounds
     return SectionArrays(
-        np.empty((planes, capacity + 4 * rounds, 6)),
-        np.empty((planes, capacity + 4 * rounds), dtype=np.int64),
+        np.empty((planes, segments, 6)),
+        np.empty((planes, segments), dtype=np.int64),
         np.empty((planes, 3 * rounds, 3)),
         np.empty((planes, 3 * rounds), dtype=np.int64),
         np.empty((planes, rounds, 8)),
         np.empty((planes, rounds), dtype=np.int64),
         np.zeros((planes, 3), dtype=np.int64),
+        np.empty((planes, segments // RUN + 1, 3)),
     )
+
+
+@inner_kernel
+def put_circles(sections: SectionArrays, row: int) -> None:
+    """Write circles around those that have the segments of a row as diameters."""
+    segments, count = sections.segments, sections.counts[row, 0]
+    for run in range(-(-count // RUN)):
+        first, last = RUN * run, min(RUN * run + RUN, count)
+        x0, x1, z0, z1 = math.inf, -math.inf, math.inf, -math.inf
+        for i in range(first, last):
+            for end in (0, 2):
+                x, z = segments[row, i, end], segments[row, i, end + 1]
+                x0, x1, z0, z1 = min(x0, x), max(x1, x), min(z0, z), max(z1, z)
+        x, z, radius = 0.5 * (x0 + x1), 0.5 * (z0 + z1), 0.0
+        for i in range(first, last):
+            ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
+            away = math.sqrt((0.5 * (ax + bx) - x) ** 2 + (0.5 * (az + bz) - z) ** 2)
+            radius = max(radius, away + 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2))
+        circle = sections.circles[row, run]
+        circle[0], circle[1], circle[2] = x, z, WIDER * radius
 
 
 @kernel
@@ -79,6 +106,7 @@ def cut_planes(
     for plane in range(low, high):
         sections.counts[plane - base, 1], sections.counts[plane - base, 2] = 0, 0
         cut_rounds(rounds, T, hand.plane_offset[plane], plane - base, sections, pose)
+        put_circles(sections, plane - base)
     return int(wanted)
 
 

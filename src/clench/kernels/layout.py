@@ -137,6 +137,10 @@ class Work(NamedTuple):
     best: Ints
 
 
+#: Segments in one circle: those next to each other in the tree lie near each other.
+RUN = 8
+
+
 class SectionArrays(NamedTuple):
     """Hold the object's sections with P planes, one row each; a fixed arena with a count per plane.
 
@@ -148,6 +152,8 @@ class SectionArrays(NamedTuple):
             semi-axes a >= b, and the band of coordinates along u that belongs to the section.
         ellipse_sources: (P, E).
         counts: segments, disks and ellipses in use, (P, 3); negative where the arena was too small.
+        circles: rows (x, z, radius) [m] around the circles about every `RUN` segments that follow each other,
+            (P, capacity / RUN + 1, 3).
     """
 
     segments: Floats
@@ -157,6 +163,7 @@ class SectionArrays(NamedTuple):
     ellipses: Floats
     ellipse_sources: Ints
     counts: Ints
+    circles: Floats
 
 
 class RoundArrays(NamedTuple):

@@ -14,12 +14,12 @@ from .sweeping import body_gap, make_sweep_work, put_core
 
 @allocating_kernel
 def smallest_gap(
-    links: BodyArrays, wanted: Ints, poses: Floats, target: BodyArrays, T_palm_object: Floats
+    links: BodyArrays, which: Ints, poses: Floats, target: BodyArrays, T_palm_object: Floats
 ) -> tuple[float, int]:
     """Return the smallest gap between some bodies and the first one of another set, and which body has it.
 
     Args:
-        links: the bodies. wanted: numbers of those that count, (W,). poses: of every body, (B, 3, 4).
+        links: the bodies. which: numbers of those that count, (W,). poses: of every body, (B, 3, 4).
         target: the other set. T_palm_object: its pose, (3, 4).
 
     Returns:
@@ -29,7 +29,7 @@ def smallest_gap(
     work = make_sweep_work(0, 0)
     copy_pose(T_palm_object, work.resting)
     best, nearest = np.inf, -1
-    for m in wanted:
+    for m in which:
         copy_pose(poses[m], work.moving)
         gap = body_gap(links, m, target, 0, best, 1.0, work)
         if gap < best:

@@ -8,7 +8,7 @@ from .compiling import inner_kernel
 from .conics import sweep_region
 from .corners import sharp_blocks
 from .coupled_pairs import sweep_disk, sweep_segment
-from .layout import Floats, Outline, SectionArrays, Work
+from .layout import RUN, Floats, Outline, SectionArrays, Work
 from .turning_pairs import turn_disk, turn_segment
 
 
@@ -127,16 +127,24 @@ def nearest_turn(
         cx, cz, reach: the circle around the outline, whose centre is `d` from the pivot. turn: the last of interest.
         ex, ez: where the centre is then.
     """
-    segments, nearest, least, wide = sections.segments, -1, math.inf, turn >= 3.0
-    for i in range(sections.counts[row, 0]):
-        ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
-        bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
-        mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        if not misses(cx, cz, d, ex, ez, wide, mx, mz, reach + half):
-            gap, arm = stadium_gap(work.stadium, outline.number, mx, mz) - half - touch, math.sqrt(mx * mx + mz * mz)
-            # A part of the object turns about the pivot, seen from the link: along an arc no shorter than the gap.
-            if gap <= arm * min(turn, least):
-                nearest, least = i, max(gap, 0.0) / arm if arm > 0.0 else 0.0
+    segments, circles, count = sections.segments, sections.circles, sections.counts[row, 0]
+    nearest, least, wide, stadium, o = -1, math.inf, turn >= 3.0, work.stadium, outline.number
+    for run in range(-(-count // RUN)):
+        mx, mz, around = circles[row, run, 0] - px, (circles[row, run, 1] - pz) * mirror, circles[row, run, 2]
+        arm = math.sqrt(mx * mx + mz * mz) + around
+        if misses(cx, cz, d, ex, ez, wide, mx, mz, reach + around) or (
+            stadium_gap(stadium, o, mx, mz) - around - touch > arm * min(turn, least)
+        ):
+            continue
+        for i in range(RUN * run, min(RUN * run + RUN, count)):
+            ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
+            bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
+            mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+            if not misses(cx, cz, d, ex, ez, wide, mx, mz, reach + half):
+                gap, arm = stadium_gap(stadium, o, mx, mz) - half - touch, math.sqrt(mx * mx + mz * mz)
+                # A part of the object turns about the pivot, seen from the link: along an arc no shorter than the gap.
+                if gap <= arm * min(turn, least):
+                    nearest, least = i, max(gap, 0.0) / arm if arm > 0.0 else 0.0
     return nearest
 
 
@@ -156,34 +164,45 @@ def turn_outline(
 ) -> float:
     """Return the first contact of an outline behind one active joint with a plane's section, before `best`."""
     segments, disks, stadium, o = sections.segments, sections.disks, work.stadium, outline.number
+    circles, count = sections.circles, sections.counts[row, 0]
     vertex, side, pair = work.vertex, work.side, work.best
     # The circle around the stadium, which turns, and where it is at the end.
     cx, cz = stadium[o, 0] + 0.5 * stadium[o, 2], stadium[o, 1] + 0.5 * stadium[o, 3]
     reach = 0.5 * math.sqrt(stadium[o, 2] ** 2 + stadium[o, 3] ** 2) + stadium[o, 5] + touch
     d = math.sqrt(cx * cx + cz * cz)
     nearest, before, ex, ez, wide = -1, -1.0, 0.0, 0.0, False
-    if sections.counts[row, 0] > 0:
+    if count > 0:
         before, turn = best, best * rate
         ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
         nearest = nearest_turn(outline, sections, row, px, pz, mirror, cx, cz, ex, ez, d, reach, turn, touch, work)
-    for k in range(-1 if nearest >= 0 else sections.counts[row, 0], sections.counts[row, 0]):
-        i = nearest if k < 0 else k
-        if k == nearest:
-            continue
-        if best != before:
-            before, turn = best, best * rate
-            ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
-        ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
-        bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
-        mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        if (
-            not misses(cx, cz, d, ex, ez, wide, mx, mz, reach + half)
-            and stadium_gap(stadium, o, mx, mz) - half - touch <= math.sqrt(mx * mx + mz * mz) * best * rate
-        ):
-            nx, nz = segments[row, i, 4], segments[row, i, 5] * mirror
-            best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, vertex, side, pair)
-            if best == 0.0:
-                return best
+    # The nearest segment first, then run after run, if one has come that near.
+    for run in range(-1, -(-count // RUN) if nearest >= 0 else -1):
+        first, last = nearest, nearest + 1
+        if run >= 0:
+            first, last = RUN * run, min(RUN * run + RUN, count)
+            mx, mz, around = circles[row, run, 0] - px, (circles[row, run, 1] - pz) * mirror, circles[row, run, 2]
+            arm = math.sqrt(mx * mx + mz * mz) + around
+            if misses(cx, cz, d, ex, ez, wide, mx, mz, reach + around) or (
+                stadium_gap(stadium, o, mx, mz) - around - touch > arm * best * rate
+            ):
+                continue
+        for i in range(first, last):
+            if run >= 0 and i == nearest:
+                continue
+            if best != before:
+                before, turn = best, best * rate
+                ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
+            ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
+            bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
+            mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+            if (
+                not misses(cx, cz, d, ex, ez, wide, mx, mz, reach + half)
+                and stadium_gap(stadium, o, mx, mz) - half - touch <= math.sqrt(mx * mx + mz * mz) * best * rate
+            ):
+                nx, nz = segments[row, i, 4], segments[row, i, 5] * mirror
+                best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, vertex, side, pair)
+                if best == 0.0:
+                    return best
     if pair[6] and deferred_blocks(outline, sections, row, px, pz, mirror, closed, touch, 1, work):
         return 0.0
     for i in range(sections.counts[row, 1]):
@@ -211,12 +230,17 @@ def first_near(
     if sections.counts[row, 2]:
         return 0.0, -1
     segments, disks, nearest, least = sections.segments, sections.disks, -1, math.inf
-    for i in range(sections.counts[row, 0]):
-        ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
-        half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        gap = stadium_gap(work.stadium, outline.number, 0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) - half
-        if gap < least:
-            nearest, least = i, gap
+    circles, count, stadium, o = sections.circles, sections.counts[row, 0], work.stadium, outline.number
+    for run in range(-(-count // RUN)):
+        around = circles[row, run, 2]
+        if stadium_gap(stadium, o, circles[row, run, 0] - x, circles[row, run, 1] - z) - around >= least:
+            continue
+        for i in range(RUN * run, min(RUN * run + RUN, count)):
+            ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
+            half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+            gap = stadium_gap(stadium, o, 0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) - half
+            if gap < least:
+                nearest, least = i, gap
     for i in range(sections.counts[row, 1]):
         gap = stadium_gap(work.stadium, outline.number, disks[row, i, 0] - x, disks[row, i, 1] - z) - disks[row, i, 2]
         least = min(least, gap)
@@ -246,21 +270,45 @@ def sweep_outline(
     Args:
         px, pz: the first pivot; x, z: the last one, see `first_near`, which gives `nearest`, too.
     """
-    segments, disks, o = sections.segments, sections.disks, outline.number
+    segments, disks, circles, o = sections.segments, sections.disks, sections.circles, outline.number
     vertex, side, chain, terms, pair = work.vertex, work.side, work.chain, work.terms, work.best
-    for k in range(-1 if nearest >= 0 else 0, sections.counts[row, 0]):
-        i = nearest if k < 0 else k
-        if k == nearest:
-            continue
-        ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
-        near = touch + speed * best + 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        if stadium_gap(work.stadium, o, 0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) <= near:
-            ax, az, bx, bz, nx, nz = ax - px, az - pz, bx - px, bz - pz, segments[row, i, 4], segments[row, i, 5]
-            best = sweep_segment(
-                outline, i, ax, az, bx, bz, nx, nz, closed, touch, count, speed, best, vertex, side, chain, terms, pair
-            )
-            if best == 0.0:
-                return best
+    segment_count = sections.counts[row, 0]
+    for run in range(-1, -(-segment_count // RUN)):
+        first, last = nearest, nearest + 1
+        if run >= 0:
+            first, last = RUN * run, min(RUN * run + RUN, segment_count)
+            near = touch + speed * best + circles[row, run, 2]
+            if stadium_gap(work.stadium, o, circles[row, run, 0] - x, circles[row, run, 1] - z) > near:
+                continue
+        for i in range(max(first, 0), last):
+            if run >= 0 and i == nearest:
+                continue
+            ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
+            near = touch + speed * best + 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+            if stadium_gap(work.stadium, o, 0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) <= near:
+                ax, az, bx, bz, nx, nz = ax - px, az - pz, bx - px, bz - pz, segments[row, i, 4], segments[row, i, 5]
+                best = sweep_segment(
+                    outline,
+                    i,
+                    ax,
+                    az,
+                    bx,
+                    bz,
+                    nx,
+                    nz,
+                    closed,
+                    touch,
+                    count,
+                    speed,
+                    best,
+                    vertex,
+                    side,
+                    chain,
+                    terms,
+                    pair,
+                )
+                if best == 0.0:
+                    return best
     if pair[6] and deferred_blocks(outline, sections, row, px, pz, 1.0, closed, touch, count, work):
         return 0.0
     for i in range(sections.counts[row, 1]):

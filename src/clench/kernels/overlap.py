@@ -10,7 +10,7 @@ from .advance import make_work, place_joints, put_outline
 from .compiling import allocating_kernel, inner_kernel, kernel
 from .distance import Point, is_inside
 from .family_pose import back, compose_inverse
-from .layout import Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
+from .layout import RUN, Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
 from .outline_gap import core_distance, point_segment, round_distance, side_ends
 from .outline_sweep import stadium_gap
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID
@@ -73,12 +73,16 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
     """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
     margin = 4.0 * touch
     segments = sections.segments
-    for i in range(sections.counts[row, 0]):
-        ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
-        half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-        gap = stadium_gap(work.stadium, outline.number, 0.5 * (ax + bx), 0.5 * (az + bz))
-        if gap <= half and segment_overlaps(outline, ax, az, bx, bz, margin, work):
-            return True
+    circles, count, stadium, o = sections.circles, sections.counts[row, 0], work.stadium, outline.number
+    for run in range(-(-count // RUN)):
+        if stadium_gap(stadium, o, circles[row, run, 0], circles[row, run, 1]) > circles[row, run, 2]:
+            continue
+        for i in range(RUN * run, min(RUN * run + RUN, count)):
+            ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
+            half = 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
+            gap = stadium_gap(stadium, o, 0.5 * (ax + bx), 0.5 * (az + bz))
+            if gap <= half and segment_overlaps(outline, ax, az, bx, bz, margin, work):
+                return True
     if sections.counts[row, 1] == 0 and sections.counts[row, 2] == 0:
         return False
     if round_distance(outline, sections, row, 0.0, work) < -margin:

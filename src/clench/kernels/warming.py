@@ -1,7 +1,7 @@
 """Compile the kernels of a solve ahead of it, in two processes at once.
 
-A first solve compiles for most of a minute, one kernel after another. Half of it is the closing, so a second process
-compiles that into the cache on disk, from where this one loads it. Nothing depends on the second process: what it does
+A first solve compiles for minutes, one kernel after another. Half of it is the closing, so a second process compiles
+that into the cache on disk, from where this one loads it. Nothing depends on the second process: what it does
 not deliver is compiled when it is called.
 """
 
@@ -117,7 +117,7 @@ def sample_values() -> dict[str, Any]:
     chain = ChainArrays(*_arrays("i1 i1 f2 f1 f1 f1 f1 f1 i1"))
     outlines = OutlineArrays(*_arrays("i1 i1 f1 i1 f2 i1 f2 i1 f2"))
     hand: tuple[Any, ...] = (*_arrays("i1 i1"), chain, outlines, *_arrays("f3 i1 f1 f1 f1 i1"))
-    sections = SectionArrays(*_arrays("f3 i2 f3 i2 f3 i2 i2"))
+    sections = SectionArrays(*_arrays("f3 i2 f3 i2 f3 i2 i2 f3"))
     tree = MeshTree(*_arrays("f2 s2 f2 s1 s1 f2 f2 s1 s1 s1 s1"))
     values: dict[str, Any] = {
         "hand": HandArrays(*hand),
@@ -192,7 +192,7 @@ def announce(*, in_full: bool = False) -> None:
 
 
 def _is_cold(kernel: Any = solve_poses) -> bool:
-    """Say whether the cache on disk has no closing yet; never where NUMBA_DISABLE_JIT leaves functions as they are."""
+    """Say whether the cache on disk lacks a kernel; never where NUMBA_DISABLE_JIT leaves functions as they are."""
     stats = getattr(kernel, "stats", None)
     if stats is None:
         return False

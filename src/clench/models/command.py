@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 from clench.base.pose import FloatArray, Pose
 
@@ -75,6 +76,16 @@ class GraspCommand:
     next_steps: tuple[Mapping[str, float], ...] = ()
     task_wrenches: tuple[Mapping[str, tuple[float, ...]], ...] = ()
     seed: int | None = None
+
+    def unshared(self) -> GraspCommand:
+        """Return the same command, which no later change of a list or mapping that was given reaches."""
+        copies: dict[str, Any] = {}
+        for name, value in self.__dict__.items():
+            if isinstance(value, Mapping):
+                copies[name] = dict(value)
+            elif isinstance(value, list | tuple) and value:
+                copies[name] = tuple(dict(v) if isinstance(v, Mapping) else v for v in value)
+        return replace(self, **copies)
 
     @classmethod
     def from_posture(cls, hand: Hand, q: FloatArray | Mapping[str, float], hand_pose: Pose) -> GraspCommand:

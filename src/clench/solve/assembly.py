@@ -18,6 +18,7 @@ from clench.grasp.motion import asked_fingers, decompose
 from clench.grasp.scene import hash_hand
 from clench.grasp.surface import nearest_body
 from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.hand.hand import Hand
 
 from .causes import finger_cause, no_closing_joint
 from .certificate import Certificate
@@ -111,8 +112,13 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         speeds=dict(command.speeds),
         rounds=command.rounds,
         next_steps=plain_steps(command),
-        joint_limits={j.name: (j.lower, j.upper) for j in hand.joints},
+        joint_limits=joint_limits(hand),
     )
+
+
+def joint_limits(hand: Hand) -> dict[str, tuple[float, float]]:
+    """Return lower and upper limit of every joint [rad], by name."""
+    return {joint.name: (joint.lower, joint.upper) for joint in hand.joints}
 
 
 def plain_steps(command: GraspCommand) -> tuple[dict[str, float], ...]:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from threading import Lock
 
 import numpy as np
 
 from clench.base.deferring import Deferred, DeferredMapping
 from clench.grasp.batch_run import PoseAnswer, solve_pose
-from clench.grasp.batching import PackedProblem
 from clench.grasp.calibration import Calibration
 from clench.grasp.candidates import FingerCandidate, read_candidates
 from clench.grasp.criteria import Setting
@@ -22,7 +22,8 @@ from clench.grasp.criterion_registry import is_built_in, score_sets
 from clench.grasp.depths import hand_depths
 from clench.grasp.feasibility import judge_sets
 
-from .assembly import Answer, assemble, plain_steps
+from .alternatives import Alternatives, group_by_finger
+from .assembly import Answer, assemble, joint_limits, plain_steps
 from .certificate import certify, promised
 from .clock import Clock
 from .grasp_batch import STATUSES
@@ -58,12 +59,13 @@ def solve_directly(
         return None
     command, stages = problem.command, clock.stages()
     return GraspSolution.deferred(
-        _Direct(problem, calibration, setting, packed, answer, in_full, stages).solution,
+        _Direct(problem, calibration, setting, planned(problem), packed.wanted.whole, answer, in_full, stages).solution,
         status=status,
         joint_angles=dict(zip(problem.hand.joint_names, answer.solved.angles[0].tolist(), strict=True)),
         certified=certified,
         hand_pose=problem.T_world_palm,
         object_pose=problem.T_world_object,
+        joint_limits=joint_limits(problem.hand),
         timing=stages,
         quality=None,
         squeeze=None,
@@ -81,7 +83,8 @@ class _Direct:
     problem: Problem
     calibration: Calibration
     setting: Setting
-    packed: PackedProblem
+    complete: Planned
+    whole: bool
     answer: PoseAnswer
     in_full: Callable[[], Answer]
     stages: Mapping[str, float]
@@ -97,29 +100,30 @@ class _Direct:
             return self._made[0]
 
     def _answer(self) -> Answer:
-        problem, whole = self.problem, self.packed.wanted.whole
+        problem, complete = self.problem, self.complete
         hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
-        complete = planned(problem)
-        made = (complete.full_width if whole else None) or complete
-        items = self.answer.solved.chosen[0].tolist()
-        chosen = complete.plane_counts if whole else made.plan.items.low[items].tolist()
-        best, final = self._best(made, items), self.answer.solved.angles[0]
+        made = (complete.full_width if self.whole else None) or complete
+        items, sets = self.answer.solved.chosen[0].tolist(), self._sets(made)
+        best, final = [sets[i] for i in items], self.answer.solved.angles[0]
+        score_sets(best, self.calibration.criteria, self.setting)
         at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
-        promise = promised(problem) if whole else certify(problem, best, at_start, final, made.exact)
-        at_end = at_start if promise.holds else None
-        if at_end is None and problem.command.measure:
-            at_end = hand_depths(hand, final, packed, T, problem.source)
-        full = Deferred(self.in_full)
-        choice = DeferredMapping(lambda: full.value.choice)
-        return Answer(lambda k: full.value.sets(k), chosen, best, final, at_start, at_end, promise, choice)
+        if self.whole:
+            full = Deferred(self.in_full)
+            choice = DeferredMapping(lambda: full.value.choice)
+            found, promise, chosen = (lambda k: full.value.sets(k)), promised(problem), complete.plane_counts
+            return Answer(found, chosen, best, final, at_start, at_start, promise, choice)
+        close = partial(group_by_finger, made.plan, sets)
+        alternatives = Alternatives(problem, self.calibration, self.setting, close)
+        promise, chosen = certify(problem, best, at_start, final, made.exact), made.plan.items.low[items].tolist()
+        at_end = hand_depths(hand, final, packed, T, problem.source) if problem.command.measure else None
+        choice = DeferredMapping(partial(alternatives.explained, best, []))
+        return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, promise, choice)
 
-    def _best(self, made: Planned, items: list[int]) -> list[FingerCandidate]:
-        """Return the chosen sets; those that the other fingers made close again were never judged alone."""
-        p, closed, nowhere = self.problem, self.answer.closed, [None] * len(made.plan.plans)
-        sets = read_candidates(p.hand, made.plan, p.packed, closed, p.T_palm_object, nowhere)
+    def _sets(self, made: Planned) -> list[FingerCandidate]:
+        """Return the sets that were closed; those that the other fingers made close again were never judged alone."""
+        p, nowhere = self.problem, [None] * len(made.plan.plans)
+        sets = read_candidates(p.hand, made.plan, p.packed, self.answer.closed, p.T_palm_object, nowhere)
         judge_sets(p.hand, sets, p.packed, p.T_palm_object, p.source, measure=False)
         for i in np.flatnonzero(self.answer.anew):
             sets[i].feasible = sets[i].penetration = None
-        best = [sets[i] for i in items]
-        score_sets(best, self.calibration.criteria, self.setting)
-        return best
+        return sets

@@ -2,28 +2,46 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
+
 from clench.base.keeping import kept_by_identity
-from clench.grasp.batching import PackedProblem, is_covered, pack_problem
+from clench.grasp.batching import PackedProblem, choosing_terms, is_covered, pack_problem
 from clench.grasp.calibration import Calibration
 from clench.grasp.exact import hand_bodies
 from clench.grasp.scene import KEPT_OBJECTS, PackedObject
 from clench.models.command import ClosingOrder
 
-from .planning import Planned, planned
+from .planning import KEPT_PLANS, Planned, planned
 from .problem import Problem
+
+#: What a choice by sums depends on, and the plan by its identity.
+_Key = tuple[int, tuple[tuple[int, float], ...]]
+_Kept = OrderedDict[_Key, tuple[Planned, PackedProblem]]
 
 
 def packed_problem(problem: Problem, calibration: Calibration) -> PackedProblem | None:
     """Return a problem for the kernels of a batch, packed once; None where they do not cover it."""
-    command = problem.command
+    command, made = problem.command, planned(problem)
     usual = command.order == ClosingOrder.PROXIMAL_FIRST and command.rounds == 1 and not command.check_sets
-    return _packed(planned(problem), problem.packed, calibration) if usual else None
+    if not usual or not is_covered(problem.hand, made.plan, calibration):
+        return None
+    terms = () if any(made.plan.whole) else choosing_terms(calibration)
+    kept, key = _packed_with(problem.packed), (id(made), terms)
+    entry = kept.get(key)
+    if entry is None:
+        entry = kept[key] = made, _pack(made, problem.packed, terms)
+        while len(kept) > KEPT_PLANS:
+            kept.popitem(last=False)
+    return entry[1]
 
 
 @kept_by_identity(KEPT_OBJECTS)
-def _packed(made: Planned, packed: PackedObject, calibration: Calibration) -> PackedProblem | None:
+def _packed_with(packed: PackedObject) -> _Kept:
+    """Return what is kept for an object."""
+    return OrderedDict()
+
+
+def _pack(made: Planned, packed: PackedObject, terms: tuple[tuple[int, float], ...]) -> PackedProblem:
     hand, source = made.hand, made.source
-    if not is_covered(hand, made.plan, calibration):
-        return None
     bodies = hand_bodies(hand, source)
-    return pack_problem(hand, made.plan, made.exact, packed, made.start, source, bodies, calibration, len(made.idle))
+    return pack_problem(hand, made.plan, made.exact, packed, made.start, source, bodies, terms, len(made.idle))

@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,8 @@ from .problem import Problem
 if TYPE_CHECKING:
     from clench.kernels.exact import ExactArrays
 
-_KEPT_PLANS = 64
+#: Plans that are kept, the latest made.
+KEPT_PLANS: Final = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,7 @@ def planned(problem: Problem) -> Planned:
     if problem.together:
         exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
     made = _plans[key] = Planned(hand, problem.start, problem.source, plan, exact, tuple(idle))
-    while len(_plans) > _KEPT_PLANS:
+    while len(_plans) > KEPT_PLANS:
         _plans.popitem(last=False)
     return made
 

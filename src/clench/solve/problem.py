@@ -65,6 +65,7 @@ class Problem:
 def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:
     """Check the three inputs and bring them together."""
     check_command(hand, command)
+    command = command.unshared()
     if not any(body.role is BodyRole.GRASPABLE for body in obj.bodies):
         raise ObjectError(f"{obj.name}: no body to grasp; every body is an obstacle.")
     start = open_posture(hand, command)

@@ -217,7 +217,7 @@ class GraspSolution:
     max_penetration: float | None
     fingers: Mapping[str, FingerResult]
     contacts: tuple[Contact, ...]
-    certificate: Mapping[str, Any] | None = None
+    certificate: Mapping[str, Any] | None = field(default_factory=lambda: None)
     quality: Mapping[str, Any] | None = None
     squeeze: Mapping[str, Any] | None = None
     pregrasp: Mapping[str, float] | None = None
@@ -233,14 +233,10 @@ class GraspSolution:
         """Return a solution of which some fields are known; the others are made when one of them is first read.
 
         Args:
-            make: returns the whole solution, always the same. known: of its fields, those that may be left out when
-                one is made, too, but for the mappings among them.
+            make: returns the whole solution, always the same. known: of its fields at least those with a default value,
+                which would else be read in their place.
         """
-        late = {
-            "certificate": DeferredMapping(lambda: make().certificate or {}),
-            "choice": DeferredMapping(lambda: make().choice or {}),
-            "joint_limits": DeferredMapping(lambda: make().joint_limits),
-        }
+        late = {"choice": DeferredMapping(lambda: make().choice or {})}
         solution = object.__new__(cls)
         solution.__dict__.update({**late, **known}, _make=make)
         return solution

@@ -225,7 +225,7 @@ class _Bench:
                 return
 
     def _times(self, obj: GraspObject, commands: Sequence[GraspCommand]) -> dict[str, float]:
-        """Return times of a solve and of its parts by themselves [s]: of every pose the quickest pass, then the median."""
+        """Return times of a solve and of its parts alone [s]: of every pose the quickest pass, then the median."""
         rows: list[list[dict[str, float]]] = [[] for _ in commands]
         with listening() as spent:
             for _ in range(self.passes):
