@@ -52,6 +52,8 @@ TESTS = {
     "parting": ["kernels/test_body_sweep.py"],
     "pair_queue": ["kernels/test_body_sweep.py"],
     "slabs": ["kernels/test_slabs.py", "grasp/test_boxes.py"],
+    "apart": ["kernels/test_apart.py"],
+    "family_section": ["kernels/test_section_circles.py", PLANAR],
 }
 #: A mutant that takes this many times as long as the kernel without a mistake never ends, which the tests notice.
 PATIENCE = 5.0
