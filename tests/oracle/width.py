@@ -26,8 +26,8 @@ TOUCHING = 1e-9
 #: The oracle's smallest step [rad]: where it is nearer to a contact than that, it looks at the end alone.
 _LEAST = 1e-5
 _STEPS = 4000
-#: How far the oracle goes on beyond a stop [rad].
-_ON = (1e-3, 2e-3, 5e-3)
+#: How far the oracle goes on beyond a stop [rad]; a corner may be past another one again within the first thousandth.
+_ON = (1e-5, 1e-4, 1e-3, 2e-3, 5e-3)
 
 
 @dataclass(frozen=True)
