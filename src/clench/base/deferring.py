@@ -1,12 +1,9 @@
-"""Values, mappings and sequences that are made when they are first read."""
+"""Mappings and sequences that are made when they are first read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
-from typing import Any, ClassVar, Generic, TypeVar
-
-Value = TypeVar("Value")
+from typing import Any, ClassVar
 
 
 class _Deferred:
@@ -62,15 +59,3 @@ class DeferredSequence(_Deferred, Sequence[Any]):
     """A sequence that is made when it is first read; its copies are plain tuples."""
 
     _kind = tuple
-
-
-class Deferred(Generic[Value]):
-    """A value that is made when it is first read."""
-
-    def __init__(self, make: Callable[[], Value]) -> None:
-        self._make = make
-
-    @cached_property
-    def value(self) -> Value:
-        """The value."""
-        return self._make()

@@ -50,7 +50,7 @@ class PackedProblem:
     """Hold everything that the kernels of a batch read, but for the poses.
 
     Args:
-        hand, exact, items, frames, meshes, wanted: see `clench.kernels.batch_closing` and `batch_judging`.
+        hand, exact, items, frames, meshes, wanted: see `clench.kernels.batch_solving` and `batch_judging`.
         target: the object; mesh, surface: how it is measured and read.
         bodies: see `hand_bodies`. alone: the hand has one finger only.
     """
@@ -149,18 +149,18 @@ def choosing_terms(calibration: Calibration) -> tuple[tuple[int, float], ...]:
     return tuple((ALWAYS.index(name), calibration.worth(name, 1.0)) for name in terms)
 
 
-def is_covered(hand: Hand, plan: HandPlan, calibration: Calibration) -> bool:
-    """Say whether the kernels of a batch solve what a plan asks for: one open posture per finger, nothing unusual.
+def is_covered(hand: Hand, plan: HandPlan) -> bool:
+    """Say whether the kernels of a batch close what a plan asks for: one open posture per finger, nothing unusual.
+
+    With planes only the choice has to be theirs as well, see `sums_alone`.
 
     Args:
-        hand: the hand. plan: of its fingers, closed one joint after another, once. calibration: what counts.
+        hand: the hand. plan: of its fingers, closed one joint after another, once.
     """
     one_posture = len(set(plan.finger)) == len(plan.plans) and not plan.together
     breaks = any(c.breakaway for c in hand.couplings) or any(any(p.breaks) for p in plan.plans)
-    if any(plan.whole):
-        return one_posture and not breaks
     few = all(len(p.finger.joints) <= _MOST_JOINTS for p in plan.plans)
-    return one_posture and not breaks and few and sums_alone(calibration)
+    return one_posture and not breaks and (few or any(plan.whole))
 
 
 def pack_problem(

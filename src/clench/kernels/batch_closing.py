@@ -1,14 +1,12 @@
-"""Close the fingers of a hand at one of many poses of an object (METHOD.md section 4)."""
+"""What the closing of a hand reads and writes, at one of many poses and with other fingers in its way."""
 
 from __future__ import annotations
 
-from .closing import close_item
+from .bodies import BodyArrays
 from .compiling import inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays
 from .handing import whole
-from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays, Work
-from .sweeping import SweepWork
-from .tree import MeshTree
+from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints
 
 
 @inner_allocating_kernel
@@ -37,13 +35,13 @@ def clear_answer(answer: ClosingArrays, i: int) -> None:
 
 
 @inner_allocating_kernel
-def with_links(exact: ExactArrays, link_pose: Floats) -> ExactArrays:
-    """Return what sweeps read, with the links elsewhere."""
+def among(exact: ExactArrays, obj: BodyArrays, link_pose: Floats, checked: Ints) -> ExactArrays:
+    """Return what sweeps read, with another object, links elsewhere, and other links that may not overlap."""
     return ExactArrays(
         exact.joint_first,
         exact.wanted,
         whole(exact.links),
-        whole(exact.object),
+        whole(obj),
         exact.mover_first,
         exact.mover_link,
         exact.mover_joint,
@@ -51,7 +49,7 @@ def with_links(exact: ExactArrays, link_pose: Floats) -> ExactArrays:
         exact.axis,
         exact.anchor,
         link_pose,
-        exact.checked,
+        checked,
     )
 
 
@@ -71,52 +69,3 @@ def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
         hand.family_length,
         hand.plane_outline,
     )
-
-
-@inner_kernel
-def close_pose(
-    hand: HandArrays,
-    exact: ExactArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    items: ItemArrays,
-    asked: Ints,
-    shared: SectionArrays,
-    own: SectionArrays,
-    overlaps: Ints,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> None:
-    """Close items once, joint after joint.
-
-    Args:
-        hand, exact, tree, rounds, closed, T_palm_object, items, shared, own: see `close_items`.
-        asked: whether an item is to be closed, (I,); answers of others are left as they are.
-        overlaps: see `look_for_overlaps`, (E,); such entries are not closed. answer: written.
-    """
-    for i in range(items.entry.shape[0]):
-        if not asked[i]:
-            continue
-        clear_answer(answer, i)
-        if overlaps[items.entry[i]] >= 0:
-            continue
-        close_item(
-            hand,
-            exact,
-            tree,
-            rounds,
-            closed,
-            T_palm_object,
-            shared,
-            own,
-            items,
-            i,
-            1,
-            False,
-            work,
-            sweep,
-            answer,
-        )

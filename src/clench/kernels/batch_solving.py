@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .advance import make_work
-from .batch_closing import answer_at, clear_answer, close_pose, with_lengths
+from .batch_closing import among, answer_at, clear_answer, with_lengths
 from .batch_judging import judge_pose, make_scratch
 from .batch_layout import ObjectArrays, Solved, Wanted
 from .batch_sequence import block_pose, place_one
@@ -16,7 +16,6 @@ from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays
 from .family_section import cut_first_families
 from .frames import FrameArrays
-from .handing import whole
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, SectionArrays, Work
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh
 from .overlap import look_for_overlaps
@@ -94,25 +93,6 @@ class Turn(NamedTuple):
     overlaps: Ints
 
 
-@inner_allocating_kernel
-def among(exact: ExactArrays, obj: ObjectArrays, link_pose: Floats, checked: Ints) -> ExactArrays:
-    """Return what sweeps read, with another object, links elsewhere, and other links that may not overlap."""
-    return ExactArrays(
-        exact.joint_first,
-        exact.wanted,
-        whole(exact.links),
-        whole(obj.bodies),
-        exact.mover_first,
-        exact.mover_link,
-        exact.mover_joint,
-        exact.mover_pose,
-        exact.axis,
-        exact.anchor,
-        link_pose,
-        checked,
-    )
-
-
 @allocating_kernel
 def solve_poses(
     asked: Asked, wanted: Wanted, T_palm_objects: Floats, room: Room, found: Closed, solved: Solved
@@ -137,7 +117,7 @@ def solve_poses(
         np.empty(items.entry.shape[0], dtype=np.int64),
         np.empty(entries, dtype=np.int64),
     )
-    judged = among(exact, target, exact.link_pose, asked.across)
+    judged = among(exact, target.bodies, exact.link_pose, asked.across)
     for n in range(T_palm_objects.shape[0]):
         if found.overflow[n] == 0:
             continue
@@ -205,23 +185,35 @@ def close_asked(
     sweep: SweepWork,
     answer: ClosingArrays,
 ) -> None:
-    """Close the items that `turn` asks for; see `close_pose`."""
-    close_pose(
-        hand,
-        exact,
-        target.tree,
-        target.rounds,
-        target.closed,
-        T_palm_object,
-        items,
-        turn.asked,
-        shared,
-        own,
-        turn.overlaps,
-        work,
-        sweep,
-        answer,
-    )
+    """Close the items that `turn` asks for once, joint after joint, but for entries that overlap at the start.
+
+    Args:
+        hand, exact, T_palm_object, items, shared, own: see `close_items`. target: the object.
+        answer: written; those of items that are not asked for are left as they are.
+    """
+    for i in range(items.entry.shape[0]):
+        if not turn.asked[i]:
+            continue
+        clear_answer(answer, i)
+        if turn.overlaps[items.entry[i]] >= 0:
+            continue
+        close_item(
+            hand,
+            exact,
+            target.tree,
+            target.rounds,
+            target.closed,
+            T_palm_object,
+            shared,
+            own,
+            items,
+            i,
+            1,
+            False,
+            work,
+            sweep,
+            answer,
+        )
 
 
 @inner_allocating_kernel
@@ -254,13 +246,13 @@ def close_in_turn(
         anew[i] = 0
     while True:
         place_one(hand, asked.frames, wanted, answer.travel, turn.placed, turn.length, turn.q, turn.angles, turn.poses)
-        bounded, others = with_lengths(hand, turn.length), among(exact, nothing, turn.placed, asked.apart)
+        bounded, others = with_lengths(hand, turn.length), among(exact, nothing.bodies, turn.placed, asked.apart)
         k = first_meeting(bounded, others, nothing, T_palm_object, items, room, first, work, sweep, blocked)
         if k < 0:
             return 0
         for i in range(count):
             turn.asked[i] = 1 if i == k else 0
-        everything = among(exact, target, turn.placed, asked.across)
+        everything = among(exact, target.bodies, turn.placed, asked.across)
         close_asked(hand, everything, target, T_palm_object, items, room.shared, room.own, turn, work, sweep, answer)
         if answer.overflow[k] > 0:
             return int(answer.overflow[k])

@@ -14,7 +14,7 @@ import numba.cuda
 import numpy as np
 
 from .advance import make_work
-from .batch_closing import answer_at, with_lengths, with_links
+from .batch_closing import among, answer_at, with_lengths
 from .closing import close_item
 from .exact import ExactArrays
 from .family_section import cut_first_families
@@ -161,7 +161,7 @@ def _inlined(function: Any) -> Any:
     return cuda.jit(device=True, inline="always")(_plain(function))
 
 
-_answer_at, _with_lengths, _with_links = _inlined(answer_at), _inlined(with_lengths), _inlined(with_links)
+_among, _answer_at, _with_lengths = _inlined(among), _inlined(answer_at), _inlined(with_lengths)
 
 
 @_inlined
@@ -257,8 +257,8 @@ def _close(job: Job) -> None:
     shared, own = _sections_at(job.shared, n), _sections_at(job.own, index)
     work = _work_at(job.item_work, index)
     sweep = _sweep_at(job.sweep, index)
-    hand, exact = _with_lengths(job.hand, job.length[one]), _with_links(job.exact, job.link_pose[one])
-    T = job.T_palm_object[n]
+    hand, T = _with_lengths(job.hand, job.length[one]), job.T_palm_object[n]
+    exact = _among(job.exact, job.exact.object, job.link_pose[one], job.exact.checked)
     close_item(
         hand,
         exact,

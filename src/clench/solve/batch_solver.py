@@ -20,6 +20,7 @@ from .controller import solve
 from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
 from .packing import packed_problem
+from .planning import planned
 from .problem import make_problem, make_setting
 from .solution import FingerStatus, GraspSolution
 
@@ -61,7 +62,7 @@ class BatchSolver:
             return None
         calibration = calibration_of(command.criteria)
         make_setting(problem, calibration)
-        return packed_problem(problem, calibration)
+        return packed_problem(problem, planned(problem), calibration)
 
     def solve(
         self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int, device: str = CPU

@@ -13,7 +13,7 @@ from clench.base.pose import FloatArray
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.grasp.candidates import FingerCandidate
 from clench.grasp.containment import contained_link, link_within_link
-from clench.grasp.depths import LinkDepth
+from clench.grasp.depths import LinkDepth, hand_depths
 from clench.grasp.exact import hand_bodies, swept_deviation
 from clench.grasp.linkage import placed_links
 
@@ -64,6 +64,33 @@ class Certificate:
 
 def _refused(code: CertificateCode, text: str, links: Sequence[str] = (), finger: str | None = None) -> Certificate:
     return Certificate(False, text, code=code, links=tuple(links), finger=finger)
+
+
+def judge(
+    problem: Problem,
+    best: Sequence[FingerCandidate],
+    final: FloatArray,
+    exact: ExactArrays,
+    promise: Certificate | None = None,
+) -> tuple[Sequence[LinkDepth], Sequence[LinkDepth] | None, Certificate]:
+    """Measure what overlaps at the start and at the end, over the whole width, and say what is promised.
+
+    Args:
+        problem: the three inputs. best: one set per finger. final: posture at the end, shape (J,) [rad].
+        exact: the hand as it was swept. promise: what is promised, where that is known.
+
+    Returns:
+        depths of the links that no finger moves, before closing; of all links, at the end, or None where that is not
+        asked for; and the certificate.
+    """
+    hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
+    at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
+    certificate = promise or certify(problem, best, at_start, final, exact)
+    # Where nothing can overlap there is nothing to measure but what rests.
+    at_end = at_start if certificate.holds else None
+    if at_end is None and problem.command.measure:
+        at_end = hand_depths(hand, final, packed, T, problem.source)
+    return at_start, at_end, certificate
 
 
 def certify(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from clench.base.deferring import DeferredMapping
 from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, combined_posture
 from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import score_sets
-from clench.grasp.depths import hand_depths
 from clench.grasp.exact import hand_bodies
 from clench.grasp.sequence import close_in_sequence
 from clench.grasp.simultaneous import close_together
@@ -23,7 +22,7 @@ from clench.models.objects.grasp_object import GraspObject
 
 from .alternatives import Alternatives, close_sets, decided, group_by_finger, with_planes
 from .assembly import Answer, assemble
-from .certificate import certify
+from .certificate import judge
 from .clock import Clock
 from .directly import solve_directly
 from .orders import best_order
@@ -98,9 +97,10 @@ def _answer(problem: Problem, calibration: Calibration, setting: Setting, clock:
     score_sets([best[k] for k in changed], names, setting)
     clock.lap("sequence")
     explained = DeferredMapping(partial(alternatives.explained, best, changed))
-    answer = _judged(problem, made, alternatives, chosen, best, explained)
+    final = combined_posture(problem.hand, problem.start, best)
+    at_start, at_end, certificate = judge(problem, best, final, made.exact)
     clock.lap("judge")
-    return answer
+    return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
 
 
 def _with_each_other(
@@ -112,23 +112,3 @@ def _with_each_other(
     if plan.together:
         return close_together(hand, plan, exact, closed, packed, best, bodies)
     return close_in_sequence(hand, plan, exact, closed, packed, best, problem.start, problem.rounds, bodies)
-
-
-def _judged(
-    problem: Problem,
-    made: Planned,
-    alternatives: Alternatives,
-    chosen: Sequence[int],
-    best: Sequence[FingerCandidate],
-    explained: Mapping[str, Any],
-) -> Answer:
-    """Combine the best sets, and measure what overlaps at the start and at the end, over the whole width."""
-    hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
-    final = combined_posture(hand, problem.start, best)
-    at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
-    certificate = certify(problem, best, at_start, final, made.exact)
-    # Where nothing can overlap there is nothing to measure but what rests.
-    at_end = at_start if certificate.holds else None
-    if at_end is None and problem.command.measure:
-        at_end = hand_depths(hand, final, packed, T, problem.source)
-    return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)

@@ -8,23 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from threading import Lock
 
 import numpy as np
 
-from clench.base.deferring import Deferred, DeferredMapping
+from clench.base.deferring import DeferredMapping
 from clench.grasp.batch_run import PoseAnswer, solve_pose
 from clench.grasp.calibration import Calibration
 from clench.grasp.candidates import FingerCandidate, read_candidates
 from clench.grasp.criteria import Setting
 from clench.grasp.criterion_registry import is_built_in, score_sets
-from clench.grasp.depths import hand_depths
 from clench.grasp.feasibility import judge_sets
 
 from .alternatives import Alternatives, group_by_finger
 from .assembly import Answer, assemble, joint_limits, plain_steps
-from .certificate import certify, promised
+from .certificate import judge, promised
 from .clock import Clock
 from .grasp_batch import STATUSES
 from .packing import packed_problem
@@ -46,7 +45,10 @@ def solve_directly(
         problem, calibration, setting: what is asked. in_full: solves it with all alternatives and reasons.
         clock: of the solve.
     """
-    packed = packed_problem(problem, calibration) if is_built_in(calibration.criteria) else None
+    if not is_built_in(calibration.criteria):
+        return None
+    made = planned(problem)
+    packed = packed_problem(problem, made, calibration)
     clock.lap("plan")
     if packed is None:
         return None
@@ -59,7 +61,7 @@ def solve_directly(
         return None
     command, stages = problem.command, clock.stages()
     return GraspSolution.deferred(
-        _Direct(problem, calibration, setting, planned(problem), packed.wanted.whole, answer, in_full, stages).solution,
+        _Direct(problem, calibration, setting, made, packed.wanted.whole, answer, in_full, stages).solution,
         status=status,
         joint_angles=dict(zip(problem.hand.joint_names, answer.solved.angles[0].tolist(), strict=True)),
         certified=certified,
@@ -101,23 +103,21 @@ class _Direct:
 
     def _answer(self) -> Answer:
         problem, complete = self.problem, self.complete
-        hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
         made = (complete.full_width if self.whole else None) or complete
         items, sets = self.answer.solved.chosen[0].tolist(), self._sets(made)
         best, final = [sets[i] for i in items], self.answer.solved.angles[0]
         score_sets(best, self.calibration.criteria, self.setting)
-        at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
+        promise = promised(problem) if self.whole else None
+        at_start, at_end, certificate = judge(problem, best, final, made.exact, promise)
         if self.whole:
-            full = Deferred(self.in_full)
-            choice = DeferredMapping(lambda: full.value.choice)
-            found, promise, chosen = (lambda k: full.value.sets(k)), promised(problem), complete.plane_counts
-            return Answer(found, chosen, best, final, at_start, at_start, promise, choice)
-        close = partial(group_by_finger, made.plan, sets)
-        alternatives = Alternatives(problem, self.calibration, self.setting, close)
-        promise, chosen = certify(problem, best, at_start, final, made.exact), made.plan.items.low[items].tolist()
-        at_end = hand_depths(hand, final, packed, T, problem.source) if problem.command.measure else None
-        choice = DeferredMapping(partial(alternatives.explained, best, []))
-        return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, promise, choice)
+            full, chosen = cache(self.in_full), complete.plane_counts
+            found, choice = (lambda k: full().sets(k)), DeferredMapping(lambda: full().choice)
+        else:
+            close = partial(group_by_finger, made.plan, sets)
+            alternatives = Alternatives(problem, self.calibration, self.setting, close)
+            found, choice = alternatives.of_finger, DeferredMapping(partial(alternatives.explained, best, []))
+            chosen = made.plan.items.low[items].tolist()
+        return Answer(found, chosen, best, final, at_start, at_end, certificate, choice)
 
     def _sets(self, made: Planned) -> list[FingerCandidate]:
         """Return the sets that were closed; those that the other fingers made close again were never judged alone."""

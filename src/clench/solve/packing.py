@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import OrderedDict
 
 from clench.base.keeping import kept_by_identity
-from clench.grasp.batching import PackedProblem, choosing_terms, is_covered, pack_problem
+from clench.grasp.batching import PackedProblem, choosing_terms, pack_problem, sums_alone
 from clench.grasp.calibration import Calibration
 from clench.grasp.exact import hand_bodies
 from clench.grasp.scene import KEPT_OBJECTS, PackedObject
 from clench.models.command import ClosingOrder
 
-from .planning import KEPT_PLANS, Planned, planned
+from .planning import KEPT_PLANS, Planned
 from .problem import Problem
 
 #: What a choice by sums depends on, and the plan by its identity.
@@ -19,13 +19,17 @@ _Key = tuple[int, tuple[tuple[int, float], ...]]
 _Kept = OrderedDict[_Key, tuple[Planned, PackedProblem]]
 
 
-def packed_problem(problem: Problem, calibration: Calibration) -> PackedProblem | None:
-    """Return a problem for the kernels of a batch, packed once; None where they do not cover it."""
-    command, made = problem.command, planned(problem)
+def packed_problem(problem: Problem, made: Planned, calibration: Calibration) -> PackedProblem | None:
+    """Return a problem for the kernels of a batch, packed once; None where they do not cover it.
+
+    Args:
+        problem: the three inputs. made: their plan. calibration: what counts.
+    """
+    command = problem.command
     usual = command.order == ClosingOrder.PROXIMAL_FIRST and command.rounds == 1 and not command.check_sets
-    if not usual or not is_covered(problem.hand, made.plan, calibration):
+    if not usual or not made.covered or not (made.whole or sums_alone(calibration)):
         return None
-    terms = () if any(made.plan.whole) else choosing_terms(calibration)
+    terms = () if made.whole else choosing_terms(calibration)
     kept, key = _packed_with(problem.packed), (id(made), terms)
     entry = kept.get(key)
     if entry is None:

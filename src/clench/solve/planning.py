@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, HandError
 from clench.base.pose import FloatArray
+from clench.grasp.batching import is_covered
 from clench.grasp.closing import HandPlan, make_hand_plan, only_items
 from clench.grasp.exact import HandBodies, hand_bodies, pack_exact
 from clench.grasp.motion import alternatives, asked_fingers
@@ -45,6 +46,16 @@ class Planned:
     plan: HandPlan
     exact: ExactArrays
     idle: tuple[Finger, ...]
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether the full width of fingers is closed."""
+        return any(self.plan.whole)
+
+    @cached_property
+    def covered(self) -> bool:
+        """Whether the kernels of a batch close these fingers, see `is_covered`."""
+        return is_covered(self.hand, self.plan)
 
     @cached_property
     def full_width(self) -> Planned | None:
