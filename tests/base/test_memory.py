@@ -6,7 +6,10 @@ import platform
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+
+from clench.base.memory import AT_ONCE, in_parts
 
 #: Arrays as work on a mesh makes them: large ones come and go, small ones between them stay.
 TRIAL = """
@@ -37,3 +40,11 @@ def test_large_blocks_are_given_back() -> None:
         return int(done.stdout)
 
     assert left("large") < 10_000_000 < 50_000_000 < left("small")
+
+
+@pytest.mark.parametrize("rows", [0, 1, AT_ONCE - 1, AT_ONCE, AT_ONCE + 1, 3 * AT_ONCE + 7])
+def test_parts_are_all_rows_once_and_in_order(rows: int) -> None:
+    parts = [np.arange(rows)[some] for some in in_parts(rows)]
+    assert np.array_equal(np.concatenate([np.empty(0), *parts]), np.arange(rows))
+    assert max(map(len, parts), default=0) <= AT_ONCE
+    assert min(map(len, parts), default=1) > 0

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
 from functools import cache
 from typing import Final
 
 #: What is smaller leaves too little behind to be worth a setting [bytes].
 LARGE: Final = 4_000_000
+#: Rows of an array that are worked on together.
+AT_ONCE: Final = 16384
 #: Blocks from this size on go back to the system when they are freed [bytes].
 BLOCK: Final = 1 << 20
 #: glibc's name for that size.
@@ -22,6 +25,11 @@ def expect(size: int) -> None:
     """
     if size >= LARGE:
         _give_back_blocks()
+
+
+def in_parts(rows: int) -> Iterator[slice]:
+    """Return slices that part an array's rows, so that work on them takes little memory however many there are."""
+    return (slice(start, min(start + AT_ONCE, rows)) for start in range(0, rows, AT_ONCE))
 
 
 @cache

@@ -10,8 +10,10 @@ from numbers import Real
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, ObjectError
+from clench.base.memory import in_parts
 from clench.base.pose import FloatArray, Pose, invert, quaternion_from_rotation, rotation_about
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
@@ -74,22 +76,28 @@ class _Surface:
     """Draw points of the graspable surface by area."""
 
     def __init__(self, obj: GraspObject, packed: PackedObject) -> None:
-        tree = packed.full_tree
-        graspable = np.array([role is BodyRole.GRASPABLE for role in packed.body_roles])[tree.body]
-        self.corners = tree.vertices[tree.triangles[graspable]]
-        self.normals = tree.normals[graspable]
-        a, b, c = self.corners.transpose(1, 0, 2)
-        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1) * self.normals.any(axis=1)
+        self.tree = packed.full_tree
+        graspable = np.array([role is BodyRole.GRASPABLE for role in packed.body_roles])[self.tree.body]
+        self.triangles = np.flatnonzero(graspable)
+        parts = in_parts(len(self.triangles))
+        areas = np.concatenate([np.empty(0), *(self._areas(self.triangles[some]) for some in parts)])
         if not areas.sum() > 0.0:
             raise ObjectError(f"object '{obj.name}': expected a graspable body with a surface to approach, found none.")
         self.shares = np.cumsum(areas) / areas.sum()
 
+    def _areas(self, triangles: NDArray[np.intp]) -> FloatArray:
+        """Return the areas of triangles [m^2], 0 for those without a normal."""
+        a, b, c = self.tree.vertices[self.tree.triangles[triangles]].transpose(1, 0, 2)
+        areas: FloatArray = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return areas * self.tree.normals[triangles].any(axis=1)
+
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """Return a point [m] and the outward unit normal there, each shape (3,)."""
-        triangle = min(int(np.searchsorted(self.shares, rng.random(), side="right")), len(self.shares) - 1)
+        number = min(int(np.searchsorted(self.shares, rng.random(), side="right")), len(self.shares) - 1)
+        triangle = self.triangles[number]
         root, other = np.sqrt(rng.random()), rng.random()
         weights = np.array([1.0 - root, root * (1.0 - other), root * other])
-        return weights @ self.corners[triangle], self.normals[triangle]
+        return weights @ self.tree.vertices[self.tree.triangles[triangle]], self.tree.normals[triangle]
 
 
 def _open_posture(hand: Hand, preshape: Mapping[str, float]) -> FloatArray:

@@ -165,20 +165,19 @@ _latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", N
 
 @lru_cache(maxsize=KEPT_OBJECTS)
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
-    from clench.kernels.bodies import join_elements, pack_bodies
+    from clench.kernels.bodies import pack_triangles
     from clench.kernels.tree import feature_owners
 
     placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
     expect(sum(shape.mesh.triangles.nbytes for _, shape in placed if shape.mesh is not None))
     flat = [(n, shape_mesh(s, source)) for n, s in placed if s.kind not in ROUND_KINDS]
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
-    elements = [(n, shape_elements(s, source)) for n, s in placed]
-    numbers = np.repeat(np.array([n for n, _ in elements], dtype=np.int32), [len(e.elements) for _, e in elements])
     tree = _tree(flat)
     full_tree = _tree(flat + curved) if curved else tree
+    joined, element_body = _bodies(placed, source) if curved else (pack_triangles(tree), tree.body)
     graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
-    corners = full_tree.vertices[full_tree.triangles]
-    center = _middle(corners[np.isin(full_tree.body, graspable)].reshape(-1, 3))
+    center = _middle(_corners(full_tree, np.isin(full_tree.body, graspable)))
+    away = np.linalg.norm(_corners(full_tree, slice(None)) - center, axis=1)
     # With `engine` every mesh became a convex hull, which is closed whatever the mesh was.
     closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
     return PackedObject(
@@ -186,17 +185,34 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
         full_tree=full_tree,
         full_owners=feature_owners(full_tree),
-        bodies=(joined := pack_bodies([join_elements([e for _, e in elements])])),
-        element_body=numbers[joined.source],
+        bodies=joined,
+        element_body=element_body,
         closed=all(closed),
         body_closed=closed,
         body_names=tuple(body.name for body in bodies),
         body_roles=tuple(body.role for body in bodies),
         center=center,
-        radius=float(np.linalg.norm(corners.reshape(-1, 3) - center, axis=1).max(initial=0.0)),
+        radius=float(away.max(initial=0.0)),
         points=part_points(full_tree),
         geometry_hash=hash_bodies(bodies, source),
     )
+
+
+def _bodies(placed: list[tuple[int, Shape]], source: CollisionSource) -> tuple[BodyArrays, NDArray[np.int32]]:
+    """Return shapes, some of them round, as the elements of one body, and which body of the object each is of."""
+    from clench.kernels.bodies import join_elements, pack_bodies
+
+    elements = [shape_elements(shape, source) for _, shape in placed]
+    numbers = np.repeat(np.array([n for n, _ in placed], dtype=np.int32), [len(e.elements) for e in elements])
+    joined = pack_bodies([join_elements(elements)])
+    return joined, numbers[joined.source]
+
+
+def _corners(tree: MeshTree, triangles: NDArray[np.bool_] | slice) -> FloatArray:
+    """Return the vertices that are corners of some triangles [m], shape (N, 3)."""
+    named = np.zeros(len(tree.vertices), dtype=bool)
+    named[tree.triangles[triangles]] = True
+    return tree.vertices[named]
 
 
 def _tree(parts: list[tuple[int, TriangleMesh]]) -> MeshTree:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from clench.base.memory import in_parts
 
 from .slabs import SLAB, node_slabs
 from .tree import MeshTree, build_tree
@@ -72,56 +74,89 @@ def join_elements(parts: Sequence[Elements]) -> Elements:
 
 def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
     """Build the trees of bodies and put them into one set of arrays; the order of the bodies is kept."""
-    rows: list[tuple[np.ndarray, ...]] = []
+    rows, boxes = [_no_columns()], []
     root, vertices, elements, nodes = [], 0, 0, 0
     for body in bodies:
         if not len(body.elements):
             root.append(-1)
+            boxes.append(_NO_BOX)
             continue
         tree = build_tree(body.vertices, body.elements)
-        radius = body.radius[tree.original]
-        ball = _balls(tree.vertices[tree.triangles], radius)
-        begin, end, grown = _spans(tree, radius)
-        node = _node_balls(tree, grown)
-        inner = tree.count == 0
-        rows.append(
-            (
-                tree.vertices,
-                tree.triangles + vertices,
-                _corners(tree.vertices[tree.triangles]),
-                radius,
-                ball,
-                tree.original,
-                node,
-                node_slabs(tree, begin, end, grown),
-                tree.first + elements,
-                tree.count,
-                np.where(inner, tree.right + nodes, -1),
-            )
-        )
+        columns, box = _columns(tree, body.radius[tree.original])
+        right = np.where(columns.count == 0, columns.right + nodes, -1).astype(np.int32)
+        rows.append(columns._replace(elements=columns.elements + vertices, first=columns.first + elements, right=right))
+        boxes.append(box)
         root.append(nodes)
         vertices += len(tree.vertices)
         elements += len(tree.triangles)
         nodes += len(tree.low)
-    shapes = ((0, 3), (0, 3), (0,), (0,), (0, 4), (0,), (0, 4), (0, SLAB), (0,), (0,), (0,))
-    kinds = (float, np.int32, np.int32, float, float, np.int32, float, np.float32, np.int32, np.int32, np.int32)
-    joined = [
-        np.concatenate([np.empty(shape, kind), *(row[k] for row in rows)]).astype(kind)
-        for k, (shape, kind) in enumerate(zip(shapes, kinds, strict=True))
-    ]
-    columns: dict[str, NDArray[Any]] = dict(zip(BodyArrays._fields, joined, strict=False))
-    box = np.array([_box(body) for body in bodies]).reshape(-1, 6)
-    return BodyArrays(**columns, root=np.array(root, dtype=np.int32), box=box)
+    joined = _Columns(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+    return BodyArrays(*joined, np.array(root, dtype=np.int32), np.array(boxes).reshape(-1, 6))
 
 
-def _box(body: Elements) -> Floats:
-    """Return middle and half size of the box around elements, a little too large, shape (6,)."""
-    if not len(body.elements):
-        return np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
-    corners = body.vertices[body.elements]
-    low = (corners - body.radius[:, None, None]).min(axis=(0, 1))
-    high = (corners + body.radius[:, None, None]).max(axis=(0, 1))
-    return np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])
+def pack_triangles(tree: MeshTree) -> BodyArrays:
+    """Return the triangles of a tree as one body, which shares the tree's arrays."""
+    if not len(tree.triangles):
+        return no_body()
+    columns, box = _columns(tree, np.zeros(len(tree.triangles)))
+    return BodyArrays(*columns, np.zeros(1, dtype=np.int32), box[None])
+
+
+class _Columns(NamedTuple):
+    """Hold what `BodyArrays` does, but for roots and boxes."""
+
+    vertices: Floats
+    elements: Ints
+    corners: Ints
+    radius: Floats
+    ball: Floats
+    source: Ints
+    node: Floats
+    slab: NDArray[np.float32]
+    first: Ints
+    count: Ints  # type: ignore[assignment]
+    right: Ints
+
+
+#: Middle and half size of the box around nothing.
+_NO_BOX: Final = np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
+
+
+def _no_columns() -> _Columns:
+    whole = np.empty(0, np.int32)
+    return _Columns(
+        np.empty((0, 3)),
+        np.empty((0, 3), np.int32),
+        whole,
+        np.empty(0),
+        np.empty((0, 4)),
+        whole,
+        np.empty((0, 4)),
+        np.empty((0, SLAB), np.float32),
+        whole,
+        whole,
+        whole,
+    )
+
+
+def _columns(tree: MeshTree, radius: Floats) -> tuple[_Columns, Floats]:
+    """Return one body's columns, and middle and half size of the box around it, a little too large, (6,).
+
+    Args:
+        tree: of its elements. radius: of each of them, in the tree's order [m], (T,).
+    """
+    corners, ball = np.empty(len(radius), dtype=np.int32), np.empty((len(radius), 4))
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for some in in_parts(len(radius)):
+        points, grown = tree.vertices[tree.triangles[some]], radius[some]
+        corners[some], ball[some] = _corners(points), _balls(points, grown)
+        low = np.minimum(low, (points - grown[:, None, None]).min(axis=(0, 1)))
+        high = np.maximum(high, (points + grown[:, None, None]).max(axis=(0, 1)))
+    begin, end, grown = _spans(tree, radius)
+    node, slab = _node_balls(tree, grown), node_slabs(tree, begin, end, grown)
+    mine = (tree.vertices, tree.triangles, corners, radius, ball, tree.original)
+    box = np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])
+    return _Columns(*mine, node, slab, tree.first, tree.count, tree.right), box
 
 
 def no_body() -> BodyArrays:

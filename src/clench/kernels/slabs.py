@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.base.memory import in_parts
+
 from .compiling import inner_kernel, kernel
 from .family_pose import put_point
 from .layout import Floats
@@ -20,8 +22,6 @@ Whole = NDArray[np.int64]
 SLAB: Final = 13
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
 THIN: Final = 0.75
-#: Nodes that boxes are laid around at once, which bounds the memory that it takes.
-AT_ONCE: Final = 16384
 #: More than how far from square the edges of a box are in single precision [-].
 ALMOST: Final = 1.0 + 1e-6
 #: More than rounding to single precision takes from the smallest numbers [m].
@@ -44,8 +44,7 @@ def node_slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats) -> NDArr
     parts = np.column_stack([tree.first, tree.count, tree.right]).astype(np.int64)
     middle = tree.vertices.mean(axis=0)
     measure_spread(tree.vertices - middle, tree.triangles, parts, np.empty((count, 10)), spread)
-    for low in range(0, count, AT_ONCE):
-        some = slice(low, low + AT_ONCE)
+    for some in in_parts(count):
         slab[some] = _slabs(tree, begin[some], end[some], grown[some], spread[some])
     return slab
 

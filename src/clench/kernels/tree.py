@@ -86,17 +86,24 @@ def feature_owners(tree: MeshTree) -> NDArray[np.uint8]:
     Returns:
         a mask per triangle in tree order, shape (T,): bit k for its vertex k, bit 3 + k for its edge from k to k + 1.
     """
-    owners = np.zeros(3 * len(tree.triangles), dtype=np.uint8)
-    bits = np.tile(np.array([1, 2, 4], dtype=np.uint8), len(tree.triangles))
-    vertices = tree.triangles.ravel().astype(np.int64)
-    nexts = np.roll(tree.triangles, -1, axis=1).ravel().astype(np.int64)
-    owned = np.unique(vertices, return_index=True)[1]
-    owners[owned] |= bits[owned]
-    edges = np.minimum(vertices, nexts) * max(len(tree.vertices), 1) + np.maximum(vertices, nexts)
-    owned = np.unique(edges, return_index=True)[1]
-    owners[owned] |= bits[owned] << 3
-    masks: NDArray[np.uint8] = np.bitwise_or.reduce(owners.reshape(-1, 3), axis=1)
+    masks = np.zeros(len(tree.triangles), dtype=np.uint8)
+    vertices = tree.triangles.ravel()
+    first = np.full(len(tree.vertices), -1, dtype=np.int32)
+    # What is assigned last stays: the first triangle that names a vertex.
+    first[vertices[::-1]] = np.arange(len(vertices), dtype=np.int32)[::-1]
+    _own(masks, first[first >= 0], 0)
+    nexts = np.roll(tree.triangles, -1, axis=1).ravel()
+    edges = np.minimum(vertices, nexts) * np.int64(max(len(tree.vertices), 1)) + np.maximum(vertices, nexts)
+    order = np.argsort(edges, kind="stable")
+    edges = edges[order]
+    _own(masks, order[np.concatenate([[True], edges[1:] != edges[:-1]])] if len(order) else order, 3)
     return masks
+
+
+def _own(masks: NDArray[np.uint8], sides: NDArray[np.integer], shift: int) -> None:
+    """Set the bit of each side or corner, which is number `side % 3` of a triangle, shifted by some bits."""
+    for k in range(3):
+        masks[sides[sides % 3 == k] // 3] |= np.uint8(1 << (k + shift))
 
 
 @kernel

@@ -161,7 +161,7 @@ def test_shapes_as_text(text, kind, size):
     ("text", "error", "words"),
     [
         ("cylinder:r=0.03", ObjectError, "'h' is missing; write it like cylinder:r=0.03,h=0.1"),
-        ("cylinder:r=0.03,h=0.1,w=1", ObjectError, "unknown key 'w'; a cylinder has r, h"),
+        ("cylinder:r=0.03,h=0.1,w=1", ObjectError, "unknown key 'w'; expected r, h"),
         ("sphere:r=-1", ObjectError, "r: expected a finite length above 0 m, got -1"),
         ("sphere:r=nan", ObjectError, "r: expected a finite length above 0 m, got nan"),
         ("sphere:r=wide", ObjectError, "r: expected a length in metres, got 'wide'"),

@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clench.base.errors import ObjectError
+from clench.base.memory import expect, in_parts
 from clench.base.pose import FloatArray
 from clench.base.tolerances import LARGEST_LENGTH, SMALLEST_LENGTH
 from clench.models.mesh import IntArray, TriangleMesh
 from clench.models.shapes import Shape
 
-from .topology import components, edge_defects, parted, winding_number, without_flaps
+from .topology import compact, components, edge_defects, parted, winding_number, without_flaps
 
 #: Objects larger than this probably have units of millimetres [m]; smaller than `SMALL`, something else is wrong.
 LARGE: Final = 2.0
@@ -52,14 +53,14 @@ def check_mesh(vertices: ArrayLike, triangles: ArrayLike, name: str) -> CheckedM
     warnings: list[str] = []
     faces = _without_repeats(faces, name, warnings)
     faces, closed = _manifold(faces, len(points), name, warnings)
-    used, index = np.unique(faces, return_inverse=True)
-    points, faces = points[used % len(points)], index.reshape(-1, 3).astype(np.int64)
+    used, faces = compact(faces)
+    points = points[used % len(points)]
     if closed:
         faces, closed = _wound_outwards(points, faces, name, warnings)
     # Slivers with three different corners enclose nothing, so dropping them leaves the surface closed.
     faces = _without_slivers(points, faces, name, warnings)
-    used, index = np.unique(faces, return_inverse=True)
-    return CheckedMesh(TriangleMesh(points[used], index.reshape(-1, 3)), closed, tuple(warnings))
+    used, faces = compact(faces)
+    return CheckedMesh(TriangleMesh(points[used], faces), closed, tuple(warnings))
 
 
 def unit_warnings(vertices: FloatArray, name: str) -> tuple[str, ...]:
@@ -102,6 +103,7 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
             faces = indices.astype(np.int64)
     except (TypeError, ValueError, OverflowError):
         raise ObjectError(f"{name}: expected arrays of numbers for vertices (V, 3) and triangles (T, 3).") from None
+    expect(points.nbytes + faces.nbytes)
     if points.size == 0 or faces.size == 0:
         missing = "vertices" if points.size == 0 else "triangles"
         raise ObjectError(f"{name}: the mesh is empty, it has no {missing}.")
@@ -136,7 +138,12 @@ def _without_repeats(faces: IntArray, name: str, warnings: list[str]) -> IntArra
     if not len(faces):
         raise ObjectError(f"{name}: every triangle is degenerate.")
     start = np.argmin(faces, axis=1)
-    turned = np.take_along_axis(faces, (start[:, None] + np.arange(3)) % 3, axis=1)
+    each, size = np.arange(len(faces)), np.uint64(faces.max() + 1)
+    a, b, c = (faces[each, (start + k) % 3].astype(np.uint64) for k in range(3))
+    # Sums that run over are equal for equal triangles still: where none are equal, no triangle is.
+    if len(np.unique((a * size + b) * size + c)) == len(faces):
+        return faces
+    turned = np.column_stack([a, b, c])
     _, first = np.unique(turned, axis=0, return_index=True)
     if len(first) < len(faces):
         warnings.append(f"{name}: dropped {_count(len(faces) - len(first), 'triangle')} repeating another one.")
@@ -146,16 +153,21 @@ def _without_repeats(faces: IntArray, name: str, warnings: list[str]) -> IntArra
 
 def _without_slivers(points: FloatArray, faces: IntArray, name: str, warnings: list[str]) -> IntArray:
     """Drop triangles without area, whose normal would be noise."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    area2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.max([np.linalg.norm(p - q, axis=1) for p, q in ((b, a), (c, b), (a, c))], axis=0)
-    fine = area2 > DEGENERATE_HEIGHT * longest**2
+    fine = np.concatenate([_have_area(points, faces[some]) for some in in_parts(len(faces))])
     if not fine.any():
         raise ObjectError(f"{name}: every triangle is degenerate.")
     if not fine.all():
         warnings.append(f"{name}: dropped {_count(int(np.count_nonzero(~fine)), 'triangle')} without area.")
     kept: IntArray = faces[fine]
     return kept
+
+
+def _have_area(points: FloatArray, faces: IntArray) -> NDArray[np.bool_]:
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([np.linalg.norm(p - q, axis=1) for p, q in ((b, a), (c, b), (a, c))], axis=0)
+    fine: NDArray[np.bool_] = area2 > DEGENERATE_HEIGHT * longest**2
+    return fine
 
 
 def _manifold(faces: IntArray, vertices: int, name: str, warnings: list[str]) -> tuple[IntArray, bool]:

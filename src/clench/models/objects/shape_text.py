@@ -56,7 +56,7 @@ def parse_shape(text: str) -> Shape:
         if not equals:
             raise ObjectError(f"{text}: expected key=number, got '{part}'; write it like {form.example}.")
         if key not in form.keys:
-            raise ObjectError(f"{text}: unknown key '{key}'; a {kind} has {', '.join(form.keys)}, like {form.example}.")
+            raise ObjectError(f"{text}: unknown key '{key}'; expected {', '.join(form.keys)}, like {form.example}.")
         if key in values:
             raise ObjectError(f"{text}: '{key}' is given twice.")
         values[key] = _length(number, key, text)

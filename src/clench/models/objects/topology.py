@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.mesh import IntArray
+
+#: A table of all vertices pays up to so many for each that is named.
+_FAR_APART: Final = 4
 
 
 class EdgeDefects(NamedTuple):
@@ -25,10 +28,29 @@ class EdgeDefects(NamedTuple):
 
 def edge_defects(faces: IntArray) -> EdgeDefects:
     """Return what is wrong with the edges of triangles, shape (T, 3)."""
-    edge, uses, direction = _edges(faces)
-    balance = np.bincount(edge, weights=direction)
-    twisted = np.count_nonzero((uses == 2) & (balance != 0))
+    # Products of names that are far apart would run over.
+    used, faces = compact(faces)
+    size = len(used)
+    # Sides of one edge stand next to each other, and whether they run upwards is their last bit.
+    sides = np.concatenate([_side_keys(faces[:, i], faces[:, (i + 1) % 3], size) for i in range(3)])
+    sides.sort()
+    edges = sides >> 1
+    first = np.flatnonzero(np.concatenate([[True], edges[1:] != edges[:-1]]))
+    uses = np.diff(first, append=len(sides))
+    pairs = first[uses == 2]
+    twisted = np.count_nonzero(sides[pairs] == sides[pairs + 1])
     return EdgeDefects(int(np.count_nonzero(uses == 1)), int(np.count_nonzero(uses > 2)), int(twisted))
+
+
+def compact(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertices that triangles name, in order, and the triangles by their places among those."""
+    size = int(faces.max()) + 1
+    if size > _FAR_APART * faces.size:
+        used, place = np.unique(faces, return_inverse=True)
+        return used, place.reshape(-1, 3).astype(np.int64)
+    named = np.zeros(size, dtype=bool)
+    named[faces] = True
+    return np.flatnonzero(named), (np.cumsum(named) - 1)[faces]
 
 
 def without_flaps(faces: IntArray) -> IntArray:
@@ -70,6 +92,12 @@ def winding_number(point: FloatArray, points: FloatArray, faces: IntArray) -> fl
     dot = [np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a))]
     denominator = la * lb * lc + dot[0] * lc + dot[1] * la + dot[2] * lb
     return float(np.arctan2(numerator, denominator).sum() / (2.0 * np.pi))
+
+
+def _side_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
+    """Return a number per side, of `size` vertices: twice that of its edge, and 1 more where it runs upwards."""
+    keys: IntArray = 2 * (np.minimum(start, end) * size + np.maximum(start, end)) + (start < end)
+    return keys
 
 
 def _edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray]:
