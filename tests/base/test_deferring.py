@@ -2,10 +2,12 @@
 
 import copy
 import pickle
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from clench.base.deferring import DeferredMapping, DeferredSequence
+from clench.base.deferring import DeferredMapping, DeferredSequence, once
 
 MADE = {"code": "limit", "angles": [0.1, 0.2]}
 
@@ -58,3 +60,21 @@ def test_a_sequence_is_made_once_when_it_is_read():
     assert deferred.is_made
     assert calls == [1]
     assert pickle.loads(pickle.dumps(deferred)) == (3, 1, 2)
+
+
+def test_a_value_is_made_once_for_threads_that_ask_at_once():
+    calls = []
+    value = once(lambda: (calls.append(1), time.sleep(0.05), object())[2])
+    assert calls == []
+    with ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(lambda _: value(), range(16)))
+    assert calls == [1]
+    assert all(each is found[0] for each in found)
+
+
+def test_a_value_that_cannot_be_made_is_tried_again():
+    calls = []
+    value = once(lambda: calls.append(1) or 1 / (len(calls) - 1))
+    with pytest.raises(ZeroDivisionError):
+        value()
+    assert (value(), value(), len(calls)) == (1.0, 1.0, 2)

@@ -1,9 +1,12 @@
-"""Mappings and sequences that are made when they are first read."""
+"""Values, mappings and sequences that are made when they are first read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from threading import Lock
+from typing import Any, ClassVar, TypeVar
+
+Value = TypeVar("Value")
 
 
 class _Deferred:
@@ -59,3 +62,18 @@ class DeferredSequence(_Deferred, Sequence[Any]):
     """A sequence that is made when it is first read; its copies are plain tuples."""
 
     _kind = tuple
+
+
+def once(make: Callable[[], Value]) -> Callable[[], Value]:
+    """Return a function that makes a value when it is first called; threads that call it at once get the same."""
+    made: list[Value] = []
+    lock = Lock()
+
+    def value() -> Value:
+        if not made:
+            with lock:
+                if not made:
+                    made.append(make())
+        return made[0]
+
+    return value

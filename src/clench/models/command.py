@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -86,6 +87,12 @@ class GraspCommand:
             elif isinstance(value, list | tuple) and value:
                 copies[name] = tuple(dict(v) if isinstance(v, Mapping) else v for v in value)
         return replace(self, **copies)
+
+    def at(self, hand_pose: Pose, object_pose: Pose | None) -> GraspCommand:
+        """Return the same command at other poses, sooner than `dataclasses.replace` does."""
+        moved = copy(self)
+        moved.__dict__.update(hand_pose=hand_pose, object_pose=object_pose)
+        return moved
 
     @classmethod
     def from_posture(cls, hand: Hand, q: FloatArray | Mapping[str, float], hand_pose: Pose) -> GraspCommand:

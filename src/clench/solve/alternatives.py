@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from threading import Lock
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from clench.base.deferring import once
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration
 from clench.grasp.candidates import FingerCandidate, read_candidates
@@ -106,16 +106,14 @@ class Alternatives:
     calibration: Calibration
     setting: Setting
     close: Callable[[], Groups]
-    _made: tuple[Groups, HandChoice] | None = field(default=None, init=False)
-    #: Threads that read at once for the first time get the same: the criteria keep what they found in the setting.
-    _lock: Lock = field(default_factory=Lock, init=False)
 
-    def _scored(self) -> tuple[Groups, HandChoice]:
-        with self._lock:
-            if self._made is None:
-                groups = self.close()
-                self._made = groups, choose(groups, self.calibration, self.setting)
-            return self._made
+    def __post_init__(self) -> None:
+        # Threads that read at once get the same: the criteria keep what they found in the setting.
+        self._scored = once(self._score)
+
+    def _score(self) -> tuple[Groups, HandChoice]:
+        groups = self.close()
+        return groups, choose(groups, self.calibration, self.setting)
 
     @property
     def choice(self) -> HandChoice:

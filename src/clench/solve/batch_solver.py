@@ -21,7 +21,7 @@ from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
 from .packing import packed_problem
 from .planning import planned
-from .problem import make_problem, make_setting
+from .problem import check_calibration, make_problem
 from .solution import FingerStatus, GraspSolution
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class BatchSolver:
         if command.orders:
             return None
         calibration = calibration_of(command.criteria)
-        make_setting(problem, calibration)
+        check_calibration(problem.hand, calibration)
         return packed_problem(problem, planned(problem), calibration)
 
     def solve(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
-
 
 class Clock:
     """Time the stages of a solve [s]."""
@@ -22,4 +20,4 @@ class Clock:
 
     def stages(self) -> dict[str, float]:
         """Return the stages, with their total."""
-        return {**self._stages, "total": float(np.sum(list(self._stages.values())))}
+        return {**self._stages, "total": sum(self._stages.values())}

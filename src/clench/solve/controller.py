@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from clench.base.deferring import DeferredMapping
+from clench.base.deferring import DeferredMapping, once
 from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, combined_posture
 from clench.grasp.criteria import Setting
@@ -27,7 +27,7 @@ from .clock import Clock
 from .directly import solve_directly
 from .orders import best_order
 from .planning import Planned, planned
-from .problem import Problem, make_problem, make_setting
+from .problem import Problem, check_calibration, make_problem, make_setting
 from .solution import GraspSolution
 
 if TYPE_CHECKING:
@@ -65,15 +65,17 @@ def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSo
     clock = Clock()
     problem = make_problem(hand, obj, command)
     calibration = calibration_of(command.criteria)
-    setting = make_setting(problem, calibration)
+    check_calibration(hand, calibration)
+    setting = once(partial(make_setting, problem, calibration))
     clock.lap("read")
     in_full = partial(_answer, problem, calibration, setting, clock)
     solution = solve_directly(problem, calibration, setting, in_full, clock)
     return solution or assemble(in_full(), problem, clock.stages())
 
 
-def _answer(problem: Problem, calibration: Calibration, setting: Setting, clock: Clock) -> Answer:
+def _answer(problem: Problem, calibration: Calibration, setting_of: Callable[[], Setting], clock: Clock) -> Answer:
     """Close what is asked for, choose, close again what is in each other's way, and judge it."""
+    setting = setting_of()
     full_width = decided(problem, calibration)
     made = full_width or planned(problem)
     clock.lap("plan")

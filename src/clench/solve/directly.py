@@ -7,13 +7,12 @@ of the kernels' numbers when one of them is first read; what was not chosen, and
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cache, partial
-from threading import Lock
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from clench.base.deferring import DeferredMapping
+from clench.base.deferring import DeferredMapping, once
 from clench.grasp.batch_run import PoseAnswer, solve_pose
 from clench.grasp.calibration import Calibration
 from clench.grasp.candidates import FingerCandidate, read_candidates
@@ -35,15 +34,15 @@ from .solution import GraspSolution, SolutionStatus
 def solve_directly(
     problem: Problem,
     calibration: Calibration,
-    setting: Setting,
+    setting: Callable[[], Setting],
     in_full: Callable[[], Answer],
     clock: Clock,
 ) -> GraspSolution | None:
     """Return the solution where the kernels of a batch give it, and nothing overlaps before anything moves.
 
     Args:
-        problem, calibration, setting: what is asked. in_full: solves it with all alternatives and reasons.
-        clock: of the solve.
+        problem, calibration: what is asked. setting: returns what sets are judged in.
+        in_full: solves it with all alternatives and reasons. clock: of the solve.
     """
     if not is_built_in(calibration.criteria):
         return None
@@ -61,7 +60,7 @@ def solve_directly(
         return None
     command, stages = problem.command, clock.stages()
     return GraspSolution.deferred(
-        _Direct(problem, calibration, setting, made, packed.wanted.whole, answer, in_full, stages).solution,
+        once(_Direct(problem, calibration, setting, made, packed.wanted.whole, answer, in_full, stages).solution),
         status=status,
         joint_angles=dict(zip(problem.hand.joint_names, answer.solved.angles[0].tolist(), strict=True)),
         certified=certified,
@@ -84,37 +83,31 @@ class _Direct:
 
     problem: Problem
     calibration: Calibration
-    setting: Setting
+    setting: Callable[[], Setting]
     complete: Planned
     whole: bool
     answer: PoseAnswer
     in_full: Callable[[], Answer]
     stages: Mapping[str, float]
-    _made: list[GraspSolution] = field(default_factory=list)
-    #: Threads that read at once for the first time get the same.
-    _lock: Lock = field(default_factory=Lock)
 
     def solution(self) -> GraspSolution:
-        """Return the whole solution, made once, but for what is made when that is read."""
-        with self._lock:
-            if not self._made:
-                self._made.append(assemble(self._answer(), self.problem, self.stages))
-            return self._made[0]
+        """Return the whole solution, but for what is made when that is read."""
+        return assemble(self._answer(), self.problem, self.stages)
 
     def _answer(self) -> Answer:
         problem, complete = self.problem, self.complete
         made = (complete.full_width if self.whole else None) or complete
         items, sets = self.answer.solved.chosen[0].tolist(), self._sets(made)
         best, final = [sets[i] for i in items], self.answer.solved.angles[0]
-        score_sets(best, self.calibration.criteria, self.setting)
+        score_sets(best, self.calibration.criteria, self.setting())
         promise = promised(problem) if self.whole else None
         at_start, at_end, certificate = judge(problem, best, final, made.exact, promise)
         if self.whole:
-            full, chosen = cache(self.in_full), complete.plane_counts
+            full, chosen = once(self.in_full), complete.plane_counts
             found, choice = (lambda k: full().sets(k)), DeferredMapping(lambda: full().choice)
         else:
             close = partial(group_by_finger, made.plan, sets)
-            alternatives = Alternatives(problem, self.calibration, self.setting, close)
+            alternatives = Alternatives(problem, self.calibration, self.setting(), close)
             found, choice = alternatives.of_finger, DeferredMapping(partial(alternatives.explained, best, []))
             chosen = made.plan.items.low[items].tolist()
         return Answer(found, chosen, best, final, at_start, at_end, certificate, choice)

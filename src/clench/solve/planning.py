@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, HandError
+from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.grasp.batching import is_covered
 from clench.grasp.closing import HandPlan, make_hand_plan, only_items
@@ -22,6 +23,7 @@ from clench.models.command import GraspCommand
 from clench.models.hand.hand import Finger, Hand
 from clench.models.shapes import CollisionSource
 
+from .checked import CheckedCommand
 from .problem import Problem
 
 if TYPE_CHECKING:
@@ -89,42 +91,48 @@ def planned(problem: Problem) -> Planned:
     Raises:
         HandError: no finger asked for has a closing joint. CommandError: fingers that cannot close in this order.
     """
-    hand, command = problem.hand, problem.command
+    return _planned(problem.checked)
+
+
+@kept_by_identity(KEPT_PLANS)
+def _planned(asked: CheckedCommand) -> Planned:
+    """Return the plan of a command, whatever its poses are."""
+    hand, command = asked.hand, asked.command
     key = (
         id(hand),
-        problem.start.tobytes(),
+        asked.start.tobytes(),
         None if command.fingers is None else tuple(command.fingers),
         command.planes,
         command.rounds != 1,
-        problem.together,
+        asked.together,
         tuple(sorted(command.speeds.items())),
         command.full_width,
         tuple(command.yaw_grid),
         tuple(command.open_variants),
         tuple(command.opposition_grid),
-        problem.source,
+        asked.source,
     )
     kept = _plans.get(key)
     if kept is not None and kept.hand is hand:
         return kept
     plans, finger, posture, idle = [], [], [], []
-    for f, asked in enumerate(asked_fingers(hand, command)):
-        if not closing_joints(hand, asked):
-            idle.append(asked)
+    for f, own in enumerate(asked_fingers(hand, command)):
+        if not closing_joints(hand, own):
+            idle.append(own)
         else:
-            for p, q in enumerate(alternatives(hand, asked, problem.start, command)):
-                plans.append(plan_finger(hand, asked, q, command.planes, problem.source, command.speeds))
+            for p, q in enumerate(alternatives(hand, own, asked.start, command)):
+                plans.append(plan_finger(hand, own, q, command.planes, asked.source, command.speeds))
                 finger.append(f)
                 posture.append(p)
     if not plans:
         raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
     if not command.full_width:
-        _check_planes(plans, command, problem.together)
-    plan = make_hand_plan(plans, finger, posture, command.full_width, problem.together, command.rounds != 1)
-    exact = pack_exact(hand, plan.plans, plan.whole, problem.source)
-    if problem.together:
-        exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, problem.source)))
-    made = _plans[key] = Planned(hand, problem.start, problem.source, plan, exact, tuple(idle))
+        _check_planes(plans, command, asked.together)
+    plan = make_hand_plan(plans, finger, posture, command.full_width, asked.together, command.rounds != 1)
+    exact = pack_exact(hand, plan.plans, plan.whole, asked.source)
+    if asked.together:
+        exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, asked.source)))
+    made = _plans[key] = Planned(hand, asked.start, asked.source, plan, exact, tuple(idle))
     while len(_plans) > KEPT_PLANS:
         _plans.popitem(last=False)
     return made

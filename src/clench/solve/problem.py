@@ -11,13 +11,14 @@ from clench.base.errors import ObjectError, UnknownNameError
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.calibration import Calibration
 from clench.grasp.criteria import Setting
-from clench.grasp.motion import next_postures, open_posture, palm_pose, task_wrenches
+from clench.grasp.motion import next_postures, palm_pose, task_wrenches
 from clench.grasp.scene import PackedObject, pack_object
 from clench.models.command import ClosingOrder, GraspCommand
-from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
+
+from .checked import CheckedCommand, checked
 
 #: More rounds than any finger needs that comes to rest.
 UNTIL_REST = 1000
@@ -28,18 +29,31 @@ class Problem:
     """Hold the three inputs, checked and brought together.
 
     Args:
-        start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
+        checked: the command, wherever hand and object are. command: the same at the poses asked for.
         T_world_palm, T_world_object: poses. packed: the object.
     """
 
-    hand: Hand
+    checked: CheckedCommand
     obj: GraspObject
     command: GraspCommand
-    start: FloatArray
-    source: CollisionSource
     T_world_palm: Pose
     T_world_object: Pose
     packed: PackedObject
+
+    @property
+    def hand(self) -> Hand:
+        """The hand."""
+        return self.checked.hand
+
+    @property
+    def start(self) -> FloatArray:
+        """Posture before closing, shape (J,) [rad]."""
+        return self.checked.start
+
+    @property
+    def source(self) -> CollisionSource:
+        """Geometry of the hand."""
+        return self.checked.source
 
     @property
     def rounds(self) -> int:
@@ -49,44 +63,48 @@ class Problem:
     @property
     def together(self) -> bool:
         """Whether all joints close at once."""
-        return self.command.order != ClosingOrder.PROXIMAL_FIRST
+        return self.checked.together
 
     @cached_property
     def T_palm_object(self) -> FloatArray:
         """Where the object is for the hand, shape (4, 4)."""
         from clench.kernels.frames import relate_poses
 
-        T = np.eye(4)
-        palm, there = (np.array([pose.wxyz_xyz]) for pose in (self.T_world_palm, self.T_world_object))
-        relate_poses(palm, there, T[None, :3])
+        T, rows = np.zeros((4, 4)), np.array([self.T_world_palm.wxyz_xyz, self.T_world_object.wxyz_xyz])
+        T[3, 3] = 1.0
+        relate_poses(rows[:1], rows[1:], T[None, :3])
         return T
 
 
 def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:
     """Check the three inputs and bring them together."""
-    check_command(hand, command)
-    command = command.unshared()
+    asked = checked(hand, command)
     if not any(body.role is BodyRole.GRASPABLE for body in obj.bodies):
         raise ObjectError(f"{obj.name}: no body to grasp; every body is an obstacle.")
-    start = open_posture(hand, command)
-    source = CollisionSource(command.collision_source or hand.default_source)
     T_world_object = command.object_pose if command.object_pose is not None else obj.pose
-    return Problem(hand, obj, command, start, source, palm_pose(hand, command, start), T_world_object, pack_object(obj))
+    T_world_palm = palm_pose(hand, command, asked.start)
+    own = asked.command.at(command.hand_pose, command.object_pose)
+    return Problem(asked, obj, own, T_world_palm, T_world_object, pack_object(obj))
 
 
-def make_setting(problem: Problem, calibration: Calibration) -> Setting:
-    """Return what the criteria judge sets in.
+def check_calibration(hand: Hand, calibration: Calibration) -> None:
+    """Check that a hand has the joints that a calibration weighs.
 
     Raises:
-        UnknownNameError: the calibration weighs a joint that the hand does not have.
+        UnknownNameError: a joint that the hand does not have.
     """
-    hand = problem.hand
-    weights = np.ones(len(hand.joints)) if calibration.joints else None
-    for name, weight in calibration.joints.items():
+    for name in calibration.joints:
         if name not in hand.joint_names:
             raise UnknownNameError(
                 "joint", name, f"hand '{hand.name}', though {calibration.name} names it", hand.joint_names
             )
+
+
+def make_setting(problem: Problem, calibration: Calibration) -> Setting:
+    """Return what the criteria judge sets in; see `check_calibration`."""
+    hand = problem.hand
+    weights = np.ones(len(hand.joints)) if calibration.joints else None
+    for name, weight in calibration.joints.items():
         assert weights is not None
         weights[hand.joint_index(name)] = weight
     return Setting(

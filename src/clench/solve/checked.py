@@ -1,0 +1,91 @@
+"""A command, checked against a hand, and what follows from it wherever hand and object are: made once per content."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from clench.base.pose import FloatArray
+from clench.grasp.motion import open_posture
+from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.command_file import check_command
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+#: Commands that are kept, the latest made.
+_KEPT: Final = 64
+_POSES: Final = ("hand_pose", "object_pose")
+#: Types whose values say all there is to say, and do not change; numbers of these types are told apart by their text.
+_PLAIN: Final = frozenset({str, int, bool, type(None), ClosingOrder, CollisionSource, type(Path())})
+_FLOATS: Final = frozenset({float, np.float64})
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedCommand:
+    """Hold a command that fits a hand.
+
+    Args:
+        command: which no later change of a list or mapping that was given reaches; its poses are those it first had.
+        start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
+    """
+
+    hand: Hand
+    command: GraspCommand
+    start: FloatArray
+    source: CollisionSource
+
+    @property
+    def together(self) -> bool:
+        """Whether all joints close at once."""
+        return self.command.order != ClosingOrder.PROXIMAL_FIRST
+
+
+_kept: OrderedDict[tuple[object, ...], CheckedCommand] = OrderedDict()
+
+
+def checked(hand: Hand, command: GraspCommand) -> CheckedCommand:
+    """Return a command that is checked; the same content at other poses is checked once.
+
+    Raises:
+        UnknownNameError, CommandError: see `check_command`.
+    """
+    try:
+        content = (_content(value) for name, value in command.__dict__.items() if name not in _POSES)
+        key = (id(hand), type(command), *content)
+    except TypeError:
+        return _check(hand, command)
+    found = _kept.get(key)
+    if found is None:
+        found = _kept[key] = _check(hand, command)
+        while len(_kept) > _KEPT:
+            _kept.popitem(last=False)
+    return found
+
+
+def _check(hand: Hand, command: GraspCommand) -> CheckedCommand:
+    check_command(hand, command)
+    own = command.unshared()
+    source = CollisionSource(own.collision_source or hand.default_source)
+    return CheckedCommand(hand, own, open_posture(hand, own), source)
+
+
+def _content(value: Any) -> object:
+    """Return something hashable that is equal for values of the same content and types alone.
+
+    Raises:
+        TypeError: a value of a type that may be more than it says, or change.
+    """
+    kind = type(value)
+    if kind in _PLAIN:
+        return kind, value
+    if kind in _FLOATS:
+        return kind, repr(value)
+    if kind is dict:
+        return kind, *((_content(key), _content(each)) for key, each in value.items())
+    if kind is tuple or kind is list:
+        return kind, *map(_content, value)
+    raise TypeError(f"a {kind.__name__} is no plain value.")
