@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import pickle
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -35,6 +36,23 @@ def test_the_bits_of_fresh_solves() -> None:
     assert answer.joint_angles[0].tolist() == list(fresh.joint_angles.values())
     again = tracker.update()
     np.testing.assert_array_equal(again.joint_angles, answer.joint_angles)
+
+
+@pytest.mark.parametrize("full_width", [True, False])
+def test_contacts_are_those_of_a_batch_whenever_they_are_read(full_width: bool) -> None:
+    command = clench.GraspCommand(hand_pose=START, planes=3, full_width=full_width)
+    tracker = clench.Tracker(HAND, BALL, command, margin=0.0)
+    answers = [tracker.update(object_pose=moved(k)) for k in range(3)]
+    copied = pickle.loads(pickle.dumps(answers[0]))
+    for k, answer in enumerate([*answers, copied]):
+        batch = clench.solve_batch(HAND, BALL, [START], command=command, object_poses=[moved(k % 3)])
+        assert len(batch.contacts.link) > 0
+        for one, other in ((answer, batch), (answer.contacts, batch.contacts)):
+            for f in fields(other):
+                if f.name not in ("question", "contacts"):
+                    np.testing.assert_array_equal(getattr(one, f.name), getattr(other, f.name), err_msg=f.name)
+    with pytest.raises(AttributeError, match="has no attribute 'contact'"):
+        answers[0].contact  # noqa: B018
 
 
 def trembling(k: int) -> Pose:

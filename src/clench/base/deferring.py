@@ -66,14 +66,15 @@ class DeferredSequence(_Deferred, Sequence[Any]):
 
 def once(make: Callable[[], Value]) -> Callable[[], Value]:
     """Return a function that makes a value when it is first called; threads that call it at once get the same."""
-    made: list[Value] = []
-    lock = Lock()
+    waiting, made, lock = [make], list[Value](), Lock()
 
     def value() -> Value:
         if not made:
             with lock:
                 if not made:
-                    made.append(make())
+                    made.append(waiting[0]())
+                    # What it was made of is not needed any more.
+                    waiting.clear()
         return made[0]
 
     return value

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clench.base.deferring import once
 from clench.base.pose import FloatArray, Pose
-from clench.grasp.batch_run import solve_packed
+from clench.grasp.batch_run import solve_packed, solve_pose
 from clench.grasp.batching import PackedProblem
 from clench.grasp.calibration import calibration_of
 from clench.grasp.motion import asked_fingers, palm_pose
@@ -77,13 +79,19 @@ class BatchSolver:
             object_rows = np.repeat(self._start.T_world_object.wxyz_xyz[None], len(hand_rows), axis=0)
         if self.packed is None:
             return self._one_by_one(hand_rows, object_rows, threads)
-        from clench.kernels.frames import relate_poses
-
         palms = self._palms(hand_rows)
-        T_palm_object = np.empty((len(palms), 3, 4))
-        relate_poses(palms, object_rows, T_palm_object)
-        solved = solve_packed(self.packed, T_palm_object, threads, device == CUDA)
-        return self._read(solved, palms, hand_rows, object_rows)
+        solved = solve_packed(self.packed, _related(palms, object_rows), threads, device == CUDA)
+        columns = self._columns(solved, hand_rows, object_rows)
+        return GraspBatch(**columns, contacts=_contacts_of(solved, palms))
+
+    def solve_one(self, hand_pose: Pose, object_pose: Pose) -> GraspBatch:
+        """Return the answer for one pose, by the kernels of a batch; its contacts are made when they are first read."""
+        assert self.packed is not None
+        hand_rows, object_rows = np.array([hand_pose.wxyz_xyz]), np.array([object_pose.wxyz_xyz])
+        palms = self._palms(hand_rows)
+        solved = solve_pose(self.packed, _related(palms, object_rows)[0]).solved
+        columns = self._columns(solved, hand_rows, object_rows)
+        return GraspBatch.deferred(once(partial(_contacts_of, solved, palms)), **columns)
 
     def _palms(self, hand_rows: FloatArray) -> FloatArray:
         """Return the poses of the palm, (N, 7)."""
@@ -94,54 +102,33 @@ class BatchSolver:
         poses = [palm_pose(problem.hand, each, problem.start).wxyz_xyz for each in placed]
         return np.array(poses).reshape(-1, 7)
 
-    def _read(self, solved: Solved, palms: FloatArray, hand_rows: FloatArray, object_rows: FloatArray) -> GraspBatch:
-        """Name what the kernels computed, with contacts in the world."""
-        from clench.base.tolerances import PASSED_GAP
-        from clench.kernels.touches import TOUCH_BODY, TOUCH_GAP, TOUCH_JOINT, TOUCH_LINK, TOUCH_NORMAL, TOUCH_PLANE
-
+    def _columns(self, solved: Solved, hand_rows: FloatArray, object_rows: FloatArray) -> dict[str, Any]:
+        """Name what the kernels computed, but for the contacts."""
         assert self.packed is not None
-        slots = np.arange(solved.number.shape[2])
-        # The hand's own links are no part of the object: no contacts, as in a solution.
-        found = (slots < solved.contacts[:, :, None]) & (solved.number[..., TOUCH_BODY] >= 0)
-        pose, finger, slot = np.nonzero(found)
-        number, value = solved.number[pose, finger, slot], solved.value[pose, finger, slot]
-        R = rotations(palms[pose])
-        contacts = BatchContacts(
-            first=np.concatenate([[0], np.cumsum(found.sum(axis=(1, 2)))]),
-            finger=finger,
-            link=number[:, TOUCH_LINK],
-            body=number[:, TOUCH_BODY],
-            joint=number[:, TOUCH_JOINT],
-            plane=number[:, TOUCH_PLANE],
-            passed=value[:, TOUCH_GAP] > PASSED_GAP,
-            position=np.einsum("cij,cj->ci", R, value[:, :3]) + palms[pose, 4:],
-            normal=np.einsum("cij,cj->ci", R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
-            gap=value[:, TOUCH_GAP],
-        )
         chosen = np.full(solved.chosen.shape, -1) if self.packed.wanted.whole else self.packed.items.low[solved.chosen]
-        idle = np.full((len(palms), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
-        return self._batch(
-            hand_poses=hand_rows,
-            object_poses=object_rows,
-            status_codes=solved.status.astype(np.int8),
-            certified=solved.certified.astype(np.bool_),
-            joint_angles=solved.angles,
-            finger_codes=np.concatenate([solved.fingers, idle], axis=1).astype(np.int8),
-            planes=np.concatenate([chosen, np.full_like(idle, -1)], axis=1).astype(np.int16),
-            contacts=contacts,
-            one_by_one=np.zeros(len(palms), dtype=np.bool_),
-        )
+        idle = np.full((len(hand_rows), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
+        return {
+            **self._names,
+            "hand_poses": hand_rows,
+            "object_poses": object_rows,
+            "status_codes": solved.status.astype(np.int8),
+            "certified": solved.certified.astype(np.bool_),
+            "joint_angles": solved.angles,
+            "finger_codes": np.concatenate([solved.fingers, idle], axis=1).astype(np.int8),
+            "planes": np.concatenate([chosen, np.full_like(idle, -1)], axis=1).astype(np.int16),
+            "one_by_one": np.zeros(len(hand_rows), dtype=np.bool_),
+        }
 
-    def _batch(self, **columns: Any) -> GraspBatch:
+    @cached_property
+    def _names(self) -> dict[str, Any]:
         problem = self._start
-        return GraspBatch(
-            question=self._question,
-            joint_names=problem.hand.joint_names,
-            finger_names=tuple(finger.name for finger in self.fingers),
-            link_names=tuple(link.name for link in problem.hand.links),
-            body_names=problem.packed.body_names,
-            **columns,
-        )
+        return {
+            "question": self._question,
+            "joint_names": problem.hand.joint_names,
+            "finger_names": tuple(finger.name for finger in self.fingers),
+            "link_names": tuple(link.name for link in problem.hand.links),
+            "body_names": problem.packed.body_names,
+        }
 
     def _one_by_one(self, hand_rows: FloatArray, object_rows: FloatArray, threads: int) -> GraspBatch:
         """Solve every pose by itself, and read the solutions."""
@@ -157,7 +144,8 @@ class BatchSolver:
         shape = (len(solutions), len(self.fingers))
         planes = [[-1 if f.best is None else _plane(f.best.plane) for f in row] for row in fingers]
         codes = [[FINGER_STATUSES.index(f.status) for f in row] for row in fingers]
-        return self._batch(
+        return GraspBatch(
+            **self._names,
             hand_poses=hand_rows,
             object_poses=object_rows,
             status_codes=np.array([STATUSES.index(s.status) for s in solutions], dtype=np.int8),
@@ -187,6 +175,44 @@ class BatchSolver:
             normal=np.array([c.normal for c in all_contacts]).reshape(-1, 3),
             gap=np.array([c.gap for c in all_contacts], dtype=np.float64),
         )
+
+
+def _related(palms: FloatArray, object_rows: FloatArray) -> FloatArray:
+    """Return `T_palm_object` of poses of both, (N, 7) each, as (N, 3, 4)."""
+    from clench.kernels.frames import relate_poses
+
+    T_palm_object = np.empty((len(palms), 3, 4))
+    relate_poses(palms, object_rows, T_palm_object)
+    return T_palm_object
+
+
+def _contacts_of(solved: Solved, palms: FloatArray) -> BatchContacts:
+    """Return the contacts that the kernels found in the world.
+
+    Args:
+        solved: for N poses. palms: poses of the palm, (N, 7).
+    """
+    from clench.base.tolerances import PASSED_GAP
+    from clench.kernels.touches import TOUCH_BODY, TOUCH_GAP, TOUCH_JOINT, TOUCH_LINK, TOUCH_NORMAL, TOUCH_PLANE
+
+    slots = np.arange(solved.number.shape[2])
+    # The hand's own links are no part of the object: no contacts, as in a solution.
+    found = (slots < solved.contacts[:, :, None]) & (solved.number[..., TOUCH_BODY] >= 0)
+    pose, finger, slot = np.nonzero(found)
+    number, value = solved.number[pose, finger, slot], solved.value[pose, finger, slot]
+    R = rotations(palms[pose])
+    return BatchContacts(
+        first=np.concatenate([[0], np.cumsum(found.sum(axis=(1, 2)))]),
+        finger=finger,
+        link=number[:, TOUCH_LINK],
+        body=number[:, TOUCH_BODY],
+        joint=number[:, TOUCH_JOINT],
+        plane=number[:, TOUCH_PLANE],
+        passed=value[:, TOUCH_GAP] > PASSED_GAP,
+        position=np.einsum("cij,cj->ci", R, value[:, :3]) + palms[pose, 4:],
+        normal=np.einsum("cij,cj->ci", R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
+        gap=value[:, TOUCH_GAP],
+    )
 
 
 def rotations(rows: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -119,6 +119,24 @@ class GraspBatch:
     planes: NDArray[np.int16]
     contacts: BatchContacts
     one_by_one: NDArray[np.bool_]
+
+    @classmethod
+    def deferred(cls, contacts: Callable[[], BatchContacts], **known: Any) -> GraspBatch:
+        """Return a batch of which everything is known but the contacts, which are made when they are first read."""
+        batch = object.__new__(cls)
+        batch.__dict__.update(known, _contacts=contacts)
+        return batch
+
+    def __getattr__(self, name: str) -> Any:
+        make: Callable[[], BatchContacts] | None = self.__dict__.get("_contacts")
+        if make is None or name != "contacts":
+            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
+        value = self.__dict__[name] = make()
+        return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Be copied and pickled with all fields."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def __len__(self) -> int:
         return len(self.status_codes)

@@ -67,8 +67,7 @@ class Tracker:
                 raise CommandError(f"{key}: expected a clench.Pose, got {type(pose).__name__}.")
         self._hand_pose = hand_pose or self._hand_pose
         self._object_pose = object_pose or self._object_pose
-        hand_rows, object_rows = (np.array([pose.wxyz_xyz]) for pose in (self._hand_pose, self._object_pose))
-        answer = self._solver.solve(hand_rows, object_rows, 1)
+        answer = self._solver.solve_one(self._hand_pose, self._object_pose)
         self._stay(answer)
         return answer
 
