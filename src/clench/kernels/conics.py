@@ -11,7 +11,7 @@ import math
 from clench.base.tolerances import FOOT_FRACTION
 
 from .compiling import inner_kernel
-from .coupled import STEPS, bounds, evaluate, line_on_point, place, safe_step
+from .coupled import STEPS, bounds, cosine_and_sine, evaluate, line_on_point, safe_step
 from .coupled_pairs import side_foot
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning_pairs import note
@@ -22,26 +22,25 @@ RANGE = 1e-9
 
 @inner_kernel
 def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
-    """Return the point of an ellipse with semi-axes a >= b nearest to (t, y), by bisection on the multiplier.
+    """Return the point of an ellipse with semi-axes a >= b nearest to (t, y).
 
     The foot is `(a² t / (m + a² - b²), b² y / m)` for the root m > 0 of `(a t / (m + a² - b²))² + (b y / m)² = 1`.
+    Newton's steps on 1 minus the inverse root of the left side, which is nearly straight, climb to it from below: three
+    or four mostly (Moré and Sorensen, 1983, do so for trust regions).
     """
     u, v = abs(t), abs(y)
-    c = a * a - b * b
-    if v == 0.0 and u * a <= c:
+    c = (a - b) * (a + b)
+    if b * v == 0.0 and u * a <= c:
         x = a * a * u / c if c > 0.0 else a
         return math.copysign(x, t), b * math.sqrt(max(1.0 - (x / a) ** 2, 0.0))
-    low, high = b * v, math.hypot(a * u, b * v)
-    for _ in range(1100):
-        m = 0.5 * (low + high)
-        if m <= low or m >= high:
-            break
+    m = max(b * v, a * u - c)
+    while True:
         p, q = a * u / (m + c), b * v / m
-        if p * p + q * q > 1.0:
-            low = m
-        else:
-            high = m
-    return math.copysign(a * (a * u / (high + c)), t), math.copysign(b * (b * v / high), y)
+        size = math.sqrt(p * p + q * q)
+        more = m + size * size * (size - 1.0) / (p * p / (m + c) + q * q / m)
+        if not more > m:
+            return math.copysign(a * p, t), math.copysign(b * q, y)
+        m = more
 
 
 @inner_kernel
@@ -87,16 +86,16 @@ def sweep_vertex_region(
     least = math.sqrt(2.0 * settled / bound)
     s = 0.0
     for step in range(STEPS):
-        x, z = place(chain, count, s)
+        x, z, fx, fz = 0.0, 0.0, 0.0, 0.0
+        for i in range(count):
+            c, d = cosine_and_sine(chain[i, 0] * s)
+            ex, ez = c * chain[i, 1] - d * chain[i, 2], d * chain[i, 1] + c * chain[i, 2]
+            x, z, fx, fz = x + ex, z + ez, fx - chain[i, 0] * ez, fz + chain[i, 0] * ex
         value, nx, nz, _, _ = region_gap(e, x, z)
         value -= w
         if step == 0 and (value > speed * best or value < -touch):
             return best
-        slope = 0.0
-        for i in range(count):
-            c, d = math.cos(chain[i, 0] * s), math.sin(chain[i, 0] * s)
-            ex, ez = c * chain[i, 1] - d * chain[i, 2], d * chain[i, 1] + c * chain[i, 2]
-            slope += chain[i, 0] * (nz * ex - nx * ez)
+        slope = nx * fx + nz * fz
         if value <= settled and (value < -touch or slope < -1e-9 * bound):
             return s
         s += max(safe_step(max(value, 0.0), slope, bound), least if value <= settled else 0.0)
@@ -122,20 +121,23 @@ def turn_into(angle: float, low: float, high: float) -> float:
 
 
 @inner_kernel
-def turn_to_curve(e: Floats, nx: float, nz: float, sense: float) -> float:
+def curve_range(e: Floats) -> tuple[float, float]:
+    """Return the range of angles of the normals of a region's curve between two caps, on the side of positive ones."""
+    a, b = e[4], e[5]
+    first = math.atan2(math.sqrt(max(1.0 - (e[7] / a) ** 2, 0.0)) / b, e[7] / (a * a)) - RANGE
+    return first, math.atan2(math.sqrt(max(1.0 - (e[6] / a) ** 2, 0.0)) / b, e[6] / (a * a)) + RANGE
+
+
+@inner_kernel
+def turn_to_curve(e: Floats, first: float, last: float, nx: float, nz: float, sense: float) -> float:
     """Return how far a side with normal n turns until the curved part of a region has a tangent along it.
 
     Between two caps the normals of the curve are in two ranges, narrow ones where the ellipse is long: elsewhere a side
     meets the corners, and the support of the whole ellipse would only tell of what is not there.
 
     Args:
-        sense: of the turn, 1 from x to z.
+        first, last: see `curve_range`. sense: of the turn, 1 from x to z.
     """
-    a, b = e[4], e[5]
-    if e[6] <= -a and e[7] >= a:
-        return 0.0
-    first = math.atan2(math.sqrt(max(1.0 - (e[7] / a) ** 2, 0.0)) / b, e[7] / (a * a)) - RANGE
-    last = math.atan2(math.sqrt(max(1.0 - (e[6] / a) ** 2, 0.0)) / b, e[6] / (a * a)) + RANGE
     angle = sense * math.atan2(nx * e[3] - nz * e[2], -nx * e[2] - nz * e[3])
     # Either range is the other one's mirror image.
     turn = min(turn_into(angle, first, last), turn_into(angle, -last, -first))
@@ -164,11 +166,14 @@ def sweep_side_region(
     bound += rate * rate * e[4] * e[4] / e[5]
     settled, least = 1e-3 * touch, math.sqrt(2e-3 * touch / bound)
     slack = FOOT_FRACTION * (tb - ta)
-    s, sign = 0.0, 0.0
+    s, sign, first, last = 0.0, 0.0, 0.0, 0.0
+    capped = e[6] > -e[4] or e[7] < e[4]
+    if capped:
+        first, last = curve_range(e)
     for _ in range(STEPS):
-        c, d = math.cos(rate * s), math.sin(rate * s)
+        c, d = cosine_and_sine(rate * s)
         mx, mz = c * nx - d * nz, d * nx + c * nz
-        turn = turn_to_curve(e, mx, mz, math.copysign(1.0, rate))
+        turn = turn_to_curve(e, first, last, mx, mz, math.copysign(1.0, rate)) if capped else 0.0
         if turn > 0.0:
             if turn >= abs(rate) * (best - s):
                 return best
