@@ -16,6 +16,8 @@ from .coupled_pairs import side_foot
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning_pairs import note
 
+#: Inverses of products below this run over [m^2]; a point with such a height is on the axis.
+NOTHING = 1e-290
 #: The range of a curve's normals is taken to be wider by this [rad].
 RANGE = 1e-9
 
@@ -30,7 +32,7 @@ def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
     """
     u, v = abs(t), abs(y)
     c = (a - b) * (a + b)
-    if b * v == 0.0 and u * a <= c:
+    if b * v < NOTHING and u * a <= c:
         x = a * a * u / c if c > 0.0 else a
         return math.copysign(x, t), b * math.sqrt(max(1.0 - (x / a) ** 2, 0.0))
     m = max(b * v, a * u - c)
