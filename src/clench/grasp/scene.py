@@ -31,7 +31,7 @@ TESSELLATION_DEVIATION: Final = 2e-5
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
 _KEPT_HANDS: Final = 16
-#: Objects that stay packed: one of a million triangles takes a gigabyte.
+#: Objects that stay packed: one of a million triangles takes a fifth of a gigabyte.
 KEPT_OBJECTS: Final = 8
 ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
 #: Number of each kind of round shape in `RoundShapes.kind`.

@@ -74,73 +74,59 @@ def join_elements(parts: Sequence[Elements]) -> Elements:
 
 def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
     """Build the trees of bodies and put them into one set of arrays; the order of the bodies is kept."""
-    rows, boxes = [_no_columns()], []
-    root, vertices, elements, nodes = [], 0, 0, 0
+    parts, vertices, elements, nodes = [_nothing(0)], 0, 0, 0
     for body in bodies:
-        if not len(body.elements):
-            root.append(-1)
-            boxes.append(_NO_BOX)
-            continue
-        tree = build_tree(body.vertices, body.elements)
-        columns, box = _columns(tree, body.radius[tree.original])
-        right = np.where(columns.count == 0, columns.right + nodes, -1).astype(np.int32)
-        rows.append(columns._replace(elements=columns.elements + vertices, first=columns.first + elements, right=right))
-        boxes.append(box)
-        root.append(nodes)
-        vertices += len(tree.vertices)
-        elements += len(tree.triangles)
-        nodes += len(tree.low)
-    joined = _Columns(*(np.concatenate(column) for column in zip(*rows, strict=True)))
-    return BodyArrays(*joined, np.array(root, dtype=np.int32), np.array(boxes).reshape(-1, 6))
+        part = _nothing(1)
+        if len(body.elements):
+            tree = build_tree(body.vertices, body.elements)
+            part = _body(tree, body.radius[tree.original])
+        inner = part.count == 0
+        parts.append(
+            part._replace(
+                elements=part.elements + vertices,
+                first=part.first + elements,
+                right=np.where(inner, part.right + nodes, -1).astype(np.int32),
+                root=np.where(part.root >= 0, part.root + nodes, -1).astype(np.int32),
+            )
+        )
+        vertices += len(part.vertices)
+        elements += len(part.elements)
+        nodes += len(part.node)
+    return BodyArrays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def pack_triangles(tree: MeshTree) -> BodyArrays:
     """Return the triangles of a tree as one body, which shares the tree's arrays."""
-    if not len(tree.triangles):
-        return no_body()
-    columns, box = _columns(tree, np.zeros(len(tree.triangles)))
-    return BodyArrays(*columns, np.zeros(1, dtype=np.int32), box[None])
+    return _body(tree, np.zeros(len(tree.triangles))) if len(tree.triangles) else no_body()
 
 
-class _Columns(NamedTuple):
-    """Hold what `BodyArrays` does, but for roots and boxes."""
-
-    vertices: Floats
-    elements: Ints
-    corners: Ints
-    radius: Floats
-    ball: Floats
-    source: Ints
-    node: Floats
-    slab: NDArray[np.float32]
-    first: Ints
-    count: Ints  # type: ignore[assignment]
-    right: Ints
+def no_body() -> BodyArrays:
+    """Return one body without elements."""
+    return _nothing(1)
 
 
-#: Middle and half size of the box around nothing.
-_NO_BOX: Final = np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
-
-
-def _no_columns() -> _Columns:
-    whole = np.empty(0, np.int32)
-    return _Columns(
-        np.empty((0, 3)),
-        np.empty((0, 3), np.int32),
-        whole,
-        np.empty(0),
-        np.empty((0, 4)),
-        whole,
-        np.empty((0, 4)),
-        np.empty((0, SLAB), np.float32),
-        whole,
-        whole,
-        whole,
+def _nothing(bodies: int) -> BodyArrays:
+    """Return so many bodies without elements."""
+    whole, box = np.empty(0, np.int32), np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
+    return BodyArrays(
+        vertices=np.empty((0, 3)),
+        elements=np.empty((0, 3), np.int32),
+        corners=whole,
+        radius=np.empty(0),
+        ball=np.empty((0, 4)),
+        source=whole,
+        node=np.empty((0, 4)),
+        slab=np.empty((0, SLAB), np.float32),
+        first=whole,
+        count=whole,
+        right=whole,
+        root=np.full(bodies, -1, np.int32),
+        box=np.tile(box, (bodies, 1)),
     )
 
 
-def _columns(tree: MeshTree, radius: Floats) -> tuple[_Columns, Floats]:
-    """Return one body's columns, and middle and half size of the box around it, a little too large, (6,).
+def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
+    """Return one body.
 
     Args:
         tree: of its elements. radius: of each of them, in the tree's order [m], (T,).
@@ -153,15 +139,21 @@ def _columns(tree: MeshTree, radius: Floats) -> tuple[_Columns, Floats]:
         low = np.minimum(low, (points - grown[:, None, None]).min(axis=(0, 1)))
         high = np.maximum(high, (points + grown[:, None, None]).max(axis=(0, 1)))
     begin, end, grown = _spans(tree, radius)
-    node, slab = _node_balls(tree, grown), node_slabs(tree, begin, end, grown)
-    mine = (tree.vertices, tree.triangles, corners, radius, ball, tree.original)
-    box = np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])
-    return _Columns(*mine, node, slab, tree.first, tree.count, tree.right), box
-
-
-def no_body() -> BodyArrays:
-    """Return one body without elements."""
-    return pack_bodies([join_elements([])])
+    return BodyArrays(
+        vertices=tree.vertices,
+        elements=tree.triangles,
+        corners=corners,
+        radius=radius,
+        ball=ball,
+        source=tree.original,
+        node=_node_balls(tree, grown),
+        slab=node_slabs(tree, begin, end, grown),
+        first=tree.first,
+        count=tree.count,
+        right=tree.right,
+        root=np.zeros(1, dtype=np.int32),
+        box=np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])[None],
+    )
 
 
 def _corners(points: Floats) -> Ints:
