@@ -59,6 +59,7 @@ def test_the_centre_of_a_circle_has_a_foot():
     assert math.hypot(*ellipse_foot(0.3, 0.3, 0.0, 0.0)) == pytest.approx(0.3)
     assert math.hypot(*ellipse_foot(0.3, 0.3, 0.0, 1e-80)) == pytest.approx(0.3)
     assert math.hypot(*ellipse_foot(0.3, 0.2, 0.0, 0.0)) == pytest.approx(0.2)
+    assert math.hypot(*ellipse_foot(0.3, 0.3, 1e-310, 1e-310)) == pytest.approx(0.3)
 
 
 @settings(max_examples=40, deadline=None)

@@ -91,6 +91,11 @@ def test_a_name_without_an_ending_is_a_preset(tmp_path):
             {"index_yaw": float("nan")},
             "preshape.index_yaw: expected a number in rad that is finite, got nan",
         ),
+        (
+            "preshape",
+            {"index_yaw": 10**400},
+            "preshape.index_yaw: expected a number in rad that is finite, got 1000000",
+        ),
         ("preshape", [0.1], "preshape: expected an object"),
         ("hand_pose", {"position": [0, 0]}, "hand_pose.position: expected 3 numbers"),
         ("hand_pose", {"position": [0, 0, float("inf")]}, "hand_pose.position: expected finite numbers"),

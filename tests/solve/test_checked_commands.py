@@ -65,6 +65,32 @@ def test_a_change_of_what_was_given_is_seen_and_reaches_nothing_that_was_kept():
         checked(HAND, command)
 
 
+def test_a_change_deep_inside_reaches_nothing_that_was_kept():
+    force = [0.0, 0.0, -2.0]
+    first = checked(HAND, GraspCommand(HERE, task_wrenches=({"force": force},)))
+    force[2] = -20.0
+    assert checked(HAND, GraspCommand(HERE, task_wrenches=({"force": [0.0, 0.0, -2.0]},))) is first
+    assert first.command.task_wrenches == ({"force": (0.0, 0.0, -2.0)},)
+
+
+@pytest.mark.parametrize("key", ["yaw_grid", "fingers", "task_wrenches", "next_steps"])
+def test_a_list_that_contains_itself_is_refused(key):
+    endless = []
+    endless.append(endless)
+    with pytest.raises(ClenchError, match=key):
+        checked(HAND, GraspCommand(HERE, **{key: endless}))
+
+
+def test_criteria_that_write_to_what_they_are_given_change_no_later_solve():
+    from clench.grasp.calibration import calibration_of
+    from clench.solve.problem import make_problem, make_setting
+
+    problem = make_problem(HAND, clench.GraspObject.load("ball"), GraspCommand(HERE))
+    before = problem.start.copy()
+    make_setting(problem, calibration_of(None)).start[:] = 7.0
+    assert np.array_equal(problem.start, before)
+
+
 def test_zeros_of_either_sign_are_told_apart():
     signs = [
         checked(HAND, GraspCommand(HERE, preshape={JOINT: zero})).start[HAND.joint_index(JOINT)] for zero in (0.0, -0.0)
@@ -81,9 +107,11 @@ def test_values_that_may_change_unseen_are_checked_every_time():
 
 
 def test_few_are_kept():
+    again = checked(HAND, GraspCommand(HERE, seed=77))
     for planes in range(1, 100):
         checked(HAND, GraspCommand(HERE, planes=planes))
-    assert len(module._kept) <= 64
+        assert checked(HAND, GraspCommand(HERE, seed=77)) is again
+    assert len(module._kept) == 64
 
 
 def test_a_solution_has_the_poses_of_its_own_command():

@@ -44,6 +44,9 @@ def test_contacts_are_those_of_a_batch_whenever_they_are_read(full_width: bool) 
     tracker = clench.Tracker(HAND, BALL, command, margin=0.0)
     answers = [tracker.update(object_pose=moved(k)) for k in range(3)]
     copied = pickle.loads(pickle.dumps(answers[0]))
+    later = tracker.update(object_pose=moved(0))
+    later.hand_poses[0, 4:] += 1.0
+    np.testing.assert_array_equal(later.contacts.position, copied.contacts.position)
     for k, answer in enumerate([*answers, copied]):
         batch = clench.solve_batch(HAND, BALL, [START], command=command, object_poses=[moved(k % 3)])
         assert len(batch.contacts.link) > 0

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
 from clench.base.files import read_text
+from clench.base.numbers import is_finite_number
 from clench.models.hand.hand import Hand
 
 #: Units of a controller by name: how many of them one radian is.
@@ -161,7 +162,7 @@ class _Numbers:
         if name not in self.table:
             return None
         value = self.table[name]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if not is_finite_number(value):
             raise FileError(self.source, f"{self.key}.{name}: expected a finite number, got {value!r}.")
         return float(value)
 

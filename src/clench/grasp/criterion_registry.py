@@ -203,7 +203,7 @@ def checked_value(criterion: Criterion | HandCriterion, value: float) -> float:
     """
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
         raise CommandError(f"criterion '{criterion.name}': gave {value!r}; expected a finite number or None.")

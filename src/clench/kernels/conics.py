@@ -16,7 +16,7 @@ from .coupled_pairs import side_foot
 from .layout import KIND_SIDE, Floats, Ints, Outline
 from .turning_pairs import note
 
-#: Inverses of products below this run over [m^2]; a point with such a height is on the axis.
+#: Inverses of products below this run over [m^2]: such a point is on the axis.
 NOTHING = 1e-290
 #: The range of a curve's normals is taken to be wider by this [rad].
 RANGE = 1e-9
@@ -32,7 +32,7 @@ def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
     """
     u, v = abs(t), abs(y)
     c = (a - b) * (a + b)
-    if b * v < NOTHING and u * a <= c:
+    if b * v < NOTHING and u * a <= c + NOTHING:
         x = a * a * u / c if c > 0.0 else a
         return math.copysign(x, t), b * math.sqrt(max(1.0 - (x / a) ** 2, 0.0))
     m = max(b * v, a * u - c)
@@ -49,7 +49,8 @@ def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
 def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, float, float]:
     """Return the distance of a point to an ellipse between its caps, the outward normal and the foot (x, z).
 
-    Inside the region the distance is negative, not more than the true depth.
+    Inside the region the distance is negative, not more than the true depth. Beyond a cap, but inside the whole
+    ellipse, it is that to the curve: caps are segments of their own.
     """
     dx, dz = px - e[0], pz - e[1]
     ux, uz, a, b, low, high = e[2], e[3], e[4], e[5], e[6], e[7]

@@ -80,13 +80,7 @@ class GraspCommand:
 
     def unshared(self) -> GraspCommand:
         """Return the same command, which no later change of a list or mapping that was given reaches."""
-        copies: dict[str, Any] = {}
-        for name, value in self.__dict__.items():
-            if isinstance(value, Mapping):
-                copies[name] = dict(value)
-            elif isinstance(value, list | tuple) and value:
-                copies[name] = tuple(dict(v) if isinstance(v, Mapping) else v for v in value)
-        return replace(self, **copies)
+        return replace(self, **{name: _own(value) for name, value in self.__dict__.items()})
 
     def at(self, hand_pose: Pose, object_pose: Pose | None) -> GraspCommand:
         """Return the same command at other poses, sooner than `dataclasses.replace` does."""
@@ -108,3 +102,10 @@ class GraspCommand:
         from .decomposition import command_from_posture
 
         return command_from_posture(hand, q, hand_pose)
+
+
+def _own(value: Any) -> Any:
+    """Return a value that shares no list or mapping with another one."""
+    if isinstance(value, Mapping):
+        return {name: _own(each) for name, each in value.items()}
+    return tuple(map(_own, value)) if isinstance(value, list | tuple) else value

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import difflib
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from numbers import Integral, Real
@@ -16,6 +15,7 @@ from typing import Any, Final, TypeVar
 
 from clench.base.errors import CommandError, FileError
 from clench.base.files import expanded, read_file
+from clench.base.numbers import is_finite_number
 from clench.base.pose import Pose
 
 from .command import ClosingOrder, GraspCommand
@@ -251,8 +251,8 @@ def _numbers(value: Any, key: str, what: str) -> tuple[float, ...]:
 def _number(value: Any, key: str, what: str) -> float:
     if not _is_number(value):
         raise CommandError(f"{key}: expected {what}, got {_shown(value)}.")
-    if not math.isfinite(value):
-        raise CommandError(f"{key}: expected {what} that is finite, got {value}.")
+    if not is_finite_number(value):
+        raise CommandError(f"{key}: expected {what} that is finite, got {_shown(value)}.")
     return float(value)
 
 

@@ -88,7 +88,8 @@ class BatchSolver:
         """Return the answer for one pose, by the kernels of a batch; its contacts are made when they are first read."""
         assert self.packed is not None
         hand_rows, object_rows = np.array([hand_pose.wxyz_xyz]), np.array([object_pose.wxyz_xyz])
-        palms = self._palms(hand_rows)
+        # What is read later does not follow what is done to the answer.
+        palms = self._palms(hand_rows).copy()
         solved = solve_pose(self.packed, _related(palms, object_rows)[0]).solved
         columns = self._columns(solved, hand_rows, object_rows)
         return GraspBatch.deferred(once(partial(_contacts_of, solved, palms)), **columns)

@@ -16,7 +16,7 @@ from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
-#: Commands that are kept, the latest made.
+#: Commands that are kept, those asked for last.
 _KEPT: Final = 64
 _POSES: Final = ("hand_pose", "object_pose")
 #: Types whose values say all there is to say, and do not change; numbers of these types are told apart by their text.
@@ -54,15 +54,14 @@ def checked(hand: Hand, command: GraspCommand) -> CheckedCommand:
         UnknownNameError, CommandError: see `check_command`.
     """
     try:
-        content = (_content(value) for name, value in command.__dict__.items() if name not in _POSES)
+        content = ((name, _content(value)) for name, value in command.__dict__.items() if name not in _POSES)
         key = (id(hand), type(command), *content)
-    except TypeError:
+    except (TypeError, RecursionError):
         return _check(hand, command)
-    found = _kept.get(key)
-    if found is None:
-        found = _kept[key] = _check(hand, command)
-        while len(_kept) > _KEPT:
-            _kept.popitem(last=False)
+    found = _kept.pop(key, None) or _check(hand, command)
+    _kept[key] = found
+    while len(_kept) > _KEPT:
+        _kept.popitem(last=False)
     return found
 
 

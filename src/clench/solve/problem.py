@@ -109,7 +109,7 @@ def make_setting(problem: Problem, calibration: Calibration) -> Setting:
         weights[hand.joint_index(name)] = weight
     return Setting(
         hand,
-        problem.start,
+        problem.start.copy(),  # criteria of others may write to it
         problem.packed,
         problem.T_palm_object,
         problem.source,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from clench.base.errors import CommandError, FileError
 from clench.base.json_files import write_atomically
+from clench.base.numbers import is_finite_number
 from clench.base.pose import Pose
 from clench.solve.solution import GraspSolution
 
@@ -89,7 +89,7 @@ def _posture(name: str, grasp: Any, source: str) -> GraspPosture:
     except CommandError as error:
         raise FileError(source, str(error)) from None
     confidence = grasp.get("confidence")
-    if confidence is not None and not _is_number(confidence):
+    if confidence is not None and not is_finite_number(confidence):
         raise FileError(source, f"{key}.confidence: expected a number, got {confidence!r}.")
     return GraspPosture(name, pose, joint_angles=_angles(grasp, key, source), confidence=confidence)
 
@@ -99,10 +99,6 @@ def _angles(grasp: Mapping[str, Any], key: str, source: str) -> dict[str, float]
     if not isinstance(angles, dict):
         raise FileError(source, f"{key}.cspace_position: expected angles by joint, got {angles!r}.")
     for joint, angle in angles.items():
-        if not _is_number(angle):
+        if not is_finite_number(angle):
             raise FileError(source, f"{key}.cspace_position.{joint}: expected a finite number in rad, got {angle!r}.")
     return {str(joint): float(angle) for joint, angle in angles.items()}
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -11,6 +11,7 @@ from typing import Any
 
 from clench.base.errors import FileError, HandError
 from clench.base.files import read_text
+from clench.base.numbers import is_finite_number
 from clench.models.shapes import CollisionSource
 
 from .hand import JointRole
@@ -143,7 +144,7 @@ def _limits(table: _Table) -> tuple[float, float] | None:
     value = table.data.get("limits")
     if "limits" not in table.data:
         return None
-    if not (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)) and value[0] <= value[1]):
+    if not (isinstance(value, list) and len(value) == 2 and all(map(is_finite_number, value)) and value[0] <= value[1]):
         raise table.error("limits", "two angles, the lower one first [rad]", value)
     return float(value[0]), float(value[1])
 
@@ -178,7 +179,9 @@ def _tendons(top: _Table) -> TendonMap | None:
     rows = table.data.get("moment_arms")
     width = len(rows[0]) if isinstance(rows, list) and rows and isinstance(rows[0], list) else 0
     ok = isinstance(rows, list) and len(rows) == len(joints) > 0 and width > 0
-    if not ok or not all(isinstance(r, list) and len(r) == width and all(_is_number(x) for x in r) for r in rows or []):
+    if not ok or not all(
+        isinstance(r, list) and len(r) == width and all(is_finite_number(x) for x in r) for r in rows or []
+    ):
         raise table.error("moment_arms", f"{len(joints)} rows (one a joint) of equally many numbers [m]", rows)
     low, high = (_tensions(table, key, missing, width) for key, missing in (("t_min", 0.0), ("t_max", math.inf)))
     arms = tuple(tuple(float(x) for x in row) for row in rows or [])
@@ -191,9 +194,9 @@ def _tendons(top: _Table) -> TendonMap | None:
 def _tensions(table: _Table, key: str, missing: float, count: int) -> tuple[float, ...]:
     """Return one number for every tendon: those of a list, or the same for all."""
     value = table.data.get(key, missing)
-    if isinstance(value, list) and len(value) == count and all(_is_number(v) for v in value):
+    if isinstance(value, list) and len(value) == count and all(map(is_finite_number, value)):
         return tuple(float(v) for v in value)
-    if key in table.data and not _is_number(value):
+    if key in table.data and not is_finite_number(value):
         raise table.error(key, f"a finite number, or a list of {count} (one a tendon) [N]", value)
     return (float(value),) * count
 
@@ -241,7 +244,7 @@ class _Table:
         return None if value is None else tuple(value)
 
     def number(self, name: str) -> float | None:
-        value = self._typed(name, "a finite number", _is_number)
+        value = self._typed(name, "a finite number", is_finite_number)
         return None if value is None else float(value)
 
     def choice(self, name: str, allowed: list[str]) -> str | None:
@@ -255,7 +258,3 @@ class _Table:
         if name in self.data and not check(value):
             raise self.error(name, expected, value)
         return value
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -28,11 +28,8 @@ class EdgeDefects(NamedTuple):
 
 def edge_defects(faces: IntArray) -> EdgeDefects:
     """Return what is wrong with the edges of triangles, shape (T, 3)."""
-    # Products of names that are far apart would run over.
-    used, faces = compact(faces)
-    size = len(used)
-    # Sides of one edge stand next to each other, and whether they run upwards is their last bit.
-    sides = np.concatenate([_side_keys(faces[:, i], faces[:, (i + 1) % 3], size) for i in range(3)])
+    # Products of names that are far apart would run over. Sides of one edge stand next to each other.
+    sides = _sides(compact(faces)[1])
     sides.sort()
     edges = sides >> 1
     first = np.flatnonzero(np.concatenate([[True], edges[1:] != edges[:-1]]))
@@ -71,7 +68,7 @@ def parted(faces: IntArray, vertices: int) -> IntArray:
     Returns:
         Triangles whose index `i` stands for vertex `i % vertices`.
     """
-    edge, uses, _ = _edges(faces)
+    edge, uses = _edges(faces)
     sides = np.argsort(edge, kind="stable")
     pairs = sides[uses[edge[sides]] == 2].reshape(-1, 2) % len(faces)
     return faces + vertices * _connected(pairs, len(faces))[:, None]
@@ -94,18 +91,19 @@ def winding_number(point: FloatArray, points: FloatArray, faces: IntArray) -> fl
     return float(np.arctan2(numerator, denominator).sum() / (2.0 * np.pi))
 
 
-def _side_keys(start: IntArray, end: IntArray, size: int) -> IntArray:
-    """Return a number per side, of `size` vertices: twice that of its edge, and 1 more where it runs upwards."""
-    keys: IntArray = 2 * (np.minimum(start, end) * size + np.maximum(start, end)) + (start < end)
-    return keys
+def _sides(faces: IntArray) -> IntArray:
+    """Return a number for each of the 3 T sides: twice that of its edge, and 1 more where it runs upwards."""
+    size, keys = int(faces.max()) + 1, []
+    for i in range(3):
+        start, end = faces[:, i], faces[:, (i + 1) % 3]
+        keys.append(2 * (np.minimum(start, end) * size + np.maximum(start, end)) + (start < end))
+    return np.concatenate(keys)
 
 
-def _edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the edge of each of the 3 T sides, how often each edge is used, and the direction of each side, ±1."""
-    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    low, high = directed.min(axis=1), directed.max(axis=1)
-    _, edge, uses = np.unique(low * (int(high.max()) + 1) + high, return_inverse=True, return_counts=True)
-    return edge.ravel(), uses, np.where(directed[:, 0] < directed[:, 1], 1, -1)
+def _edges(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the edge of each of the 3 T sides, first sides first, and how often each edge is used."""
+    _, edge, uses = np.unique(_sides(faces) >> 1, return_inverse=True, return_counts=True)
+    return edge.ravel(), uses
 
 
 def _connected(pairs: IntArray, count: int) -> IntArray:
