@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from threading import Lock
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 Value = TypeVar("Value")
 
@@ -62,6 +62,35 @@ class DeferredSequence(_Deferred, Sequence[Any]):
     """A sequence that is made when it is first read; its copies are plain tuples."""
 
     _kind = tuple
+
+
+class LateFields:
+    """A dataclass some of whose fields are made when they are first read; copies and pickles have them all."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @classmethod
+    def with_late(cls, make: Callable[[str], Any], **known: Any) -> Self:
+        """Return an instance of which some fields are known.
+
+        Args:
+            make: returns the field of that name, always the same. known: at least the fields with a default value,
+                which would else be read in their place.
+        """
+        instance = object.__new__(cls)
+        instance.__dict__.update(known, _make_field=make)
+        return instance
+
+    def __getattr__(self, name: str) -> Any:
+        make: Callable[[str], Any] | None = self.__dict__.get("_make_field")
+        if make is None or name not in self.__dataclass_fields__:
+            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
+        value = self.__dict__[name] = make(name)
+        return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all fields, and nothing of how they are made."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 def once(make: Callable[[], Value]) -> Callable[[], Value]:

@@ -92,7 +92,8 @@ class BatchSolver:
         palms = self._palms(hand_rows).copy()
         solved = solve_pose(self.packed, _related(palms, object_rows)[0]).solved
         columns = self._columns(solved, hand_rows, object_rows)
-        return GraspBatch.deferred(once(partial(_contacts_of, solved, palms)), **columns)
+        contacts = once(partial(_contacts_of, solved, palms))
+        return GraspBatch.with_late(lambda _: contacts(), **columns)
 
     def _palms(self, hand_rows: FloatArray) -> FloatArray:
         """Return the poses of the palm, (N, 7)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.base.deferring import LateFields
 from clench.base.errors import CommandError
 from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray, Pose
@@ -91,7 +92,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class GraspBatch:
+class GraspBatch(LateFields):
     """Hold the answers of `clench.solve_batch` for N poses; F fingers, J joints.
 
     Args:
@@ -119,24 +120,6 @@ class GraspBatch:
     planes: NDArray[np.int16]
     contacts: BatchContacts
     one_by_one: NDArray[np.bool_]
-
-    @classmethod
-    def deferred(cls, contacts: Callable[[], BatchContacts], **known: Any) -> GraspBatch:
-        """Return a batch of which everything is known but the contacts, which are made when they are first read."""
-        batch = object.__new__(cls)
-        batch.__dict__.update(known, _contacts=contacts)
-        return batch
-
-    def __getattr__(self, name: str) -> Any:
-        make: Callable[[], BatchContacts] | None = self.__dict__.get("_contacts")
-        if make is None or name != "contacts":
-            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
-        value = self.__dict__[name] = make()
-        return value
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Be copied and pickled with all fields."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def __len__(self) -> int:
         return len(self.status_codes)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.base.deferring import DeferredMapping
+from clench.base.deferring import DeferredMapping, LateFields
 from clench.base.pose import FloatArray, Pose
 
 
@@ -123,7 +123,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class FingerResult:
+class FingerResult(LateFields):
     """Hold a finger's alternatives and the chosen one.
 
     Args:
@@ -149,10 +149,8 @@ class FingerResult:
         cause: Mapping[str, Any] | None,
     ) -> FingerResult:
         """Return a finger that ends as its best candidate does; all candidates are made when they are first read."""
-        result = object.__new__(cls)
         values = {"name": name, "status": best.status, "reason": best.reason, "chosen": chosen, "cause": cause}
-        result.__dict__.update(values, _make_candidates=candidates, _made={chosen: best})
-        return result
+        return cls.with_late(lambda _: candidates(), **values, _made={chosen: best})
 
     @property
     def made(self) -> Mapping[int, Candidate]:
@@ -165,20 +163,9 @@ class FingerResult:
         """The chosen candidate, or None; the others are not made for it."""
         return self.made.get(self.chosen)
 
-    def __getattr__(self, name: str) -> tuple[Candidate, ...]:
-        make: Callable[[], tuple[Candidate, ...]] | None = self.__dict__.get("_make_candidates")
-        if name != "candidates" or make is None:
-            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
-        made = self.__dict__["candidates"] = make()
-        return made
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Be copied and pickled with all candidates."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
-
 
 @dataclass(frozen=True)
-class GraspSolution:
+class GraspSolution(LateFields):
     """Hold the answer of `clench.solve`; `to_dict` gives the documented JSON form.
 
     Args:
@@ -233,24 +220,10 @@ class GraspSolution:
         """Return a solution of which some fields are known; the others are made when one of them is first read.
 
         Args:
-            make: returns the whole solution, always the same. known: of its fields at least those with a default value,
-                which would else be read in their place.
+            make: returns the whole solution, always the same. known: see `with_late`.
         """
         late = {"choice": DeferredMapping(lambda: make().choice or {})}
-        solution = object.__new__(cls)
-        solution.__dict__.update({**late, **known}, _make=make)
-        return solution
-
-    def __getattr__(self, name: str) -> Any:
-        make: Callable[[], GraspSolution] | None = self.__dict__.get("_make")
-        if make is None or name not in self.__dataclass_fields__:
-            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
-        value = self.__dict__[name] = getattr(make(), name)
-        return value
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Be copied and pickled with all fields."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return cls.with_late(lambda name: getattr(make(), name), **{**late, **known})
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""
