@@ -19,8 +19,9 @@ from clench.models.shapes import CollisionSource
 #: Commands that are kept, those asked for last.
 _KEPT: Final = 64
 _POSES: Final = ("hand_pose", "object_pose")
-#: Types whose values say all there is to say, and do not change; numbers of these types are told apart by their text.
+#: Types whose values say all there is to say, and do not change.
 _PLAIN: Final = frozenset({str, int, bool, type(None), ClosingOrder, CollisionSource, type(Path())})
+#: Numbers that are told apart by their text, as zeros have a sign.
 _FLOATS: Final = frozenset({float, np.float64})
 
 
