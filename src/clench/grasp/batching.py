@@ -80,9 +80,10 @@ class PackedProblem:
     def room(self, capacity: int) -> Iterator[Room]:
         """Lend scratch space for the kernel of a batch, with so many segments per plane; threads get each their own."""
         shape = (*self._room_shape, capacity)
-        try:
-            room = _ROOMS[shape].pop()
-        except (KeyError, IndexError):
+        with _LENDING:
+            free = _ROOMS.get(shape)
+            room = free.pop() if free else None
+        if room is None:
             room = self._make_room(capacity)
         yield room
         with _LENDING:
