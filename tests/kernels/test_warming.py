@@ -9,6 +9,7 @@ import clench
 from clench.apps.cli.demo import MUG_POSE
 from clench.base.pose import Pose
 from clench.kernels import batch_solving, closing, family_section, frames, link_meshes, overlap, touches, warming
+from clench.kernels.compiling import index_of
 
 
 @pytest.mark.parametrize("kernel", [*warming.HERE, *warming.THERE], ids=lambda kernel: kernel.__name__)
@@ -55,14 +56,13 @@ def test_the_first_call_says_that_it_compiles(monkeypatch, capsys):
 
 def test_a_cache_without_the_closing_is_cold(monkeypatch, tmp_path):
     assert not warming._is_cold()
+    monkeypatch.setattr(index_of(batch_solving.solve_poses), "_index_path", str(tmp_path / "none.nbi"))
+    assert warming._is_cold()
 
-    class Elsewhere:
-        py_func = batch_solving.solve_poses.py_func
 
-        class stats:  # noqa: N801
-            cache_path = str(tmp_path)
-
-    assert warming._is_cold(Elsewhere)
+def test_a_cache_of_other_source_is_cold(monkeypatch):
+    monkeypatch.setattr(index_of(batch_solving.solve_poses), "_source_stamp", b"of a year ago")
+    assert warming._is_cold()
 
 
 def test_compiled_kernels_start_no_process(monkeypatch):

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit
+
+from clench.base import tolerances
 
 from .handing import handed
 
@@ -39,6 +44,29 @@ def inner_allocating_kernel(function: Kernel) -> Kernel:
     return _compiled(function, _nrt=True, no_cpython_wrapper=True)
 
 
+@cache
+def source_stamp() -> bytes:
+    """Return a digest of the source of all kernels, and of the numbers that are compiled into them.
+
+    What is kept on disk is good for as long as it is the same. Numba asks no other file than the kernel's own, while
+    every kernel has those that it calls inside: after an update old ones would stay in use.
+    """
+    digest = hashlib.sha256()
+    for path in [*sorted(Path(__file__).parent.glob("*.py")), Path(tolerances.__file__)]:
+        digest.update(path.read_bytes())
+    return digest.digest()
+
+
+def index_of(dispatcher: Any) -> Any:
+    """Return what Numba keeps of a kernel on disk: an `IndexDataCacheFile`, which it does not make public."""
+    return dispatcher._cache._cache_file
+
+
+def is_kept(function: Any) -> bool:
+    """Say whether a kernel is on disk as it is now; true where NUMBA_DISABLE_JIT leaves functions as they are."""
+    return not hasattr(function, "get_call_template") or bool(index_of(function)._load_index())
+
+
 def _compiled(function: Kernel, **options: bool) -> Kernel:
     """Compile a function on its first call, once for all values of a number.
 
@@ -48,6 +76,7 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
     dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
+    index_of(dispatcher)._source_stamp = source_stamp()
     choose = dispatcher.get_call_template
 
     def choose_handed(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:

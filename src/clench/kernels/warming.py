@@ -13,7 +13,6 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -24,6 +23,7 @@ from .batch_judging import Scratch, judge_pose
 from .batch_layout import ObjectArrays, Solved, Wanted
 from .batch_solving import Asked, Closed, Room, solve_poses
 from .closing import close_item, close_items
+from .compiling import is_kept
 from .exact import planes_only
 from .family_section import cut_first_families
 from .frames import FrameArrays, place_links, relate_poses
@@ -192,13 +192,8 @@ def announce(*, in_full: bool = False) -> None:
 
 
 def _is_cold(kernel: Any = solve_poses) -> bool:
-    """Say whether the cache on disk lacks a kernel; never where NUMBA_DISABLE_JIT leaves functions as they are."""
-    stats = getattr(kernel, "stats", None)
-    if stats is None:
-        return False
-    function = kernel.py_func
-    name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
-    return not any(Path(stats.cache_path).glob(f"{name}-*.nbi"))
+    """Say whether the cache on disk lacks a kernel."""
+    return not is_kept(kernel)
 
 
 if __name__ == "__main__":
