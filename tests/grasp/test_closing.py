@@ -8,7 +8,7 @@ from small_chain import CLOSING, POSTURE, chain
 
 from clench.base.pose import Pose
 from clench.grasp import closing
-from clench.grasp.closing import close_hand, kernel_threads, make_hand_plan, share_out
+from clench.grasp.closing import close_hand, items_around, kernel_threads, make_hand_plan, planes_tell, share_out
 from clench.grasp.plan import plan_finger
 from clench.grasp.scene import pack_object
 from clench.kernels.exact import planes_only
@@ -79,14 +79,29 @@ def test_a_section_that_outgrows_its_arena_is_cut_anew(roles):
     assert plenty.answer.contacts.sum() > 4
 
 
-def test_overlap_at_the_start_is_noted_for_the_finger_it_concerns():
+def test_overlap_at_the_start_is_noted_on_planes_for_the_finger_it_concerns():
     hand = chain([CLOSING], names=("a", "b"))
-    _, closed = close(plans(hand), BALL)
+    _, closed = close(plans(hand), BALL, full_width=False)
     assert closed.overlaps.tolist() == [-1, -1]
     inside = BALL.posed(Pose([0.02, 0.0, 0.02]))
-    plan, closed = close(plans(hand), inside)
+    plan, closed = close(plans(hand), inside, full_width=False)
     assert (closed.overlaps >= 0).all()
     assert plan.arrays.outlines.link[closed.overlaps].tolist() == [1, 2]
+
+
+@pytest.mark.parametrize("model", ["sphere:r=0.02", "box:x=0.02,y=0.02,z=0.02", "cylinder:r=0.02,h=0.02"])
+def test_the_full_width_has_planes_around_what_is_swept_as_a_polyhedron_alone(model):
+    (three,) = plans(chain([CLOSING]))
+    plan = make_hand_plan([three], [0], [0], True, False)
+    curved = model.startswith("cylinder")
+    packed = pack_object(GraspObject.load(model))
+    items = items_around(plan, packed)
+    assert (items.high - items.low).tolist() == [1, 1, 1, 3 if curved else 0]
+    assert planes_tell(plan, packed) == curved
+    alone = make_hand_plan([three], [0], [0], False, False)
+    assert planes_tell(alone, packed)
+    assert items_around(alone, packed).high.tolist() == [1, 2, 3]
+    assert items_around(plan, None).high.tolist() == [1, 2, 3, 0]
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

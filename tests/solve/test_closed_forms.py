@@ -146,7 +146,10 @@ def test_link_corner_on_the_face_of_a_box():
     solution = clench.solve(hand, obj, command())
     theta = np.arcsin(0.03 / np.hypot(0.06, 0.008)) - np.arctan2(0.008, 0.06)
     assert solution.joint_angles["index_0"] == pytest.approx(theta, abs=EXACT)
-    assert {c.kind for c in solution.contacts} == {"edge"}
+    assert {c.kind for c in solution.contacts} == {"vertex"}
+    on_plane = clench.solve(hand, obj, command(full_width=False))
+    assert on_plane.joint_angles["index_0"] == pytest.approx(theta, abs=EXACT)
+    assert {c.kind for c in on_plane.contacts} == {"edge"}
 
 
 def test_flat_side_on_flat_face():

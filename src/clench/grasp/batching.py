@@ -19,7 +19,7 @@ from clench.models.shapes import CollisionSource
 
 from .blocking import link_masks
 from .calibration import Calibration
-from .closing import HandPlan, nothing_to_close, object_for_closing
+from .closing import HandPlan, items_around, nothing_to_close, object_for_closing
 from .containment import link_within_link
 from .criterion_registry import ALWAYS
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
@@ -184,7 +184,7 @@ def pack_problem(
     """
     obj = object_for_closing(packed)
     items = np.flatnonzero(plan.whole) if any(plan.whole) else np.arange(len(plan.whole))
-    columns: list[Any] = [np.ascontiguousarray(column[items]) for column in plan.items]
+    columns: list[Any] = [np.ascontiguousarray(column[items]) for column in items_around(plan, packed)]
     return PackedProblem(
         hand=plan.arrays,
         exact=exact._replace(object=obj.bodies, wanted=np.ascontiguousarray(exact.wanted[items])),

@@ -121,10 +121,28 @@ def make_hand_plan(
     return HandPlan(tuple(plans), tuple(finger), tuple(posture), arrays, items, whole, together)
 
 
+def items_around(plan: HandPlan, packed: PackedObject | None) -> ItemArrays:
+    """Return the items of a plan as they close around an object, or around none.
+
+    The full width needs no planes around what is swept exactly: the sweep finds the same, and sooner. Around cylinders
+    and ellipsoids, which are swept as polyhedra, it stops where a plane shows the true shape to be touched before.
+    """
+    if packed is not None and packed.is_curved:
+        return plan.items
+    return plan.items._replace(high=np.where(plan.whole, plan.items.low, plan.items.high))
+
+
+def planes_tell(plan: HandPlan, packed: PackedObject) -> bool:
+    """Say whether planes tell which fingers overlap the object at the start; else the full width does."""
+    items, whole = items_around(plan, packed), np.array(plan.whole, dtype=bool)
+    decide = whole if whole.any() else ~whole
+    return bool((items.low < items.high)[decide].any())
+
+
 def close_hand(
     plan: HandPlan, exact: ExactArrays, packed: PackedObject, T_palm_object: FloatArray, rounds: int
 ) -> ClosedHand:
-    """Cut the object, look for overlaps at the start, and close every item.
+    """Cut the object, look for overlaps at the start where planes tell of them, and close every item.
 
     Args:
         plan: of the hand. exact: for the items that are swept exactly; the object is put in. packed: the object.
@@ -139,15 +157,17 @@ def close_hand(
 
     T = np.ascontiguousarray(T_palm_object[:3])
     obj = object_for_closing(packed)
-    arena = arena_of(obj.tree)
+    items, arena = items_around(plan, packed), arena_of(obj.tree)
+    planar = bool((items.low < items.high).any())
     shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
     scratch = np.empty((2, 3, 4))
-    while wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared, scratch):
+    while planar and (wanted := cut_first_families(plan.arrays, obj.tree, obj.rounds, T, shared, scratch)):
         arena.grow(wanted)
         shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
-    overlaps = np.empty(len(plan.plans), dtype=np.int64)
-    find_overlaps(plan.arrays, obj.tree, obj.rounds, obj.closed, T, shared, overlaps)
-    answer = _close_plan(plan, exact, obj, T, shared, rounds)
+    overlaps = np.full(len(plan.plans), -1, dtype=np.int64)
+    if planes_tell(plan, packed):
+        find_overlaps(plan.arrays, obj.tree, obj.rounds, obj.closed, T, shared, overlaps)
+    answer = _close_plan(replace(plan, items=items), exact, obj, T, shared, rounds)
     return ClosedHand(answer, overlaps, shared, T_palm_object)
 
 
@@ -321,7 +341,9 @@ def close_items_again(
         shared = make_sections(len(plan.arrays.plane_offset), 0, 0)
     else:
         obj = object_for_closing(packed)
-    answer = _close_plan(only_items(plan, items), exact, obj, T, shared, rounds)
+    some = only_items(plan, items)
+    some = replace(some, items=items_around(some, packed))
+    answer = _close_plan(some, exact, obj, T, shared, rounds)
     return ClosedHand(answer, closed.overlaps, shared, closed.T_palm_object)
 
 

@@ -89,6 +89,11 @@ class PackedObject:
     geometry_hash: str
 
     @property
+    def is_curved(self) -> bool:
+        """Whether shapes that are swept as polyhedra are exact on planes alone."""
+        return any(kind in ROUND_POLYHEDRA for kind, _ in self.round_sizes)
+
+    @property
     def round_sizes(self) -> list[tuple[ShapeKind, tuple[float, ...]]]:
         """Kind and half sizes of every round shape [m]."""
         kinds = {number: kind for kind, number in ROUND_KINDS.items()}

@@ -14,7 +14,7 @@ from .batch_sequence import block_pose, place_one
 from .closing import close_item
 from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays
-from .family_section import cut_first_families
+from .family_section import cut_first_families, needs_planes
 from .frames import FrameArrays
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, SectionArrays, Work
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh
@@ -157,10 +157,14 @@ def close_free(
     Where too much was wanted nothing else that is written is of use.
     """
     tree, rounds = target.tree, target.rounds
-    overflow = cut_first_families(hand, tree, rounds, T_palm_object, room.shared, work.pose)
-    if overflow > 0:
-        return int(overflow)
-    look_for_overlaps(hand, tree, rounds, target.closed, T_palm_object, room.shared, turn.overlaps, work)
+    overflow = 0
+    for entry in range(blocked.shape[0]):
+        turn.overlaps[entry] = -1
+    if needs_planes(items):
+        overflow = cut_first_families(hand, tree, rounds, T_palm_object, room.shared, work.pose)
+        if overflow > 0:
+            return int(overflow)
+        look_for_overlaps(hand, tree, rounds, target.closed, T_palm_object, room.shared, turn.overlaps, work)
     for i in range(items.entry.shape[0]):
         turn.asked[i] = 1
     close_asked(hand, exact, target, T_palm_object, items, room.shared, room.own, turn, work, sweep, answer)

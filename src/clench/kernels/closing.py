@@ -51,7 +51,8 @@ def close_group(
     """Move one degree of freedom, or all at once, until a contact or a limit holds every joint.
 
     The travel at which a follower starts or stops moving (its own limit) splits the motion into path segments. On each
-    of them the planes give a first bound, and the exact sweep, where wanted, what comes before it.
+    of them the planes of the item, if it has any, give a first bound, and the exact sweep, where wanted, what comes
+    before it.
 
     Args:
         sections, base: whose row `plane - base` belongs to `plane`. family: of the planes. group: or `ALL`.
@@ -75,7 +76,6 @@ def close_group(
             fastest += abs(rates[j])
         reach = end + TOUCH_FRACTION / max(fastest, 1.0)
         moved, plane = advance(hand, family, sections, base, low, high, closed, turns, rates, reach, work)
-        moved = min(moved, end)
         met = -1
         if exact.wanted[i]:
             families, size = answer.pose[i], hand.family_length[family]
@@ -86,6 +86,7 @@ def close_group(
             if moved < 0.0:
                 answer.overlap[i] = sweep.winner[2]
                 return False
+        moved = min(moved, end)
         for j in range(joints[0], joints[1]):
             turns[j] += rates[j] * moved
         move_groups(chain, joints, group, answer.travel[i], locked, moved)
@@ -156,9 +157,9 @@ def enter_family(
     work: Work,
     answer: ClosingArrays,
 ) -> None:
-    """Place a family at an item's present posture and, unless it is the entry's first, cut the object by its planes."""
+    """Place a family at an item's present posture and cut the object by its planes, unless that was done before."""
     pose_family(hand, family, family == start, answer.turn[i], work, answer.pose[i])
-    if family > start:
+    if family > start and items.low[i] < items.high[i]:
         T = work.pose[0]
         compose_inverse(answer.pose[i, family], T_palm_object, T)
         low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]

@@ -17,7 +17,7 @@ from .advance import make_work
 from .batch_closing import among, answer_at, with_lengths
 from .closing import close_item
 from .exact import ExactArrays
-from .family_section import cut_first_families
+from .family_section import cut_first_families, needs_planes
 from .layout import (
     ClosingArrays,
     Floats,
@@ -229,10 +229,14 @@ def _cut(job: Job) -> None:
     if n >= job.T_palm_object.shape[0]:
         return
     shared, work, T = _sections_at(job.shared, n), _work_at(job.work, n), job.T_palm_object[n]
-    wanted = cut_first_families(job.hand, job.tree, job.rounds, T, shared, work.pose)
+    wanted, planar = 0, needs_planes(job.items)
+    if planar:
+        wanted = cut_first_families(job.hand, job.tree, job.rounds, T, shared, work.pose)
+    for entry in range(job.overlaps.shape[1]):
+        job.overlaps[n, entry] = -1
     for i in range(job.asked.shape[1]):
         job.answers.overflow[n, i] = wanted
-    if wanted == 0:
+    if planar and wanted == 0:
         look_for_overlaps(job.hand, job.tree, job.rounds, job.closed, T, shared, job.overlaps[n], work)
 
 

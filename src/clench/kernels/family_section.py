@@ -8,7 +8,7 @@ import numpy as np
 
 from .compiling import inner_kernel, kernel
 from .family_pose import compose, compose_inverse
-from .layout import RUN, Floats, HandArrays, RoundArrays, SectionArrays
+from .layout import RUN, Floats, HandArrays, ItemArrays, RoundArrays, SectionArrays
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
 from .section import cut
 from .tree import MeshTree
@@ -108,6 +108,15 @@ def cut_planes(
         cut_rounds(rounds, T, hand.plane_offset[plane], plane - base, sections, pose)
         put_circles(sections, plane - base)
     return int(wanted)
+
+
+@kernel
+def needs_planes(items: ItemArrays) -> bool:
+    """Say whether any item has planes; the full width has none around what it sweeps exactly."""
+    planes = 0
+    for i in range(items.entry.shape[0]):
+        planes += items.high[i] - items.low[i]
+    return bool(planes > 0)
 
 
 @kernel

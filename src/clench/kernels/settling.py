@@ -29,7 +29,7 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .sweeping import SweepWork, body_gap, put_core
+from .sweeping import SweepWork, body_gap, elements_of, put_core
 from .touching import settle_hit
 from .turning import STILL
 from .vectors import Vector, cross, dot
@@ -110,6 +110,21 @@ def settle_carried(
 
 
 @inner_kernel
+def closest_element(exact: ExactArrays, T_palm_object: Floats, m: int, k: int, sweep: SweepWork) -> int:
+    """Return the element of a link at `sweep.poses` that is closest to an element of the object."""
+    links, target = exact.links, exact.object
+    put_core(target, k, T_palm_object, sweep.fixed)
+    closest, least = -1, math.inf
+    begin, end = elements_of(links, m)
+    for i in range(begin, end):
+        put_core(links, i, sweep.poses[m], sweep.core)
+        gap = separation(sweep.core, links.corners[i], sweep.fixed, target.corners[k])[0] - links.radius[i]
+        if gap < least:
+            closest, least = i, gap
+    return closest
+
+
+@inner_kernel
 def settle_pair(
     exact: ExactArrays,
     chain: ChainArrays,
@@ -137,7 +152,7 @@ def settle_pair(
     if met == exact.checked.shape[0] and point[HIT_GAP] <= PASSED_GAP:
         at, normal = (point[0], point[1], point[2]), (point[3], point[4], point[5])
         if not holds_exactly(exact, chain, entry, turns, hit, at, normal, sweep):
-            sweep.winner[0], sweep.winner[1] = i, k
+            sweep.winner[0], sweep.winner[1] = closest_element(exact, T_palm_object, m, k, sweep), k
             describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
 
 

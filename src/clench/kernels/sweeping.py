@@ -131,6 +131,17 @@ def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints,
 
 
 @inner_kernel
+def elements_of(bodies: BodyArrays, m: int) -> tuple[int, int]:
+    """Return the first element of a body that has some, and the one after its last."""
+    first = last = bodies.root[m]
+    while bodies.count[first] == 0:
+        first += 1
+    while bodies.count[last] == 0:
+        last = bodies.right[last]
+    return int(bodies.first[first]), int(bodies.first[last] + bodies.count[last])
+
+
+@inner_kernel
 def push_roots(moving: BodyArrays, m: int, resting: BodyArrays, r: int, stack: Ints) -> int:
     """Put two bodies on the empty stack, unless one has no elements; return its height."""
     if moving.root[m] < 0 or resting.root[r] < 0:

@@ -227,16 +227,20 @@ class _Bench:
     def _times(self, obj: GraspObject, commands: Sequence[GraspCommand]) -> dict[str, float]:
         """Return times of a solve and of its parts alone [s]: of every pose the quickest pass, then the median."""
         rows: list[list[dict[str, float]]] = [[] for _ in commands]
-        with listening() as spent:
-            for _ in range(self.passes):
-                for row, command in zip(rows, commands, strict=True):
-                    for times in spent.values():
-                        times.clear()
-                    whole = timed(partial(clench.solve, self.hand, obj, command))[1]
-                    close_in_parts(self.hand, obj, command)
-                    row.append({"whole": whole, **{part: sum(times) for part, times in spent.items()}})
+        for _ in range(self.passes):
+            for row, command in zip(rows, commands, strict=True):
+                flat = replace(command, full_width=False)
+                whole, planar = (timed(partial(clench.solve, self.hand, obj, c))[1] for c in (command, flat))
+                closing, cutting = (self._kernel(obj, c, part) for c, part in ((command, "fingers"), (flat, "cut")))
+                row.append({"whole": whole, "planar": planar, "fingers": closing, "cut": cutting})
         quickest = [{part: min(one[part] for one in row) for part in row[0]} for row in rows]
         return {part: float(np.median([one[part] for one in quickest])) for part in quickest[0]}
+
+    def _kernel(self, obj: GraspObject, command: GraspCommand, part: str) -> float:
+        """Return what a kernel takes in one solve [s]."""
+        with listening() as spent:
+            close_in_parts(self.hand, obj, command)
+        return sum(spent[part])
 
 
 def _command(pose: Pose, fingers: tuple[str, ...]) -> GraspCommand:

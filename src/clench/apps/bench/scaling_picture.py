@@ -21,10 +21,10 @@ _TITLES: Final = {
     "batch": "poses at once, one thread",
 }
 _PARTS: Final = {
-    "whole": ("one solve, whole", INK),
-    "fingers": ("kernel: closing fingers", CHOSEN),
-    "cut": ("kernel: cutting the object", CONTACT),
-    "overlap": ("kernel: overlaps at the start", JOINT_COLORS[0]),
+    "whole": ("one solve, certified", INK),
+    "planar": ("one solve, planes only", CONTACT),
+    "fingers": ("kernel: closing over the full width", CHOSEN),
+    "cut": ("kernel: cutting by the planes", JOINT_COLORS[0]),
     "prepare": ("packing the object, once", FAINT),
     "certified": ("certified, per pose", CHOSEN),
     "planes": ("planes only, per pose", CONTACT),

@@ -158,11 +158,13 @@ def _time_solves(
 def _time_kernels(
     report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
 ) -> None:
-    with listening() as spent:
-        for command in [command for _ in range(passes) for command in commands]:
-            close_in_parts(hand, obj, command)
-    for part, times in spent.items():
-        report.distribution(f"close_{part}", times)
+    for kind, full_width in (("close", True), ("planes", False)):
+        with listening() as spent:
+            for command in [replace(command, full_width=full_width) for _ in range(passes) for command in commands]:
+                close_in_parts(hand, obj, command)
+        for part, times in spent.items():
+            if times:
+                report.distribution(f"{kind}_{part}", times)
 
 
 def close_in_parts(hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
