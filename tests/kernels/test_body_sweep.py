@@ -97,7 +97,7 @@ def test_a_body_meets_what_the_first_of_its_elements_meets(one, other):
         expected = best
         for a, ka, wa in cores(moving, work.moving):
             for b, kb, wb in cores(resting, work.resting):
-                each = sweep_pair(a, ka, b, kb, wa + wb, chain, len(chain), TOUCH, best, np.zeros((6, 3)))
+                each = sweep_pair(a, ka, b, kb, wa + wb, chain, len(chain), TOUCH, 0.0, best, np.zeros((6, 3)))
                 expected = min(expected, each)
         assert found == pytest.approx(expected, abs=1e-6), (seed, found, expected)
         assert (found == OVERLAP) == (expected == OVERLAP)

@@ -17,7 +17,7 @@ def sweep(core, fixed, w=0.0, rate=1.0, best=BEST):
     """Return how far `core` turns about the origin's y axis before it meets `fixed`."""
     chain = np.array([[rate, 0.0, 0.0]])
     rows = [np.vstack([c, np.tile(c[-1], (3 - len(c), 1))]) for c in (core, fixed)]
-    return sweep_pair(rows[0], len(core), rows[1], len(fixed), w, chain, 1, TOUCH, best, np.zeros((6, 3)))
+    return sweep_pair(rows[0], len(core), rows[1], len(fixed), w, chain, 1, TOUCH, 0.0, best, np.zeros((6, 3)))
 
 
 def turned(core, angle):
@@ -137,7 +137,7 @@ def test_a_wall_across_the_axis_stops_nothing_that_slides_along_it(count):
     wall = np.array([[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 2.0]])
     core = np.array([[0.01, 1e-9, 0.0], [0.05, 0.01, 0.0], [0.05, 0.01, 0.01]])
     chain = np.array([[1.0, 0.02, 0.0], [1.8, 0.0, 0.0]])[2 - count :]
-    found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, BEST, np.zeros((6, 3)))
+    found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, 0.0, BEST, np.zeros((6, 3)))
     assert found == BEST
 
 
@@ -151,7 +151,7 @@ def test_what_slides_on_a_wall_is_not_stopped_by_a_side_of_one_of_its_triangles(
     c, d = np.cos(turn), np.sin(turn)
     wall = np.array([[0.0, 0.0, 0.0], [0.1 * c, 0.0, 0.1 * d], [-0.05, 0.0, 0.1]])
     chain = np.array([[0.7, 0.001, 0.0], [1.0, 0.0, 0.0]])[2 - count :]
-    found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, 2.0, np.zeros((6, 3)))
+    found = sweep_pair(core, 3, wall, 3, 0.0, chain, count, TOUCH, 0.0, 2.0, np.zeros((6, 3)))
     assert found == 2.0
 
 
@@ -174,7 +174,7 @@ def test_a_corner_that_comes_down_stops_what_another_corner_lets_go(seed):
         core = np.array([[at[0] + rng.uniform(-0.03, 0.03) * (k > 0), 0.01 * k, at[1] + rise[k]] for k in range(3)])
         below = chain[0, 2] + core[0, 2]
         face = np.array([[-1.0, -1.0, below], [1.0, -1.0, below], [0.0, 2.0, below]])
-        found = sweep_pair(core, 3, face, 3, 0.0, chain, 2, TOUCH, 1.5, np.zeros((6, 3)))
+        found = sweep_pair(core, 3, face, 3, 0.0, chain, 2, TOUCH, 0.0, 1.5, np.zeros((6, 3)))
         s = np.linspace(0.0, found, 300)[:, None]
         base = np.sin(chain[0, 0] * s) * chain[0, 1] + np.cos(chain[0, 0] * s) * chain[0, 2]
         heights = base + np.sin(chain[1, 0] * s) * core[:, 0] + np.cos(chain[1, 0] * s) * core[:, 2] - below

@@ -29,7 +29,7 @@ def distance(core, chain, fixed, s):
 
 def swept(core, chain, fixed, w=0.0):
     rows = [np.ascontiguousarray(np.resize(np.asarray(c, dtype=float), (3, 3))) for c in (core, fixed)]
-    return sweep_pair(rows[0], len(core), rows[1], len(fixed), w, chain, len(chain), TOUCH, BEST, np.zeros((6, 3)))
+    return sweep_pair(rows[0], len(core), rows[1], len(fixed), w, chain, len(chain), TOUCH, 0.0, BEST, np.zeros((6, 3)))
 
 
 @pytest.mark.parametrize("corners", [1, 2, 3])

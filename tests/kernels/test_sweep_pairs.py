@@ -20,7 +20,7 @@ def swept(core, fixed, w=0.0, best=BEST, chain=PIVOT):
     """Sweep a core that turns from x towards z about the origin, or as a chain does."""
     corners = [np.ascontiguousarray(np.resize(np.asarray(c, dtype=float), (3, 3))) for c in (core, fixed)]
     return sweep_pair(
-        corners[0], len(core), corners[1], len(fixed), w, chain, len(chain), TOUCH, best, np.zeros((6, 3))
+        corners[0], len(core), corners[1], len(fixed), w, chain, len(chain), TOUCH, 0.0, best, np.zeros((6, 3))
     )
 
 
@@ -169,7 +169,7 @@ def test_a_plane_that_is_told_keeps_the_cores_apart_on_the_whole_way():
         fixed[:, 2] += 0.03
         chain = np.column_stack([rng.uniform(0.5, 2.0, count), rng.uniform(-0.02, 0.02, (count, 2))])
         placed, there = np.zeros((6, 3)), np.zeros((6, 3))
-        found = sweep_pair(core, ka, fixed, kb, w, chain, count, TOUCH, 0.8, placed)
+        found = sweep_pair(core, ka, fixed, kb, w, chain, count, TOUCH, 0.0, 0.8, placed)
         n = placed[5]
         if found < 0.8:
             met += 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from .bodies import BodyArrays
+from .box_walk import put_box, walk_to_box
 from .compiling import inner_kernel
 from .earliest import ball_entry, measure_of, walk_ball, walk_core
 from .layout import Floats
@@ -14,8 +15,8 @@ from .spatial_motion import is_spatial
 from .sweep_pairs import sweep_pair
 from .sweeping import QUEUE, SweepWork, push_roots, put_ball, put_item, split_pair
 
-#: How coarsely the sweep of a node's capsule is settled, as a fraction of its radius [-].
-COARSE = 0.25
+#: How coarsely the sweep of a node is settled, as a fraction of how thick it is, and of how wide [-].
+COARSE, WIDE = 0.1, 0.02
 #: No item.
 NONE = -(2**40)
 
@@ -95,6 +96,39 @@ def keep_earliest(
 
 
 @inner_kernel
+def walk_item(
+    ka: int,
+    wa: float,
+    a: int,
+    resting: BodyArrays,
+    b: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    since: float,
+    best: float,
+    work: SweepWork,
+) -> float:
+    """Return a travel up to which a pair of items, of which one is a node at least, is farther apart than `touch`.
+
+    It is infinite where it is until `best`.
+
+    Args:
+        ka, wa: corners and radius of the moving item `a`, which is in `work`. since: a travel before which it is known.
+    """
+    near = touch + (COARSE * wa if a >= 0 else 0.0)
+    if b < 0:
+        kb, wb = put_item(resting, b, work.resting, work.fixed)
+        return float(
+            walk_core(work.core, ka, work.fixed, kb, wa + wb + touch, chain, count, near, since, best, work.placed)
+        )
+    grown, box = put_box(resting.slab[b], work.resting, work.box), work.box
+    near += COARSE * (box[4, 2] + grown) + WIDE * box[4, 0]
+    w = wa + grown + touch
+    return float(walk_to_box(work.core, ka, box, w, chain, count, near, since, best, work.placed))
+
+
+@inner_kernel
 def measure(s: float, chain: Floats, count: int) -> float:
     """Return a travel as `earliest_meeting` tells it."""
     return s if count > 1 else float(measure_of(abs(chain[0, 0]) * s))
@@ -141,11 +175,9 @@ def sweep_body(
             beyond, apart = a if stays_beyond(ka, wa, chain, count, since, best, work) else NONE, since
         if within and a == beyond:
             continue
-        kb, wb = put_item(resting, b, work.resting, work.fixed)
         if a >= 0 or b >= 0:
             if stack[row, 2] == 0:
-                w, near = wa + wb + touch, touch + COARSE * ((wa if a >= 0 else 0.0) + (wb if b >= 0 else 0.0))
-                s = walk_core(work.core, ka, work.fixed, kb, w, chain, count, near, since, best, work.placed)
+                s = walk_item(ka, wa, a, resting, b, chain, count, touch, since, best, work)
                 if s == math.inf or (within and s > since and stays_beyond(ka, wa, chain, count, s, best, work)):
                     continue
                 stack[row, 2], work.since[row], keys[row] = 1, s, max(keys[row], measure(s, chain, count))
@@ -161,7 +193,10 @@ def sweep_body(
                 height -= 1
                 queue = take_in(work, queue, height)
             continue
-        found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, best, work.placed)
+        if since > 0.0 and since >= best:
+            continue
+        kb, wb = put_item(resting, b, work.resting, work.fixed)
+        found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, since, best, work.placed)
         if found >= best:
             if best > 0.0 and not met and keep_plane(kb, wb, touch, work):
                 laid, beyond = True, NONE

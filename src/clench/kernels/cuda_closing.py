@@ -215,6 +215,7 @@ def _sweep_at(s: SweepWork, n: int) -> SweepWork:
         s.stack[n],
         s.keys[n],
         s.since[n],
+        s.box[n],
         s.plane[n],
         s.pair[n],
         s.winner[n],

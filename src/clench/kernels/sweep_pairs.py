@@ -155,6 +155,7 @@ def sweep_pair(
     chain: Floats,
     count: int,
     touch: float,
+    begin: float,
     best: float,
     placed: Floats,
 ) -> float:
@@ -169,12 +170,12 @@ def sweep_pair(
         w: sum of their radii [m].
         chain, count: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
             see `spatial_motion`.
-        touch: gaps up to this touch [m].
+        touch: gaps up to this touch [m]. begin: a travel up to which they are known to be farther apart, or 0.
         placed: scratch space, (6, 3); its first rows are the moving core at the contact. Where nothing is
             met before a positive `best`, its last row is the normal of a plane that keeps the cores apart all the way
-            from the start, or zero.
+            from `begin`, or zero.
     """
-    s, level, leap = 0.0, -1.0, 1.0
+    s, level, leap = begin, -1.0, 1.0
     for turn in range(PLANES):
         move_core(core, ka, chain, count, s, placed)
         d, nx, ny, nz, _, _, _, _, _ = separation(placed, ka, fixed, kb)

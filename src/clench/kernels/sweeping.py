@@ -37,6 +37,7 @@ class SweepWork(NamedTuple):
         after: the first joint that moves and does not move a link, (L,).
         stack: pairs of items that wait, and whether `walk_core` has been there, (PAIRS, 3). keys: when they can meet at
             the earliest, for one joint as a `turn_measure`; since: a travel before which they do not, (PAIRS,) each.
+        box: that around a node of the resting body, see `put_box`, (5, 3).
         plane: normal and offset of one that keeps bodies apart, relative to the first pivot, then in the resting body's
             frame, (8,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
@@ -57,6 +58,7 @@ class SweepWork(NamedTuple):
     stack: Ints
     keys: Floats
     since: Floats
+    box: Floats
     plane: Floats
     pair: Ints
     winner: Ints
@@ -81,6 +83,7 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((PAIRS, 3), dtype=np.int64),
         np.empty(PAIRS),
         np.empty(PAIRS),
+        np.empty((5, 3)),
         np.empty(8),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),

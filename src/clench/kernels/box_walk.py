@@ -1,0 +1,173 @@
+"""How long a moving core stays clear of the box around a node of a resting body (METHOD.md section 5).
+
+Small parts of a surface are flat: the boxes around them are thin, where capsules are as thick as they are wide.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .compiling import inner_kernel
+from .core_motion import move_core
+from .distance import closest_on_triangle
+from .layout import Floats
+from .sweep_pairs import step_to_plane
+from .vectors import Vector, cross, dot, scaled
+
+#: Steps of a walk at most.
+STEPS = 8
+#: How often the closest points of a core and a box are looked for, each from the other one.
+TURNS = 3
+#: Edges with a smaller sine between them are taken for parallel [-].
+PARALLEL = 1e-6
+
+
+@inner_kernel
+def put_box(slab: Any, T: Floats, box: Floats) -> float:
+    """Write the box around a node, in a pose; return by how much it is grown [m].
+
+    Its axes are made square to each other in double precision, and as long as the edges of the node's box reach.
+
+    Args:
+        slab: see `clench.kernels.slabs`.
+        box: written with the middle, three unit axes, and half the sizes along them [m], (5, 3).
+    """
+    u = np.float64(slab[3]), np.float64(slab[4]), np.float64(slab[5])
+    v = np.float64(slab[6]), np.float64(slab[7]), np.float64(slab[8])
+    w = np.float64(slab[9]), np.float64(slab[10]), np.float64(slab[11])
+    size = math.sqrt(dot(u, u))
+    first = scaled(u, 1.0 / size) if size > 0.0 else (1.0, 0.0, 0.0)
+    third = cross(first, v)
+    size = math.sqrt(dot(third, third))
+    if size <= PARALLEL * math.sqrt(dot(v, v)):
+        third = cross(first, (0.0, 0.0, 1.0) if abs(first[2]) < 0.5 else (0.0, 1.0, 0.0))
+        size = math.sqrt(dot(third, third))
+    third = scaled(third, 1.0 / size)
+    put_axis(first, u, v, w, T, 0, box)
+    put_axis(cross(third, first), u, v, w, T, 1, box)
+    put_axis(third, u, v, w, T, 2, box)
+    for r in range(3):
+        box[0, r] = T[r, 0] * slab[0] + T[r, 1] * slab[1] + T[r, 2] * slab[2] + T[r, 3]
+    return float(slab[12])
+
+
+@inner_kernel
+def put_axis(axis: Vector, u: Vector, v: Vector, w: Vector, T: Floats, k: int, box: Floats) -> None:
+    """Write axis `k` of a box, turned by a pose, and how far the edges u, v and w reach along it."""
+    for r in range(3):
+        box[1 + k, r] = T[r, 0] * axis[0] + T[r, 1] * axis[1] + T[r, 2] * axis[2]
+    box[4, k] = abs(dot(axis, u)) + abs(dot(axis, v)) + abs(dot(axis, w))
+
+
+@inner_kernel
+def nearest_of(core: Floats, corners: int, p: Vector) -> Vector:
+    """Return the point of a core that is closest to a point."""
+    a = core[0, 0], core[0, 1], core[0, 2]
+    if corners == 1:
+        return a
+    b = core[1, 0], core[1, 1], core[1, 2]
+    if corners == 3:
+        return closest_on_triangle(p, a, b, (core[2, 0], core[2, 1], core[2, 2]))
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    along = ux * (p[0] - a[0]) + uy * (p[1] - a[1]) + uz * (p[2] - a[2])
+    t = min(max(along / (ux * ux + uy * uy + uz * uz), 0.0), 1.0)
+    return a[0] + t * ux, a[1] + t * uy, a[2] + t * uz
+
+
+@inner_kernel
+def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[float, float, float, float, float]:
+    """Return how far a core lies beyond a box along a direction that parts them well, and the box's top along it.
+
+    The gap is never larger than the distance, and not above zero where they overlap. The directions that are looked at
+    are the box's axes, and that between the closest points, as far as a few looks from either find them.
+
+    Args:
+        core: (3, 3). corners: how many of its rows count. box: see `put_box`. local: scratch space, (3, 3).
+
+    Returns:
+        gap, unit direction, largest coordinate of the box along it.
+    """
+    gap, n = -math.inf, (1.0, 0.0, 0.0)
+    for r in range(3):
+        low, high = math.inf, -math.inf
+        for k in range(corners):
+            dx, dy, dz = core[k, 0] - box[0, 0], core[k, 1] - box[0, 1], core[k, 2] - box[0, 2]
+            at = box[1 + r, 0] * dx + box[1 + r, 1] * dy + box[1 + r, 2] * dz
+            local[k, r] = at
+            low, high = min(low, at), max(high, at)
+        beyond = max(low, -high) - box[4, r]
+        if beyond > gap:
+            sign = 1.0 if low >= -high else -1.0
+            gap, n = beyond, (sign if r == 0 else 0.0, sign if r == 1 else 0.0, sign if r == 2 else 0.0)
+    if gap > 0.0:
+        q = (0.0, 0.0, 0.0)
+        for _ in range(TURNS):
+            p = nearest_of(local, corners, q)
+            q = clamped(p[0], box[4, 0]), clamped(p[1], box[4, 1]), clamped(p[2], box[4, 2])
+            d = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+            size = math.sqrt(dot(d, d))
+            if size <= max(gap, 0.0):
+                break
+            m = scaled(d, 1.0 / size)
+            beyond = lowest(local, corners, m) - box_reach(box, m)
+            if beyond > gap:
+                gap, n = beyond, m
+    nx = n[0] * box[1, 0] + n[1] * box[2, 0] + n[2] * box[3, 0]
+    ny = n[0] * box[1, 1] + n[1] * box[2, 1] + n[2] * box[3, 1]
+    nz = n[0] * box[1, 2] + n[1] * box[2, 2] + n[2] * box[3, 2]
+    return gap, nx, ny, nz, nx * box[0, 0] + ny * box[0, 1] + nz * box[0, 2] + box_reach(box, n)
+
+
+@inner_kernel
+def clamped(x: float, half: float) -> float:
+    """Return what is closest to a coordinate within half a size to either side."""
+    return min(max(x, -half), half)
+
+
+@inner_kernel
+def lowest(core: Floats, corners: int, m: Vector) -> float:
+    """Return the smallest coordinate of a core along a direction."""
+    low: float = m[0] * core[0, 0] + m[1] * core[0, 1] + m[2] * core[0, 2]
+    for k in range(1, corners):
+        low = min(low, m[0] * core[k, 0] + m[1] * core[k, 1] + m[2] * core[k, 2])
+    return low
+
+
+@inner_kernel
+def box_reach(box: Floats, m: Vector) -> float:
+    """Return how far a box reaches from its middle along a direction that is given along its axes."""
+    reach: float = abs(m[0]) * box[4, 0] + abs(m[1]) * box[4, 1] + abs(m[2]) * box[4, 2]
+    return reach
+
+
+@inner_kernel
+def walk_to_box(
+    core: Floats,
+    ka: int,
+    box: Floats,
+    w: float,
+    chain: Floats,
+    count: int,
+    near: float,
+    begin: float,
+    best: float,
+    placed: Floats,
+) -> float:
+    """Return a travel up to which a core, that is apart from a box until `begin`, stays farther than `w` from it.
+
+    It is infinite where it does until `best`. Every step goes to a plane between the two, see `step_to_plane`, but ends
+    where they are nearer than `near`, or after some steps.
+    """
+    s = begin
+    for _ in range(STEPS):
+        move_core(core, ka, chain, count, s, placed)
+        gap, nx, ny, nz, top = off_box(placed, ka, box, placed[3:])
+        if gap - w <= near:
+            return s
+        s += step_to_plane(core, placed, ka, chain, count, nx, ny, nz, top + w + 0.5 * near, s, best - s)
+        if s >= best:
+            return math.inf
+    return s
