@@ -13,7 +13,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
-from .closing import ClosedHand, HandPlan, planes_tell
+from .closing import ClosedHand, HandPlan
 from .depths import LinkDepth, hand_depths, link_mesh_arrays, mesh_mask, object_mesh
 from .plan import FingerPlan, resting_links
 from .scene import PackedObject
@@ -58,8 +58,8 @@ def start_overlaps(
 
     masks, T = link_masks(hand, plan.plans, source), np.ascontiguousarray(T_palm_object[:3])
     blocked = np.empty(len(plan.plans), dtype=np.int64)
-    alone = not planes_tell(plan, packed)
-    find_start_overlaps(link_pose, link_mesh_arrays(hand, source), *masks, object_mesh(packed), T, alone, blocked)
+    whole = any(plan.whole)
+    find_start_overlaps(link_pose, link_mesh_arrays(hand, source), *masks, object_mesh(packed), T, whole, blocked)
     crossed = _crossed_links(plan, closed)
     result: list[LinkDepth | None] = []
     for finger, link, code in zip(plan.plans, crossed, blocked.tolist(), strict=True):

@@ -124,7 +124,7 @@ def make_hand_plan(
 def items_around(plan: HandPlan, packed: PackedObject | None) -> ItemArrays:
     """Return the items of a plan as they close around an object, or around none.
 
-    The full width needs no planes around what is swept exactly: the sweep finds the same, and sooner. Around cylinders
+    The full width needs no planes around what is swept exactly: the sweep alone is sooner done. Around cylinders
     and ellipsoids, which are swept as polyhedra, it stops where a plane shows the true shape to be touched before.
     """
     if packed is not None and packed.is_curved:
@@ -133,7 +133,7 @@ def items_around(plan: HandPlan, packed: PackedObject | None) -> ItemArrays:
 
 
 def planes_tell(plan: HandPlan, packed: PackedObject) -> bool:
-    """Say whether planes tell which fingers overlap the object at the start; else the full width does."""
+    """Say whether planes tell, too, which fingers overlap the object at the start; of the full width the links do."""
     items, whole = items_around(plan, packed), np.array(plan.whole, dtype=bool)
     decide = whole if whole.any() else ~whole
     return bool((items.low < items.high)[decide].any())

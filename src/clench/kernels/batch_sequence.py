@@ -7,7 +7,6 @@ import numpy as np
 from .batch_closing import answer_at, clear_answer
 from .batch_layout import Wanted
 from .compiling import allocating_kernel, inner_kernel
-from .family_section import needs_planes
 from .frames import FrameArrays, put_angles, put_links
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, make_depth_work
@@ -52,14 +51,13 @@ def block_pose(
     blocked: Ints,
 ) -> None:
     """Do as `find_blocked` at one pose; `work` is overwritten."""
-    alone = not needs_planes(items)
     for entry in range(blocked.shape[0]):
         crossed = overlaps[entry] >= 0
         for i in range(items.entry.shape[0]):
             crossed = crossed or (items.entry[i] == entry and answer.overlap[i] >= 0)
         if not crossed:
             own, resting = wanted.own[entry], wanted.resting[entry]
-            code = start_overlap(link_pose[entry], meshes, own, resting, solid, T_palm_object, alone, work)
+            code = start_overlap(link_pose[entry], meshes, own, resting, solid, T_palm_object, wanted.whole, work)
             crossed = code != FREE
         blocked[entry] = 1 if crossed else 0
     for i in range(items.entry.shape[0]):

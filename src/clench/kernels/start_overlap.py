@@ -33,15 +33,15 @@ def start_overlap(
     resting: Ints,
     solid: ObjectMesh,
     T_palm_object: Floats,
-    alone: bool,
+    whole: bool,
     work: DepthWork,
 ) -> int:
     """Return whether links of a finger that the planes do not tell of overlap the object; see the codes above.
 
     Args:
-        alone: no planes tell of any. The rest as in `find_start_overlaps`.
+        whole: see `find_start_overlaps`, as the rest.
     """
-    around = alone or may_hold_part(meshes, link_pose, solid, T_palm_object, work.points)
+    around = whole or may_hold_part(meshes, link_pose, solid, T_palm_object, work.points)
     if not any_deep(meshes, own if around else resting, link_pose, solid, T_palm_object, work):
         return FREE
     return ANY_LINK if around else RESTING_LINK
@@ -55,7 +55,7 @@ def find_start_overlaps(
     resting: Ints,
     solid: ObjectMesh,
     T_palm_object: Floats,
-    alone: bool,
+    whole: bool,
     blocked: Ints,
 ) -> None:
     """Write a code for every entry, (E,).
@@ -66,10 +66,10 @@ def find_start_overlaps(
     Args:
         link_pose: see `ExactArrays`. meshes: of the links. own, resting: which are each finger's, and which of those
             closing does not move, (E, M). solid: the object. T_palm_object: where it is, (3, 4).
-        alone: no planes tell of any link.
+        whole: links close over their full width, and all of them are looked at: there may be no planes.
     """
     work = make_depth_work()
     for entry in range(blocked.shape[0]):
         blocked[entry] = start_overlap(
-            link_pose[entry], meshes, own[entry], resting[entry], solid, T_palm_object, alone, work
+            link_pose[entry], meshes, own[entry], resting[entry], solid, T_palm_object, whole, work
         )
