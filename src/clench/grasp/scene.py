@@ -90,7 +90,7 @@ class PackedObject:
 
     @property
     def is_curved(self) -> bool:
-        """Whether shapes that are swept as polyhedra are exact on planes alone."""
+        """Whether it has shapes that are swept as polyhedra, and are themselves on planes alone."""
         return any(kind in ROUND_POLYHEDRA for kind, _ in self.round_sizes)
 
     @property
