@@ -97,10 +97,11 @@ def test_the_full_width_has_planes_around_what_is_swept_as_a_polyhedron_alone(mo
     packed = pack_object(GraspObject.load(model))
     items = items_around(plan, packed)
     assert (items.high - items.low).tolist() == [1, 1, 1, 3 if curved else 0]
-    assert planes_tell(plan, packed) == curved
+    assert planes_tell(items, plan.whole) == curved
     alone = make_hand_plan([three], [0], [0], False, False)
-    assert planes_tell(alone, packed)
-    assert items_around(alone, packed).high.tolist() == [1, 2, 3]
+    single = items_around(alone, packed)
+    assert planes_tell(single, alone.whole)
+    assert single.high.tolist() == [1, 2, 3]
     assert items_around(plan, None).high.tolist() == [1, 2, 3, 0]
 
 

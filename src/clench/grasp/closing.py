@@ -132,11 +132,14 @@ def items_around(plan: HandPlan, packed: PackedObject | None) -> ItemArrays:
     return plan.items._replace(high=np.where(plan.whole, plan.items.low, plan.items.high))
 
 
-def planes_tell(plan: HandPlan, packed: PackedObject) -> bool:
-    """Say whether planes tell, too, which fingers overlap the object at the start; of the full width the links do."""
-    items, whole = items_around(plan, packed), np.array(plan.whole, dtype=bool)
-    decide = whole if whole.any() else ~whole
-    return bool((items.low < items.high)[decide].any())
+def planes_tell(items: ItemArrays, whole: Sequence[bool]) -> bool:
+    """Say whether planes tell, too, which fingers overlap the object at the start; of the full width the links do.
+
+    Args:
+        items: see `items_around`. whole: see `HandPlan`.
+    """
+    planar = items.low < items.high
+    return bool(planar[np.array(whole, dtype=bool)].any() if any(whole) else planar.any())
 
 
 def close_hand(
@@ -165,7 +168,7 @@ def close_hand(
         arena.grow(wanted)
         shared = make_sections(len(plan.arrays.plane_offset), arena.capacity, len(obj.rounds.kind))
     overlaps = np.full(len(plan.plans), -1, dtype=np.int64)
-    if planes_tell(plan, packed):
+    if planes_tell(items, plan.whole):
         find_overlaps(plan.arrays, obj.tree, obj.rounds, obj.closed, T, shared, overlaps)
     answer = _close_plan(replace(plan, items=items), exact, obj, T, shared, rounds)
     return ClosedHand(answer, overlaps, shared, T_palm_object)

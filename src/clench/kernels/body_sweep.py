@@ -148,7 +148,7 @@ def sweep_body(
 ) -> float:
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
-    Pairs of items are looked at in the order in which they can meet, as far as balls, and capsules after those, tell. A
+    Pairs of items are looked at in the order in which they can meet, as far as balls, and boxes after those, tell. A
     pair is left out when that is not before `best`; when the items pass beside each other; or when a plane keeps them
     apart, as one does everywhere on a convex body: that between the elements that met last, before that one by which
     two never met. Elements that are left are swept.

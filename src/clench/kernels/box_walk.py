@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from .compiling import inner_kernel
-from .core_motion import move_core
+from .core_motion import move_core, plane_offset
 from .distance import closest_on_triangle
+from .earliest import STEPS
 from .layout import Floats
 from .sweep_pairs import step_to_plane
 from .vectors import Vector, cross, dot, scaled
 
-#: Steps of a walk at most.
-STEPS = 8
 #: How often the closest points of a core and a box are looked for, each from the other one.
 TURNS = 3
 #: Edges with a smaller sine between them are taken for parallel [-].
@@ -112,7 +111,7 @@ def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[flo
             if size <= max(gap, 0.0):
                 break
             m = scaled(d, 1.0 / size)
-            beyond = lowest(local, corners, m) - box_reach(box, m)
+            beyond = -plane_offset(local, corners, -m[0], -m[1], -m[2]) - box_reach(box, m)
             if beyond > gap:
                 gap, n = beyond, m
     nx = n[0] * box[1, 0] + n[1] * box[2, 0] + n[2] * box[3, 0]
@@ -125,15 +124,6 @@ def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[flo
 def clamped(x: float, half: float) -> float:
     """Return what is closest to a coordinate within half a size to either side."""
     return min(max(x, -half), half)
-
-
-@inner_kernel
-def lowest(core: Floats, corners: int, m: Vector) -> float:
-    """Return the smallest coordinate of a core along a direction."""
-    low: float = m[0] * core[0, 0] + m[1] * core[0, 1] + m[2] * core[0, 2]
-    for k in range(1, corners):
-        low = min(low, m[0] * core[k, 0] + m[1] * core[k, 1] + m[2] * core[k, 2])
-    return low
 
 
 @inner_kernel

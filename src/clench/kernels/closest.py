@@ -125,21 +125,6 @@ def separation(a: Floats, ka: int, b: Floats, kb: int) -> Separation:
 
 
 @inner_kernel
-def way_between(a: Floats, ka: int, b: Floats, kb: int) -> tuple[float, float, float, float]:
-    """Return how far two cores are apart, and a unit direction from the second to the first along which they are.
-
-    It is that of `separation`, found sooner for cores without faces; where they all but touch it is less sure.
-    """
-    if ka < 3 and kb < 3:
-        _, _, dx, dy, dz, square = edge_pair(a, 0, ka - 1, b, 0, kb - 1)
-        if square > 0.0:
-            d = math.sqrt(square)
-            return d, dx / d, dy / d, dz / d
-    d, nx, ny, nz, _, _, _, _, _ = separation(a, ka, b, kb)
-    return d, nx, ny, nz
-
-
-@inner_kernel
 def edge_direction(
     a: Floats, i: int, j: int, b: Floats, k: int, m: int, dx: float, dy: float, dz: float, inside: bool
 ) -> tuple[float, float, float]:

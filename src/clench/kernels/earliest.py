@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .closest import crosses, way_between
+from .closest import crosses, separation
 from .compiling import inner_kernel
 from .core_motion import corner_motion, move_core, plane_offset
 from .layout import Floats
@@ -79,7 +79,7 @@ def walk_core(
     s = begin
     for step in range(STEPS):
         move_core(core, ka, chain, count, s, placed)
-        d, nx, ny, nz = way_between(placed, ka, fixed, kb)
+        d, nx, ny, nz, _, _, _, _, _ = separation(placed, ka, fixed, kb)
         if d - w <= near or (step == 0 and crosses(placed, ka, fixed, kb)):
             return s
         offset = plane_offset(fixed, kb, nx, ny, nz) + w

@@ -35,7 +35,7 @@ class SweepWork(NamedTuple):
         poses: `T_palm_link` of every link, (L, 3, 4).
         lane: extent of every link, and of the object last, along the axis that a segment turns about, (L + 1, 2).
         after: the first joint that moves and does not move a link, (L,).
-        stack: pairs of items that wait, and whether `walk_core` has been there, (PAIRS, 3). keys: when they can meet at
+        stack: pairs of items that wait, and whether `walk_item` has been there, (PAIRS, 3). keys: when they can meet at
             the earliest, for one joint as a `turn_measure`; since: a travel before which they do not, (PAIRS,) each.
         box: that around a node of the resting body, see `put_box`, (5, 3).
         plane: normal and offset of one that keeps bodies apart, relative to the first pivot, then in the resting body's
