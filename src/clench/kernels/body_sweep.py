@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 from .bodies import BodyArrays
-from .box_walk import put_box, walk_to_box
+from .box_walk import put_box, walk_rectangle, walk_to_box
 from .compiling import inner_kernel
 from .earliest import ball_entry, measure_of, walk_ball, walk_core
 from .layout import Floats
 from .pair_queue import take_first, take_in
 from .parting import keep_plane, lay_plane, lies_within, passes_beside, stays_beyond
+from .slabs import put_slab_face
 from .spatial_motion import is_spatial
 from .sweep_pairs import sweep_pair
-from .sweeping import QUEUE, SweepWork, push_roots, put_ball, put_item, split_pair
+from .sweeping import QUEUE, SweepWork, is_looser, push_roots, put_ball, put_item, split_pair
 
 #: How coarsely the sweep of a node is settled, as a fraction of how thick it is, and of how wide [-].
 COARSE, WIDE = 0.1, 0.02
@@ -96,6 +97,14 @@ def keep_earliest(
 
 
 @inner_kernel
+def put_moving(moving: BodyArrays, a: int, T: Floats, out: Floats) -> tuple[int, float]:
+    """Write the core of a moving item, of a flat node a rectangle; return its corners and its radius."""
+    if a >= 0:
+        return put_slab_face(moving.slab[a], T, out)
+    return put_item(moving, a, T, out)
+
+
+@inner_kernel
 def walk_item(
     ka: int,
     wa: float,
@@ -119,6 +128,12 @@ def walk_item(
     near = touch + (COARSE * wa if a >= 0 else 0.0)
     if b < 0:
         kb, wb = put_item(resting, b, work.resting, work.fixed)
+        if ka == 4:
+            return float(
+                walk_rectangle(
+                    work.core, work.fixed, kb, work.box, wa + wb + touch, chain, count, near, since, best, work.placed
+                )
+            )
         return float(
             walk_core(work.core, ka, work.fixed, kb, wa + wb + touch, chain, count, near, since, best, work.placed)
         )
@@ -169,7 +184,7 @@ def sweep_body(
         if keys[row] >= limit and keys[row] > 0.0:
             continue
         a, b, since = stack[row, 0], stack[row, 1], work.since[row]
-        ka, wa = put_item(moving, a, work.moving, work.core)
+        ka, wa = put_moving(moving, a, work.moving, work.core)
         within = laid and lies_within(resting, b, work)
         if within and (a != beyond or since < apart):
             beyond, apart = a if stays_beyond(ka, wa, chain, count, since, best, work) else NONE, since
@@ -187,7 +202,7 @@ def sweep_body(
                     continue
             since, floor, low = work.since[row], keys[row], height
             known = beyond if since >= apart else NONE
-            height = split_pair(moving, a, resting, b, stack, low)
+            height = split_pair(moving, a, resting, b, is_looser(moving, a, resting, b), stack, low)
             height = keep_earliest(moving, resting, low, height, chain, count, touch, since, floor, limit, known, work)
             while low == QUEUE and queue < QUEUE and height > QUEUE:
                 height -= 1

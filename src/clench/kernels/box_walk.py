@@ -1,6 +1,7 @@
 """How long a moving core stays clear of the box around a node of a resting body (METHOD.md section 5).
 
-Small parts of a surface are flat: the boxes around them are thin, where capsules are as thick as they are wide.
+Small parts of a surface are flat: the boxes around them are thin, where capsules are as thick as they are wide. Of a
+moving node the core is the rectangle in the middle of its box.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from .vectors import Vector, cross, dot, scaled
 
 #: How often the closest points of a core and a box are looked for, each from the other one.
 TURNS = 3
+#: Squares of edges are taken to be at least this [m²].
+SMALLEST = 1e-300
 #: Edges with a smaller sine between them are taken for parallel [-].
 PARALLEL = 1e-6
 
@@ -37,6 +40,18 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
     u = np.float64(slab[3]), np.float64(slab[4]), np.float64(slab[5])
     v = np.float64(slab[6]), np.float64(slab[7]), np.float64(slab[8])
     w = np.float64(slab[9]), np.float64(slab[10]), np.float64(slab[11])
+    first, third = square_axes(u, v)
+    put_axis(first, u, v, w, T, 0, box)
+    put_axis(cross(third, first), u, v, w, T, 1, box)
+    put_axis(third, u, v, w, T, 2, box)
+    for r in range(3):
+        box[0, r] = T[r, 0] * slab[0] + T[r, 1] * slab[1] + T[r, 2] * slab[2] + T[r, 3]
+    return float(slab[12])
+
+
+@inner_kernel
+def square_axes(u: Vector, v: Vector) -> tuple[Vector, Vector]:
+    """Return the unit vectors along u and across both, whatever their sizes, up to none."""
     size = math.sqrt(dot(u, u))
     first = scaled(u, 1.0 / size) if size > 0.0 else (1.0, 0.0, 0.0)
     third = cross(first, v)
@@ -44,13 +59,7 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
     if size <= PARALLEL * math.sqrt(dot(v, v)):
         third = cross(first, (0.0, 0.0, 1.0) if abs(first[2]) < 0.5 else (0.0, 1.0, 0.0))
         size = math.sqrt(dot(third, third))
-    third = scaled(third, 1.0 / size)
-    put_axis(first, u, v, w, T, 0, box)
-    put_axis(cross(third, first), u, v, w, T, 1, box)
-    put_axis(third, u, v, w, T, 2, box)
-    for r in range(3):
-        box[0, r] = T[r, 0] * slab[0] + T[r, 1] * slab[1] + T[r, 2] * slab[2] + T[r, 3]
-    return float(slab[12])
+    return first, scaled(third, 1.0 / size)
 
 
 @inner_kernel
@@ -62,18 +71,26 @@ def put_axis(axis: Vector, u: Vector, v: Vector, w: Vector, T: Floats, k: int, b
 
 
 @inner_kernel
+def nearest_on_edge(a: Vector, edge: Vector, p: Vector) -> Vector:
+    """Return the point of the segment from `a` along an edge that is closest to a point."""
+    along = edge[0] * (p[0] - a[0]) + edge[1] * (p[1] - a[1]) + edge[2] * (p[2] - a[2])
+    t = min(max(along / max(dot(edge, edge), SMALLEST), 0.0), 1.0)
+    return a[0] + t * edge[0], a[1] + t * edge[1], a[2] + t * edge[2]
+
+
+@inner_kernel
 def nearest_of(core: Floats, corners: int, p: Vector) -> Vector:
-    """Return the point of a core that is closest to a point."""
+    """Return the point of a core that is closest to a point; four corners are those of a rectangle, in order."""
     a = core[0, 0], core[0, 1], core[0, 2]
     if corners == 1:
         return a
     b = core[1, 0], core[1, 1], core[1, 2]
     if corners == 3:
         return closest_on_triangle(p, a, b, (core[2, 0], core[2, 1], core[2, 2]))
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    along = ux * (p[0] - a[0]) + uy * (p[1] - a[1]) + uz * (p[2] - a[2])
-    t = min(max(along / (ux * ux + uy * uy + uz * uz), 0.0), 1.0)
-    return a[0] + t * ux, a[1] + t * uy, a[2] + t * uz
+    q = nearest_on_edge(a, (b[0] - a[0], b[1] - a[1], b[2] - a[2]), p)
+    if corners == 2:
+        return q
+    return nearest_on_edge(q, (core[3, 0] - a[0], core[3, 1] - a[1], core[3, 2] - a[2]), p)
 
 
 @inner_kernel
@@ -84,7 +101,8 @@ def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[flo
     are the box's axes, and that between the closest points, as far as a few looks from either find them.
 
     Args:
-        core: (3, 3). corners: how many of its rows count. box: see `put_box`. local: scratch space, (3, 3).
+        core: up to a rectangle, (4, 3). corners: how many of its rows count. box: see `put_box`. local: scratch space,
+            (4, 3).
 
     Returns:
         gap, unit direction, largest coordinate of the box along it.
@@ -154,10 +172,64 @@ def walk_to_box(
     s = begin
     for _ in range(STEPS):
         move_core(core, ka, chain, count, s, placed)
-        gap, nx, ny, nz, top = off_box(placed, ka, box, placed[3:])
+        gap, nx, ny, nz, top = off_box(placed, ka, box, placed[4:])
         if gap - w <= near:
             return s
         s += step_to_plane(core, placed, ka, chain, count, nx, ny, nz, top + w + 0.5 * near, s, best - s)
+        if s >= best:
+            return math.inf
+    return s
+
+
+@inner_kernel
+def put_rectangle(corners: Floats, box: Floats) -> None:
+    """Write a box without height around a rectangle, whose corners are given in order, (4, 3)."""
+    u = edge_half(corners, 1)
+    v = edge_half(corners, 3)
+    first, third = square_axes(u, v)
+    second = cross(third, first)
+    for r in range(3):
+        box[0, r] = 0.5 * (corners[0, r] + corners[2, r])
+        box[1, r], box[2, r], box[3, r] = first[r], second[r], third[r]
+    box[4, 0] = abs(dot(first, u)) + abs(dot(first, v))
+    box[4, 1], box[4, 2] = abs(dot(second, v)), 0.0
+
+
+@inner_kernel
+def edge_half(corners: Floats, k: int) -> Vector:
+    """Return half of the way from the first corner to corner `k`."""
+    a, b = corners[0], corners[k]
+    return 0.5 * (b[0] - a[0]), 0.5 * (b[1] - a[1]), 0.5 * (b[2] - a[2])
+
+
+@inner_kernel
+def walk_rectangle(
+    core: Floats,
+    fixed: Floats,
+    kb: int,
+    box: Floats,
+    w: float,
+    chain: Floats,
+    count: int,
+    near: float,
+    begin: float,
+    best: float,
+    placed: Floats,
+) -> float:
+    """Return what `walk_to_box` does, for a rectangle that moves towards a resting core.
+
+    Args:
+        core: the rectangle's corners, in order, (4, 3). fixed, kb: the core. box: scratch space, (5, 3).
+    """
+    s = begin
+    for _ in range(STEPS):
+        move_core(core, 4, chain, count, s, placed)
+        put_rectangle(placed, box)
+        gap, nx, ny, nz, _ = off_box(fixed, kb, box, placed[4:])
+        if gap - w <= near:
+            return s
+        offset = plane_offset(fixed, kb, -nx, -ny, -nz) + w + 0.5 * near
+        s += step_to_plane(core, placed, 4, chain, count, -nx, -ny, -nz, offset, s, best - s)
         if s >= best:
             return math.inf
     return s

@@ -22,6 +22,10 @@ Whole = NDArray[np.int64]
 SLAB: Final = 13
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
 THIN: Final = 0.75
+#: A box that is no thinner than that, as a fraction of what is across its longest edge, is not seen as flat [-].
+FLAT: Final = 0.5
+#: How much of a box's width counts as slack beside its thickness [-].
+SOME: Final = 0.1
 #: More than how far from square the edges of a box are in single precision [-].
 ALMOST: Final = 1.0 + 1e-6
 #: More than rounding to single precision takes from the smallest numbers [m].
@@ -131,6 +135,16 @@ def slab_top(slab: Any, nx: float, ny: float, nz: float) -> float:
 
 
 @inner_kernel
+def slab_slack(slab: Any) -> float:
+    """Return about how far a box reaches beyond what is in it: its thickness, and some of its width [m]."""
+    thin, wide = 0.0, 0.0
+    for k in range(3):
+        wide += slab[6 + k] * slab[6 + k]
+        thin += slab[9 + k] * slab[9 + k]
+    return math.sqrt(thin) + SOME * math.sqrt(wide)
+
+
+@inner_kernel
 def slab_misses(slab: Any, T: Floats, core: Floats, corners: int, w: float) -> bool:
     """Say whether a core lies farther than `w` beyond a face of a box, where a pose puts that; else nothing is known.
 
@@ -179,3 +193,25 @@ def put_slab_core(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
         step = T[r, 0] * slab[3] + T[r, 1] * slab[4] + T[r, 2] * slab[5]
         out[0, r], out[1, r] = out[0, r] - step, out[0, r] + step
     return 2, math.sqrt(wide) * ALMOST + slab[12]
+
+
+@inner_kernel
+def put_slab_face(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
+    """Write a core of a box, in a pose: the rectangle through its middle along its longer edges, or `put_slab_core`'s.
+
+    Returns:
+        how many corners the core has, and what it is to be grown by to hold the box [m].
+    """
+    wide, thin = 0.0, 0.0
+    for k in range(3):
+        wide += np.float64(slab[6 + k]) ** 2
+        thin += np.float64(slab[9 + k]) ** 2
+    if thin >= FLAT * FLAT * (wide + thin):
+        return put_slab_core(slab, T, out)
+    put_point(T, slab, out[0])
+    for r in range(3):
+        middle = out[0, r]
+        u = T[r, 0] * slab[3] + T[r, 1] * slab[4] + T[r, 2] * slab[5]
+        v = T[r, 0] * slab[6] + T[r, 1] * slab[7] + T[r, 2] * slab[8]
+        out[0, r], out[1, r], out[2, r], out[3, r] = middle - u - v, middle + u - v, middle + u + v, middle - u + v
+    return 4, math.sqrt(thin) * ALMOST + slab[12]

@@ -14,7 +14,7 @@ from .core_motion import plane_gap
 from .crossing import only_touch
 from .family_pose import put_point
 from .layout import Floats, Ints
-from .slabs import put_slab_core, slab_misses
+from .slabs import put_slab_core, slab_misses, slab_slack
 from .spatial_motion import SPATIAL
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
@@ -27,8 +27,8 @@ class SweepWork(NamedTuple):
     """Hold the scratch space of a sweep.
 
     Args:
-        core, fixed: corners of a pair, (3, 3) each. placed: those of the moving one on its way, and scratch space, see
-            `sweep_pair`, (6, 3).
+        core, fixed: corners of a pair, (4, 3) and (3, 3). placed: those of the moving one on its way, and scratch
+            space, see `sweep_pair` and `off_box`, (8, 3).
         axis, anchor: of the joints where a segment begins, in the palm frame, (J, 3) each. spatial: see
             `spatial_motion`, (J, 7).
         moving, resting: poses of two bodies relative to their pivots, (3, 4).
@@ -37,7 +37,7 @@ class SweepWork(NamedTuple):
         after: the first joint that moves and does not move a link, (L,).
         stack: pairs of items that wait, and whether `walk_item` has been there, (PAIRS, 3). keys: when they can meet at
             the earliest, for one joint as a `turn_measure`; since: a travel before which they do not, (PAIRS,) each.
-        box: that around a node of the resting body, see `put_box`, (5, 3).
+        box: that around a node of either body, see `put_box`, (5, 3).
         plane: normal and offset of one that keeps bodies apart, relative to the first pivot, then in the resting body's
             frame, (8,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
@@ -69,9 +69,9 @@ class SweepWork(NamedTuple):
 def make_sweep_work(joints: int, links: int) -> SweepWork:
     """Allocate the scratch space for sweeps of a hand."""
     return SweepWork(
+        np.empty((4, 3)),
         np.empty((3, 3)),
-        np.empty((3, 3)),
-        np.empty((6, 3)),
+        np.empty((8, 3)),
         np.empty((joints, 3)),
         np.empty((joints, 3)),
         np.empty((joints, SPATIAL)),
@@ -154,9 +154,24 @@ def push_roots(moving: BodyArrays, m: int, resting: BodyArrays, r: int, stack: I
 
 
 @inner_kernel
-def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, stack: Ints, waiting: int) -> int:
-    """Put the parts of the larger of two items on the stack, each against the other; return its new height."""
-    if b < 0 or (a >= 0 and moving.node[a, 3] >= resting.node[b, 3]):
+def is_wider(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
+    """Say whether the moving one of two items, that are not both elements, has the larger ball, or is the only node."""
+    return bool(b < 0 or (a >= 0 and moving.node[a, 3] >= resting.node[b, 3]))
+
+
+@inner_kernel
+def is_looser(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
+    """Say whether the moving one of two items has the box that tells less about what is in it, or is the only node.
+
+    It need not be the wider one, which may be a strip of a wall.
+    """
+    return bool(b < 0 or (a >= 0 and slab_slack(moving.slab[a]) >= slab_slack(resting.slab[b])))
+
+
+@inner_kernel
+def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, first: bool, stack: Ints, waiting: int) -> int:
+    """Put the parts of one of two items, of `a` where `first`, on the stack against the other; see `push_parts`."""
+    if first:
         return push_parts(moving, a, 0, b, stack, waiting)
     return push_parts(resting, b, 1, a, stack, waiting)
 
@@ -187,7 +202,7 @@ def body_gap(
                 best = gap
                 work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
                 continue
-        height = split_pair(moving, a, resting, b, stack, waiting)
+        height = split_pair(moving, a, resting, b, is_wider(moving, a, resting, b), stack, waiting)
         put_nearest_last(moving, resting, stack, waiting, height, work)
         waiting = height
     return best
@@ -264,7 +279,7 @@ def bodies_overlap(
                 continue
             if b >= 0 and slab_misses(resting.slab[b], work.resting, work.core, ka, wa):
                 continue
-        waiting = split_pair(moving, a, resting, b, stack, waiting)
+        waiting = split_pair(moving, a, resting, b, is_wider(moving, a, resting, b), stack, waiting)
     return False
 
 

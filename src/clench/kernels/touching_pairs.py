@@ -9,7 +9,7 @@ from .closest import Separation, above_face, edge_count, edge_pair, face_normal,
 from .compiling import allocating_kernel, inner_kernel
 from .family_pose import copy_pose
 from .layout import Floats, Ints
-from .sweeping import SweepWork, ball_gap, make_sweep_work, put_item, split_pair
+from .sweeping import SweepWork, ball_gap, is_wider, make_sweep_work, put_item, split_pair
 
 #: Columns of the integers: posture, moving link, what it touches (a link, or the number of links for the object).
 PAIR_STAGE, PAIR_LINK, PAIR_MET = 0, 1, 2
@@ -96,7 +96,7 @@ def _add_pairs(
                 if found[0] - wa - wb >= -within:
                     count = _add_touches(found, ka, kb, wa, wb, tie, numbers, first, count, work)
                 continue
-        waiting = split_pair(moving, a, resting, b, stack, waiting)
+        waiting = split_pair(moving, a, resting, b, is_wider(moving, a, resting, b), stack, waiting)
     return count
 
 
