@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels import slabs
+from clench.kernels import slabs, sweeping
 from clench.kernels.bodies import Elements, pack_bodies
 from kernels.kernel_entries import entry
 from kernels.test_body_sweep import KINDS, patch, pose
@@ -15,6 +15,9 @@ from kernels.test_body_sweep import KINDS, patch, pose
 slab_top, slab_misses = entry(slabs.slab_top), entry(slabs.slab_misses)
 put_slab_core = entry(slabs.put_slab_core)
 
+is_wider, is_looser = entry(sweeping.is_wider), entry(sweeping.is_looser)
+
+STRIP = np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)
 IDENTITY = np.eye(4)[:3]
 
 
@@ -55,6 +58,20 @@ def test_boxes_and_capsules_hold_all_elements(seed, kind, count, scale):
             assert (points @ n + radius).max() <= slab_top(body.slab[node], *n)
         middle, half, reach = capsule(body.slab[node])
         assert (to_segment(points, middle, half) + radius <= reach).all()
+
+
+def test_of_two_boxes_the_one_that_tells_less_is_looser():
+    """A strip of a wall is wider than a finger tip's pad, and yet known better where the two meet."""
+    strip = Elements(np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.01, 0], [0.1, 0.01, 1e-5]]), STRIP, np.zeros(2))
+    pad = Elements(np.array([[0.0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.01, 0.004]]), STRIP, np.zeros(2))
+    wall, tip = pack_bodies([strip]), pack_bodies([pad])
+    assert is_wider(wall, 0, tip, 0)
+    assert not is_looser(wall, 0, tip, 0)
+    assert is_looser(tip, 0, wall, 0)
+    # Elements have no parts.
+    for choose in (is_wider, is_looser):
+        assert choose(wall, 0, tip, -1)
+        assert not choose(wall, -1, tip, 0)
 
 
 def test_they_are_thin_where_the_surface_is():
