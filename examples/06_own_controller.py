@@ -9,6 +9,7 @@ class Servos:
     """Servos in memory that say degrees and go straight to what they were told; put your bus in their place."""
 
     name = "my servos"
+    one_target = True  # of a path, command passes on one target alone
     limits = clench.DriverLimits(velocities={"index_proximal_servo": 90.0})
 
     def __init__(self, joints: list[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -64,6 +65,46 @@ def test_no_command_reaches_beyond_the_horizon_and_all_are_slow_enough(pincer: H
         assert (steps <= np.array([3.0, 2.0]) * (1 + 1e-6)).all()
     lowest = min(path.positions[:, 0].min() for path in driver.commands)
     assert lowest == pytest.approx(0.0, abs=1e-12)
+
+
+class Servos(FakeDriver):
+    """Go at once to where a path is when the next one is due; `pause` is how long the program stops after a path."""
+
+    def __init__(self, joints: dict[str, float], pause: Callable[[JointPath], float]) -> None:
+        super().__init__(joints)
+        self.pause = pause
+
+    def where(self) -> dict[str, float]:
+        return self.start
+
+    def command(self, path: JointPath) -> None:
+        super().command(path)
+        self.start = {**self.start, **path.at(path.period)}
+        time.sleep(self.pause(path))
+
+
+def test_servos_arrive_when_the_program_pauses_before_the_end(pincer: Hand, solution: GraspSolution) -> None:
+    end = np.array([solution.joint_angles[name] for name in OPEN])
+    driver = Servos(OPEN, lambda path: 0.4 if np.allclose(path.positions[-1], end, atol=1e-9) else 0.0)
+    report = run(driver, pincer, solution, settling=0.1)
+    assert report.success, report.reason
+    for name in OPEN:
+        assert driver.where()[name] == pytest.approx(solution.joint_angles[name], abs=1e-9)
+
+
+@pytest.mark.parametrize("one_target", [True, False])
+def test_after_a_pause_servos_go_on_from_the_target_they_were_told(
+    pincer: Hand, solution: GraspSolution, one_target: bool
+) -> None:
+    driver = Servos(OPEN, lambda _: 0.15)
+    driver.one_target = one_target  # type: ignore[attr-defined]
+    assert run(driver, pincer, solution).success
+    targets = np.array([list(path.at(path.period).values()) for path in driver.commands])
+    fastest = np.abs(np.diff(targets, axis=0)).max(axis=0) / PERIOD
+    planned = max(
+        (np.abs(np.diff(p.positions, axis=0)) / np.diff(p.times)[:, None]).max() for p in driver.commands[:-1]
+    )
+    assert (fastest.max() <= planned * (1.0 + 1e-6)) == one_target
 
 
 def test_other_names_units_offsets_and_directions(pincer: Hand, solution: GraspSolution) -> None:

@@ -227,9 +227,12 @@ def test_killing_our_program_stops_the_hand(world: World, ours: str) -> None:
     time.sleep(0.4)
     assert driving.poll() is None
     driving.kill()
-    time.sleep(0.8)
-    samples = np.array(world.log(node)["samples"])
-    assert np.ptp(samples[-20:, 1:], axis=0).max() == 0.0
+    time.sleep(HORIZON + 1.0)
+    log = world.log(node)
+    samples = np.array(log["samples"])
+    later = samples[samples[:, 0] > log["last"] + HORIZON, 1:]
+    assert len(later) > 5
+    assert np.ptp(later, axis=0).max() == 0.0  # however busy the machine is
     assert (samples[-1, 1:] < 0.95 * targets(world.solution)).all()
     assert (samples[-1, 1:] > 0.0).any()
 

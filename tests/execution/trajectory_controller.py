@@ -22,7 +22,7 @@ class Joints:
         self.times, self.points = np.zeros(1), self.at[None]
         self.refused: list[str] = []
         self.jumps: list[float] = []
-        self.accepted = 0
+        self.accepted, self.last = 0, 0.0
 
     def take(self, names: list[str], times: list[float], points: list[list[float]]) -> None:
         if set(names) != set(self.names) or len(names) != len(self.names):
@@ -40,7 +40,7 @@ class Joints:
             else:
                 self.jumps.append(float(np.abs(told[0] - self.now()).max()))
             self.points, self.times = told, times
-            self.accepted += 1
+            self.accepted, self.last = self.accepted + 1, now
 
     def now(self) -> np.ndarray:
         return np.array([np.interp(time.monotonic(), self.times, c) for c in self.points.T])
@@ -203,7 +203,7 @@ def main() -> None:
             dds.say([*joints.names, "elbow"], [*at.tolist(), 1.0], stamp)
         time.sleep(0.01)
     log = {"accepted": joints.accepted, "refused": joints.refused, "cut": cut, "samples": samples}
-    log["jumps"] = joints.jumps
+    log |= {"jumps": joints.jumps, "last": None if moving is None else joints.last - moving}
     a.log.write_text(json.dumps(log))
     os._exit(0)
 

@@ -82,6 +82,15 @@ class TendonDriver(Protocol):
         """
 
 
+@runtime_checkable
+class OneTargetDriver(Protocol):
+    """Pass on one target of a path, ``path.at(path.period)``: what a driver can say of itself besides `HandDriver`."""
+
+    @property
+    def one_target(self) -> bool:
+        """Whether, after a pause of this program, the hand stands at that target and not at the end of the path."""
+
+
 class HandDriver(Protocol):
     """Talk to the controller of a hand, in the controller's own joint names and units.
 

@@ -16,7 +16,7 @@ import numpy as np
 from clench.base.pose import FloatArray
 
 from .command_check import CommandCheck
-from .driver import DriverError, HandDriver, HandState, JointPath
+from .driver import DriverError, HandDriver, HandState, JointPath, OneTargetDriver
 
 #: How often the controller is read and told more [s].
 PERIOD = 0.05
@@ -140,23 +140,23 @@ class Follower:
 
     def _move(self, plan: TimedPlan, found: Followed) -> None:
         begun = latest = time.monotonic()
-        moment, told = 0.0, 0.0
+        one_target = isinstance(self.driver, OneTargetDriver) and self.driver.one_target
+        moment, ahead = 0.0, PERIOD if one_target else HORIZON
         while True:
             state, expected = self.driver.read(), plan.at(moment)
             self.check.state(state, plan.at(moment - state.age(plan.joints)))
             found.sample(latest - begun, expected, state)
             if self.stopping.is_set():
                 raise DriverError("Stopped on request.")
-            if moment >= plan.duration:
-                return
             path = plan.window(moment, HORIZON)
             self.check.command(path, expected)
             self.driver.command(path)
-            told = moment + HORIZON
+            if moment >= plan.duration:
+                return  # told the end, however late this program came to it
             self.stopping.wait(max(0.0, latest + PERIOD - time.monotonic()))
             now = time.monotonic()
             # After a pause of this program the hand stands where it was told last: the plan goes on from there.
-            moment, latest = min(moment + (now - latest), told), now
+            moment, latest = moment + min(now - latest, ahead), now
 
     def _settle(self, plan: TimedPlan, found: Followed) -> None:
         begun, before = time.monotonic(), found.times[-1]

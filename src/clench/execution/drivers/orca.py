@@ -26,6 +26,8 @@ class OrcaDriver:
         CommandError: orca-core is not installed. FileError: the configuration cannot be used.
     """
 
+    one_target = True
+
     def __init__(self, config: str | Path | None = None, *, mock: bool = False, version: str | None = None) -> None:
         if importlib.util.find_spec("orca_core") is None:
             raise CommandError("orca-core is not installed; pip install 'clench[drivers]'.")
