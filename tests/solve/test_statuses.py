@@ -199,6 +199,40 @@ def test_a_link_that_only_a_posture_joint_moves_blocks_its_finger():
     assert solution.reason["link"] == "index_link_0"
 
 
+def two_families():
+    """Return a hand whose tip turns about an axis of its own, and is narrower than the link before it."""
+    shapes = [Shape(ShapeKind.BOX, (0.025, y, 0.004), Pose([0.025, 0.0, 0.0])) for y in (0.012, 0.01)]
+    axes = [-Y, turned(np.array([1.0, 0.0, 0.0]), 0.01) @ -Y]
+    return HandBuilder().finger("index", shapes, [0.05, 0.05], axes=axes, upper=0.4).hand()
+
+
+def test_a_plane_on_which_other_joints_bring_a_link_into_the_object_has_no_set():
+    """On the outermost planes the first joint meets nothing: the tip is on none of them, but on those of its own."""
+    hand, obj = two_families(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
+    index = clench.solve(hand, obj, command(planes=3, full_width=False)).fingers["index"]
+    for c in (index.candidates[0], index.candidates[-1]):
+        assert (c.status, c.feasible, c.contacts) == ("blocked", False, ())
+        assert c.reason.startswith("index_link_1 overlaps sphere:r=0.02 on this plane, where joints that turn in other")
+        assert c.joint_angles == {"index_0": 0.0, "index_1": 0.0}
+    assert (index.status, index.chosen) == ("touch", len(index.candidates) // 2)
+
+
+def test_a_finger_without_a_set_on_any_plane_does_not_move():
+    hand, obj = two_families(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
+    asked = command(planes=2, full_width=False)
+    solution = clench.solve(hand, obj, asked)
+    assert (solution.status, solution.fingers["index"].status) == ("no_contact", "blocked")
+    assert set(solution.joint_angles.values()) == {0.0}
+    cause = solution.fingers["index"].cause
+    assert (cause["code"], cause["link"]) == ("blocked_on_the_way", "index_link_1")
+    assert cause["text"].endswith("would bring index_link_1 into sphere:r=0.02: close over the full width.")
+    assert solution.certificate["code"] == "one_plane"
+    batch = clench.solve_batch(hand, obj, [asked.hand_pose], asked)
+    assert (batch.status[0], batch.finger_status[0, 0]) == ("no_contact", "blocked")
+    assert not batch.joint_angles.any()
+    assert clench.solve(hand, obj, command(planes=2)).status == "grasp"
+
+
 @pytest.mark.parametrize(
     ("text", "position"),
     [

@@ -17,6 +17,8 @@ PARALLEL_ANGLE: Final = 1e-9
 CLOSING_ANGLE: Final = 0.08726646259971647  # 5 degrees
 #: A contact that a later motion opened by more than this is `passed` [m] (section 4).
 PASSED_GAP: Final = 1e-6
+#: A contact overlaps by less than this, which is rounding [m] (section 4).
+CONTACT_OVERLAP: Final = 1e-9
 #: A set is feasible up to this penetration, besides the pads' allowance [m] (section 5).
 ALLOWED_PENETRATION: Final = 1e-6
 #: Edge planes lie inside the finger by this fraction of its width [-] (section 1).

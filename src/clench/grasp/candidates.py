@@ -69,6 +69,7 @@ class FingerCandidate:
         q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
         touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
             or None; then nothing moves.
+        late: it would do so on the plane only once joints about another axis had moved; nothing moves either.
         exact: it was swept over the whole width. clear: it passes through nothing on any of the planes.
         feasible, penetration: over the whole width, path included; None when not measured.
         scores: criterion name to value. item: number of its item of work.
@@ -81,6 +82,7 @@ class FingerCandidate:
     q: FloatArray
     touches: tuple[Touch, ...]
     overlap: LinkDepth | None
+    late: bool = False
     exact: bool = False
     clear: bool = False
     feasible: bool | None = None
@@ -142,6 +144,8 @@ def read_candidates(
         hand, plan: what closed. packed, T_palm_object: the object, shape (4, 4). answer: what the kernels computed.
         overlaps: as `start_overlaps` gives them, per entry.
     """
+    from clench.kernels.layout import SUNK
+
     entries = plan.items.entry.tolist()
     blocked = [overlaps[entry] is not None for entry in entries]
     if any(blocked):
@@ -150,6 +154,7 @@ def read_candidates(
         travel[still] = 0.0
         answer = answer._replace(travel=travel, contacts=contacts)
     touches, postures = _read_items(hand, plan, packed, T_palm_object, answer)
+    sunk = [LinkDepth(SUNK - link, 0.0, None) if link <= SUNK else None for link in answer.overlap.tolist()]
     groups, low, skipped = plan.arrays.entry_group.tolist(), plan.items.low.tolist(), answer.skipped.tolist()
     candidates = []
     for i, entry in enumerate(entries):
@@ -165,7 +170,8 @@ def read_candidates(
                 travel=answer.travel[i, groups[entry] : groups[entry + 1]],
                 q=q,
                 touches=touches[i],
-                overlap=overlaps[entry],
+                overlap=overlaps[entry] or sunk[i],
+                late=not blocked[i] and sunk[i] is not None,
                 exact=plan.whole[i] and not skipped[i],
             )
         )

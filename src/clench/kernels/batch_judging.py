@@ -15,7 +15,7 @@ from .batch_sequence import take_joints
 from .compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays, find_link_overlap
 from .frames import FrameArrays, couple, place_links, put_angles
-from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays
+from .layout import SUNK, ClosingArrays, Floats, HandArrays, Ints, ItemArrays
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, make_depth_work
 from .start_overlap import any_deep
 from .touches import (
@@ -142,7 +142,7 @@ def choose_sets(
     """Choose an item of every entry: the full width, else the plane that `clench.grasp.choice` takes; read touches."""
     for entry in range(scratch.chosen.shape[0]):
         scratch.chosen[entry] = -1
-    held, best = False, 0.0
+    rank, best = 0, 0.0
     for i in range(items.entry.shape[0]):
         entry = items.entry[i]
         links = read_item(hand, frames, surface, entry, answer, i, T_palm_object, scratch.touches)
@@ -150,9 +150,9 @@ def choose_sets(
         put_angles(frames, entry, first, last, answer.travel[i], scratch.angles)
         total = 0.0 if wanted.whole else set_total(hand, frames, wanted, entry, links, scratch.angles)
         total += wanted.margin if i == wanted.present[entry] else 0.0
-        first_of_all = scratch.chosen[entry] < 0
-        if first_of_all or (links > 0 and not held) or ((links > 0) == held and total > best):
-            scratch.chosen[entry], held, best = i, links > 0, total
+        above = (2 if answer.overlap[i] > SUNK else 0) + (1 if links > 0 else 0)
+        if scratch.chosen[entry] < 0 or above > rank or (above == rank and total > best):
+            scratch.chosen[entry], rank, best = i, above, total
 
 
 @inner_kernel
@@ -236,7 +236,8 @@ def write_fingers(
         i, first, last = scratch.chosen[entry], hand.entry_group[entry], hand.entry_group[entry + 1]
         contacts = answer.contacts[i]
         links = holding_links(scratch.touches, i, contacts)
-        solved.fingers[n, entry] = finger_status(hand, entry, blocked[entry] != 0, links)
+        stuck = blocked[entry] != 0 or answer.overlap[i] <= SUNK
+        solved.fingers[n, entry] = finger_status(hand, entry, stuck, links)
         solved.chosen[n, entry], solved.contacts[n, entry] = i, contacts
         for m in range(contacts):
             for k in range(TOUCH_INTEGERS):

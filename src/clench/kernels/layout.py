@@ -207,7 +207,8 @@ class ClosingArrays(NamedTuple):
         point: numbers of each contact in its family's plane, (I, S, 7), see below.
         pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
         overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
-        overlap: link that overlaps the object at the start over its width, or -1, (I,); then nothing moves.
+        overlap: link that overlaps the object at the start over its width, (I,); then nothing moves. Or `SUNK` - link
+            where earlier families would bring it there on the item's one plane; nothing moves either. Else -1.
         skipped: pairs of the hand's own links that were left alone, as they overlapped already, (I,).
     """
 
@@ -222,6 +223,8 @@ class ClosingArrays(NamedTuple):
     skipped: Ints
 
 
+#: See `ClosingArrays.overlap`.
+SUNK = -2
 #: Columns of `ClosingArrays.hit`.
 HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE, HIT_WHICH = 0, 1, 2, 3, 4, 5, 6, 7
 #: The last joint that the contact stops.

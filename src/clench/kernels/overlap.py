@@ -134,6 +134,31 @@ def starts_inside(
     return bool(is_inside(tree, p, closed))
 
 
+@inner_kernel
+def find_on_plane(
+    hand: HandArrays,
+    plane: int,
+    touch: float,
+    tree: MeshTree,
+    rounds: RoundArrays,
+    closed: bool,
+    T_family_object: Floats,
+    sections: SectionArrays,
+    row: int,
+    work: Work,
+) -> int:
+    """Return an outline of a plane that overlaps the object with the joints where they are placed, or -1."""
+    for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
+        outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
+        x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
+        if (
+            starts_inside(tree, rounds, closed, T_family_object, x, hand.plane_offset[plane], z)
+            and not closer_than(outline, sections, row, 4.0 * touch, work)
+        ) or curves_overlap(outline, sections, row, touch, work):
+            return o
+    return -1
+
+
 @kernel
 def look_for_overlaps(
     hand: HandArrays,
@@ -156,15 +181,7 @@ def look_for_overlaps(
         place_joints(hand.chain, family, turns, work.place)
         compose_inverse(hand.family_pose[family], T_palm_object, T)
         for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
-            for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
-                outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
-                x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
-                if (
-                    starts_inside(tree, rounds, closed, T, x, hand.plane_offset[plane], z)
-                    and not closer_than(outline, sections, plane, 4.0 * touch, work)
-                ) or curves_overlap(outline, sections, plane, touch, work):
-                    overlaps[entry] = o
-                    break
+            overlaps[entry] = find_on_plane(hand, plane, touch, tree, rounds, closed, T, sections, plane, work)
             if overlaps[entry] >= 0:
                 break
 

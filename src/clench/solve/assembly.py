@@ -206,7 +206,10 @@ def _body_name(t: Touch, problem: Problem) -> str:
 def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, str]:
     hand, name = problem.hand, c.plan.finger.name
     if c.overlap is not None:
-        return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} before {name} moves."
+        when = (
+            "on this plane, where joints that turn in other planes would bring it" if c.late else f"before {name} moves"
+        )
+        return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} {when}."
     if problem.command.order == ClosingOrder.FINGERTIP and c.missed:
         first, tip = hand.links[c.touches[0].link].name, hand.links[c.plan.finger.tip_link].name
         return FingerStatus.MISSED, f"{first} touches {_body_name(c.touches[0], problem)} before the tip {tip} does."
@@ -233,9 +236,9 @@ def _status(
     deepest = max(answer.at_start, key=lambda d: d.depth, default=None)
     if deepest is not None and deepest.depth > ALLOWED_PENETRATION:
         return SolutionStatus.BLOCKED, DeferredMapping(partial(_overlap_reason, deepest, problem))
-    statuses = [r.status for r in results.values()]
-    if all(s is FingerStatus.BLOCKED for s in statuses):
-        worst = max((c.overlap for c in answer.best if c.overlap), key=lambda d: d.depth)
+    stuck = [c.overlap for c in answer.best if c.overlap is not None and not c.late]
+    if len(stuck) == len(results):
+        worst = max(stuck, key=lambda d: d.depth)
         return SolutionStatus.BLOCKED, DeferredMapping(partial(_overlap_reason, worst, problem))
     touching = [r.name for r in results.values() if r.status is FingerStatus.TOUCH]
     if not touching:

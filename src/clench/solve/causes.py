@@ -28,6 +28,8 @@ class CauseCode(StrEnum):
 
     BLOCKED_AT_START = "blocked_at_start"
     """a link overlaps the object or an obstacle before the finger moves"""
+    BLOCKED_ON_THE_WAY = "blocked_on_the_way"
+    """on the plane alone, joints that turn in other planes would bring a link into the object"""
     NO_CLOSING_JOINT = "no_closing_joint"
     """the finger has none"""
     NO_MOTION = "no_motion"
@@ -90,9 +92,14 @@ def _blocked(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
         place = problem.T_world_object.apply(found.place).tolist()
         body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
         depth = f" by {found.depth * 1e3:.2f} mm"
-    text = f"{link} overlaps {body}{depth} before {name} moves: start farther away, or with the finger more open."
+    code, text = CauseCode.BLOCKED_AT_START, f"{link} overlaps {body}{depth} before {name} moves"
+    if c.late:
+        code = CauseCode.BLOCKED_ON_THE_WAY
+        text = f"On the plane, joints of {name} that turn in other planes would bring {link} into {body}"
+    advice = "close over the full width" if c.late else "start farther away, or with the finger more open"
+    text = f"{text}: {advice}."
     return {
-        "code": CauseCode.BLOCKED_AT_START.value,
+        "code": code.value,
         "text": text,
         "link": link,
         "other": body,

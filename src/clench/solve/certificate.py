@@ -115,7 +115,7 @@ def certify(
     opened = problem.start.copy()
     for c in best:
         name = c.plan.finger.name
-        if c.overlap is not None:
+        if c.overlap is not None and not c.late:
             link = hand.links[c.overlap.link].name
             text = f"{name} overlaps the object before it moves."
             return _refused(CertificateCode.BLOCKED_AT_START, text, [link], name)

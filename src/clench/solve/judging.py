@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from clench.base.deferring import DeferredMapping
-from clench.base.tolerances import ALLOWED_PENETRATION, PASSED_GAP
+from clench.base.tolerances import ALLOWED_PENETRATION, CONTACT_OVERLAP, PASSED_GAP
 
 from .solution import Contact, FingerResult, FingerStatus, GraspSolution
 
-#: No contact may overlap the object by more than this [m] (METHOD.md section 3).
-CONTACT_OVERLAP = 1e-9
 #: What lies between two curl planes of a set that is not certified over its width may be overlapped this far [m].
 SAMPLED_PENETRATION = 1e-3
 #: Angles may exceed a limit by rounding only [rad].

@@ -34,7 +34,7 @@ class FingerStatus(StrEnum):
     LIMIT = "limit"
     """every closing joint reached its limit without touching"""
     BLOCKED = "blocked"
-    """a link of the finger overlaps the object before anything moves"""
+    """a link of the finger overlaps the object before anything moves, or would on its plane alone"""
     NO_MOTION = "no_motion"
     """no closing joint can move"""
     MISSED = "missed"

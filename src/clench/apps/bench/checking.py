@@ -10,15 +10,13 @@ import numpy as np
 
 from clench.base.json_files import non_finite_path
 from clench.base.pose import FloatArray
-from clench.base.tolerances import PASSED_GAP
+from clench.base.tolerances import CONTACT_OVERLAP, PASSED_GAP
 from clench.models.shapes import ShapeKind
 
 if TYPE_CHECKING:
     from clench.models.objects.grasp_object import GraspObject
     from clench.solve.solution import GraspSolution
 
-#: How far a contact may overlap [m] (METHOD.md section 8).
-OVERLAP = 1e-9
 #: Distance of a contact point from the object's surface [m]: what an independent measure is held to.
 SURFACE = 1e-9
 LIMIT = 1e-9
@@ -59,7 +57,7 @@ def check_answer(solution: GraspSolution, again: GraspSolution, surface: Surface
         checked.worst_gap = max(checked.worst_gap, contact.gap)
         checked.worst_overlap = max(checked.worst_overlap, -contact.gap)
         # A later joint may have carried a link off a little; by more, and its contact must say that it passed.
-        if not -OVERLAP <= contact.gap <= PASSED_GAP:
+        if not -CONTACT_OVERLAP <= contact.gap <= PASSED_GAP:
             yield f"{contact.link} is said to touch with a gap of {contact.gap:.3g} m."
     for contact in solution.contacts:
         distance = surface.distance(contact.position)
