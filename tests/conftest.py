@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from clench.kernels.warming import announce, warm_up
 from clench.solve.solution import GraspSolution
 from handmade import make_solution
 
@@ -18,6 +19,13 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.fin
     os.environ.setdefault("MUJOCO_GL", "egl")
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile what a solve calls once, before there are workers: each of them would do so, all at the same time."""
+    if session.config.getoption("dist", "no") != "no" and not hasattr(session.config, "workerinput"):
+        announce()
+        warm_up()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
