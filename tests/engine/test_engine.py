@@ -66,11 +66,11 @@ def test_a_certified_grasp_overlaps_nothing_and_stops_at_what_it_touches(shared_
     for name in ("mug", "torus"):
         obj = clench.GraspObject.load(shared_data / OBJECTS[name])
         collisions = Collisions(hand, obj)
-        for pose in clench.approach_poses(hand, obj, 2, seed=1):
+        for pose in clench.approach_poses(hand, obj, 1, seed=1):
             solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
             if solution.certified:
                 seen += collisions.check(solution)
-    assert seen >= 4
+    assert seen >= 3
 
 
 @pytest.mark.shared
@@ -80,7 +80,7 @@ def test_a_certified_grasp_of_fingers_that_move_at_once_overlaps_nothing(shared_
     hand = clench.Hand.load(shared_data / model)
     obj = clench.GraspObject.load(shared_data / OBJECTS["mug"])
     collisions, seen = Collisions(hand, obj), 0
-    for pose in clench.approach_poses(hand, obj, 2, seed=1):
+    for pose in clench.approach_poses(hand, obj, 1, seed=1):
         command = clench.GraspCommand(hand_pose=pose, order=clench.ClosingOrder.TOGETHER)
         solution = clench.solve(hand, obj, command)
         if solution.certified:

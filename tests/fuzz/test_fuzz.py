@@ -4,7 +4,7 @@ import pytest
 
 from .run import run
 
-SAMPLE = 500
+SAMPLE = 300
 
 
 def told(report):

@@ -9,7 +9,7 @@ import clench
 from clench.base.pose import Pose
 from oracle.width import Oracle, judge_places, make_case
 
-FINGERS, PLACES = 20, 3
+FINGERS, PLACES = 16, 3
 ORDERS = ("proximal-first", "together", "speeds")
 
 

@@ -11,7 +11,7 @@ from .earliest import ball_entry, measure_of, walk_ball, walk_core
 from .layout import Floats
 from .pair_queue import take_first, take_in
 from .parting import keep_plane, lay_plane, lies_within, passes_beside, stays_beyond
-from .slabs import put_slab_face
+from .slabs import RECTANGLE, put_slab_face
 from .spatial_motion import is_spatial
 from .sweep_pairs import sweep_pair
 from .sweeping import QUEUE, SweepWork, is_looser, push_roots, put_ball, put_item, split_pair
@@ -128,7 +128,7 @@ def walk_item(
     near = touch + (COARSE * wa if a >= 0 else 0.0)
     if b < 0:
         kb, wb = put_item(resting, b, work.resting, work.fixed)
-        if ka == 4:
+        if ka == RECTANGLE:
             return float(
                 walk_rectangle(
                     work.core, work.fixed, kb, work.box, wa + wb + touch, chain, count, near, since, best, work.placed

@@ -16,6 +16,7 @@ from .core_motion import move_core, plane_offset
 from .distance import closest_on_triangle
 from .earliest import STEPS
 from .layout import Floats
+from .slabs import RECTANGLE
 from .sweep_pairs import step_to_plane
 from .vectors import Vector, cross, dot, scaled
 
@@ -223,13 +224,13 @@ def walk_rectangle(
     """
     s = begin
     for _ in range(STEPS):
-        move_core(core, 4, chain, count, s, placed)
+        move_core(core, RECTANGLE, chain, count, s, placed)
         put_rectangle(placed, box)
         gap, nx, ny, nz, _ = off_box(fixed, kb, box, placed[4:])
         if gap - w <= near:
             return s
         offset = plane_offset(fixed, kb, -nx, -ny, -nz) + w + 0.5 * near
-        s += step_to_plane(core, placed, 4, chain, count, -nx, -ny, -nz, offset, s, best - s)
+        s += step_to_plane(core, placed, RECTANGLE, chain, count, -nx, -ny, -nz, offset, s, best - s)
         if s >= best:
             return math.inf
     return s

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 Whole = NDArray[np.int64]
 #: Numbers of a box: its middle, three half edges, the shortest last, and by how much it is grown.
 SLAB: Final = 13
+#: Corners of a core that is a rectangle, in order.
+RECTANGLE: Final = 4
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
 THIN: Final = 0.75
 #: A box that is no thinner than that, as a fraction of what is across its longest edge, is not seen as flat [-].
@@ -135,13 +137,16 @@ def slab_top(slab: Any, nx: float, ny: float, nz: float) -> float:
 
 
 @inner_kernel
+def edge_square(slab: Any, k: int) -> float:
+    """Return the square of the half edge of a box that begins in column `k`: 3 the longest, 6, or 9 the shortest."""
+    x, y, z = np.float64(slab[k]), np.float64(slab[k + 1]), np.float64(slab[k + 2])
+    return float(x * x + y * y + z * z)
+
+
+@inner_kernel
 def slab_slack(slab: Any) -> float:
     """Return about how far a box reaches beyond what is in it: its thickness, and some of its width [m]."""
-    thin, wide = 0.0, 0.0
-    for k in range(3):
-        wide += slab[6 + k] * slab[6 + k]
-        thin += slab[9 + k] * slab[9 + k]
-    return math.sqrt(thin) + SOME * math.sqrt(wide)
+    return math.sqrt(edge_square(slab, 9)) + SOME * math.sqrt(edge_square(slab, 6))
 
 
 @inner_kernel
@@ -183,10 +188,7 @@ def put_slab_core(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
         how many corners the core has, and the capsule's radius [m].
     """
     put_point(T, slab, out[0])
-    long, wide = 0.0, 0.0
-    for k in range(3):
-        long += np.float64(slab[3 + k]) ** 2
-        wide += np.float64(slab[6 + k]) ** 2 + np.float64(slab[9 + k]) ** 2
+    long, wide = edge_square(slab, 3), edge_square(slab, 6) + edge_square(slab, 9)
     if wide >= THIN * THIN * (long + wide):
         return 1, math.sqrt(long + wide) * ALMOST + slab[12]
     for r in range(3):
@@ -202,10 +204,7 @@ def put_slab_face(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
     Returns:
         how many corners the core has, and what it is to be grown by to hold the box [m].
     """
-    wide, thin = 0.0, 0.0
-    for k in range(3):
-        wide += np.float64(slab[6 + k]) ** 2
-        thin += np.float64(slab[9 + k]) ** 2
+    wide, thin = edge_square(slab, 6), edge_square(slab, 9)
     if thin >= FLAT * FLAT * (wide + thin):
         return put_slab_core(slab, T, out)
     put_point(T, slab, out[0])
@@ -214,4 +213,4 @@ def put_slab_face(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
         u = T[r, 0] * slab[3] + T[r, 1] * slab[4] + T[r, 2] * slab[5]
         v = T[r, 0] * slab[6] + T[r, 1] * slab[7] + T[r, 2] * slab[8]
         out[0, r], out[1, r], out[2, r], out[3, r] = middle - u - v, middle + u - v, middle + u + v, middle - u + v
-    return 4, math.sqrt(thin) * ALMOST + slab[12]
+    return RECTANGLE, math.sqrt(thin) * ALMOST + slab[12]
