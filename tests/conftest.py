@@ -20,6 +20,16 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.fin
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 
+#: Files that one worker would still be busy with while the other has nothing left to do.
+LONGEST = (
+    "test_engine.py",
+    "test_examples.py",
+    "test_figures.py",
+    "test_fuzz.py",
+    "test_invariance.py",
+    "test_width.py",
+)
+
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile what a solve calls once, before there are workers: each of them would do so, all at the same time."""
@@ -29,7 +39,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip, visibly, what needs the shared folder where it is absent."""
+    """Begin with what takes longest; skip, visibly, what needs the shared folder where it is absent."""
+    items.sort(key=lambda item: item.path.name not in LONGEST)
     if SHARED.is_dir():
         return
     for item in items:

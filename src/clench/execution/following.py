@@ -148,18 +148,21 @@ class Follower:
             found.sample(latest - begun, expected, state)
             if self.stopping.is_set():
                 raise DriverError("Stopped on request.")
-            path = plan.window(moment, HORIZON)
-            self.check.command(path, expected)
-            self.driver.command(path)
             if moment >= plan.duration:
-                return  # told the end, however late this program came to it
+                return
+            self._tell(plan, moment, expected)
             self.stopping.wait(max(0.0, latest + PERIOD - time.monotonic()))
             now = time.monotonic()
             # After a pause of this program the hand stands where it was told last: the plan goes on from there.
             moment, latest = moment + min(now - latest, ahead), now
 
+    def _tell(self, plan: TimedPlan, moment: float, expected: Mapping[str, float]) -> None:
+        path = plan.window(moment, HORIZON)
+        self.check.command(path, expected)
+        self.driver.command(path)
+
     def _settle(self, plan: TimedPlan, found: Followed) -> None:
-        begun, before = time.monotonic(), found.times[-1]
+        begun, before, told = time.monotonic(), found.times[-1], False
         end = plan.at(plan.duration)
         while time.monotonic() - begun < self.settling:
             self.stopping.wait(PERIOD)
@@ -170,6 +173,9 @@ class Follower:
             found.sample(before + time.monotonic() - begun, end, state)
             if all(abs(state.positions[name] - end[name]) <= near for name, near in self.arrived.items()):
                 return
+            if not told:  # a driver that passes on one target without saying so may not have been told the end
+                self._tell(plan, plan.duration, end)
+                told = True
 
     def _stop(self, found: Followed, wait: float = STOP_WAIT) -> bool:
         """Stop the hand; return whether it was seen to stand still, and keep where it stands."""
