@@ -92,14 +92,13 @@ def _blocked(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
         place = problem.T_world_object.apply(found.place).tolist()
         body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
         depth = f" by {found.depth * 1e3:.2f} mm"
-    code, text = CauseCode.BLOCKED_AT_START, f"{link} overlaps {body}{depth} before {name} moves"
     if c.late:
-        code = CauseCode.BLOCKED_ON_THE_WAY
         text = f"On the plane, joints of {name} that turn in other planes would bring {link} into {body}"
-    advice = "close over the full width" if c.late else "start farther away, or with the finger more open"
-    text = f"{text}: {advice}."
+        text = f"{text}: close over the full width."
+        return {"code": CauseCode.BLOCKED_ON_THE_WAY.value, "text": text, "link": link, "other": body}
+    text = f"{link} overlaps {body}{depth} before {name} moves: start farther away, or with the finger more open."
     return {
-        "code": code.value,
+        "code": CauseCode.BLOCKED_AT_START.value,
         "text": text,
         "link": link,
         "other": body,
