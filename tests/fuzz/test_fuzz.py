@@ -4,7 +4,7 @@ import pytest
 
 from .run import run
 
-SAMPLE = 300
+SAMPLE = 200
 
 
 def told(report):
