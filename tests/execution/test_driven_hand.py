@@ -107,6 +107,38 @@ def test_after_a_pause_servos_go_on_from_the_target_they_were_told(
     assert (fastest.max() <= planned * (1.0 + 1e-6)) == one_target
 
 
+@given(
+    st.lists(st.floats(0.001, 0.2), min_size=1, max_size=8),
+    st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9),
+    st.floats(0.0, 1.0),
+)
+def test_a_path_tells_where_the_plan_is_at_any_time_until_its_end(
+    steps: list[float], angles: list[float], begin: float
+) -> None:
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    plan = TimedPlan(("thumb",), times, np.array(angles[: len(times)])[:, None])
+    moment = begin * plan.duration
+    path = plan.window(moment, HORIZON)
+    assert (np.diff(path.times) > 0.0).all()
+    fastest = np.abs(np.diff(plan.positions[:, 0]) / np.diff(times)).max()
+    for time_ahead in np.linspace(PERIOD, HORIZON, 23):
+        # Way-points that are next to the begin or the end of the path are left out.
+        there = plan.at(moment + time_ahead)["thumb"]
+        assert path.at(time_ahead)["thumb"] == pytest.approx(there, abs=3e-4 * fastest + 1e-12)
+
+
+def test_servos_keep_to_the_speed_of_a_plan_of_few_points(pincer: Hand, solution: GraspSolution) -> None:
+    """The way back to the open hand has nine points, farther apart than a path is due."""
+    driver = Servos({"thumb": 1.4, "index": 1.05}, lambda _: 0.0)
+    driver.one_target = True  # type: ignore[attr-defined]
+    report = run(driver, pincer, solution, speed=0.3, max_deviation=2.0)
+    assert report.success, report.reason
+    targets = np.array([list(path.at(path.period).values()) for path in driver.commands])
+    rates = [np.abs(np.diff(path.positions, axis=0)) / np.diff(path.times)[:, None] for path in driver.commands]
+    planned = max((rate.max() for rate in rates if len(rate)), default=0.0)
+    assert np.abs(np.diff(targets, axis=0)).max() / PERIOD <= planned * (1.0 + 1e-6)
+
+
 def test_other_names_units_offsets_and_directions(pincer: Hand, solution: GraspSolution) -> None:
     deg = 180.0 / np.pi
     joint_map = JointMap(
@@ -126,7 +158,7 @@ def test_other_names_units_offsets_and_directions(pincer: Hand, solution: GraspS
 
 def test_a_slower_controller_gets_a_slower_path(pincer: Hand, solution: GraspSolution) -> None:
     fast = run(FakeDriver(OPEN), pincer, solution)
-    slow = run(FakeDriver(OPEN, DriverLimits(velocities={"thumb": 0.5})), pincer, solution)
+    slow = run(FakeDriver(OPEN, DriverLimits(velocities={"thumb": 0.25})), pincer, solution)
     assert slow.success, slow.reason
     assert slow.duration > 1.5 * fast.duration
 

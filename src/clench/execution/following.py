@@ -64,15 +64,12 @@ class TimedPlan:
 
     def window(self, moment: float, horizon: float) -> JointPath:
         """Return the way-points of the next `horizon` [s], with times from `moment` [s] on."""
-        end = moment + horizon
-        inside = (self.times > moment + CLOSEST) & (self.times < end - CLOSEST)
-        points = np.array(list(self.at(end).values()))
-        return JointPath(
-            joints=self.joints,
-            times=np.append(self.times[inside] - moment, horizon),
-            positions=np.vstack([self.positions[inside], points]),
-            period=PERIOD,
-        )
+        inside = self.times[(self.times > moment + CLOSEST) & (self.times < moment + horizon - CLOSEST)] - moment
+        # Where it is when the next path is due, so that a driver that passes that on finds it.
+        due = [PERIOD] if horizon - CLOSEST > PERIOD and (np.abs(inside - PERIOD) > CLOSEST).all() else []
+        times = np.sort(np.concatenate([inside, due, [horizon]]))
+        rows = [list(self.at(moment + time).values()) for time in times]
+        return JointPath(joints=self.joints, times=times, positions=np.array(rows), period=PERIOD)
 
 
 @dataclass

@@ -43,7 +43,7 @@ def judge_sets(
     whole = {id(c.plan): c for c in candidates if c.plane is None}
     for c in candidates:
         if c.overlap is not None:
-            c.feasible, c.penetration = False, c.overlap.depth
+            c.feasible, c.penetration = False, None if c.late else c.overlap.depth
         elif c.exact:
             c.clear, c.feasible, c.penetration = True, True, 0.0
         else:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .advance import advance, make_work, place_joints
+from .advance import advance, make_work
 from .compiling import allocating_kernel, inner_kernel, kernel
 from .exact import ExactArrays, describe_pair, last_mover, pose_movers
-from .family_pose import compose_inverse, copy_pose, pose_families, pose_family
-from .family_section import cut_planes
+from .family_pose import copy_pose, pose_families
+from .later_family import enter_family, is_held
 from .layout import (
     HIT_GAP,
     HIT_GROUP,
@@ -24,7 +24,6 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .overlap import find_on_plane
 from .segments import ALL, lock_held, lock_joints, move_groups, next_segment
 from .settling import settle
 from .stage_sweep import sweep_stage
@@ -146,44 +145,6 @@ def group_family(hand: HandArrays, group: int) -> int:
 
 
 @inner_kernel
-def enter_family(
-    hand: HandArrays,
-    family: int,
-    start: int,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    own: SectionArrays,
-    items: ItemArrays,
-    i: int,
-    work: Work,
-    answer: ClosingArrays,
-) -> None:
-    """Place a family at an item's present posture and cut the object by its planes, unless that was done before.
-
-    On the one plane of an item a link may overlap the object by now: joints about another axis turned it there, in
-    planes of their own. Then there is no set on this plane, and nothing moves.
-    """
-    pose_family(hand, family, family == start, answer.turn[i], work, answer.pose[i])
-    if family == start or items.low[i] >= items.high[i]:
-        return
-    T, base = work.pose[0], hand.family_plane[start]
-    compose_inverse(answer.pose[i, family], T_palm_object, T)
-    low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
-    wanted = cut_planes(hand, family, low, high, tree, rounds, T, own, base, work.pose[1])
-    answer.overflow[i] = max(answer.overflow[i], wanted)
-    if wanted > 0 or high - low > 1:
-        return
-    place_joints(hand.chain, family, answer.turn[i], work.place)
-    touch = TOUCH_FRACTION * hand.family_length[family]
-    o = find_on_plane(hand, low, touch, tree, rounds, closed, T, own, low - base, work)
-    if o >= 0:
-        answer.travel[i], answer.turn[i] = 0.0, 0.0
-        answer.contacts[i], answer.overlap[i] = 0, SUNK - hand.outlines.link[o]
-
-
-@inner_kernel
 def stops_same(chain: ChainArrays, hit: Ints, group: int, joint: int) -> bool:
     """Say whether a contact stops what another one stops: a group, or its joints up to one that later ones leave."""
     return hit[HIT_GROUP] == group and (not chain.breaks[group] or hit[HIT_JOINT] == joint)
@@ -269,6 +230,8 @@ def close_item(
                 enter_family(hand, family, start, tree, rounds, closed, T_palm_object, own, items, i, work, answer)
             if answer.overlap[i] <= SUNK:
                 break
+            if family > start and not exact.wanted[i] and is_held(hand, family, group, items, i, work, answer):
+                continue
             sections, base = shared, 0
             if family > start:
                 sections, base = own, hand.family_plane[start]

@@ -135,8 +135,9 @@ def starts_inside(
 
 
 @inner_kernel
-def find_on_plane(
+def outline_overlaps(
     hand: HandArrays,
+    o: int,
     plane: int,
     touch: float,
     tree: MeshTree,
@@ -146,17 +147,15 @@ def find_on_plane(
     sections: SectionArrays,
     row: int,
     work: Work,
-) -> int:
-    """Return an outline of a plane that overlaps the object with the joints where they are placed, or -1."""
-    for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
-        outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
-        x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
-        if (
-            starts_inside(tree, rounds, closed, T_family_object, x, hand.plane_offset[plane], z)
-            and not closer_than(outline, sections, row, 4.0 * touch, work)
-        ) or curves_overlap(outline, sections, row, touch, work):
-            return o
-    return -1
+) -> bool:
+    """Say whether an outline of a plane overlaps the object with the joints where they are placed."""
+    outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
+    x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
+    if starts_inside(tree, rounds, closed, T_family_object, x, hand.plane_offset[plane], z) and not closer_than(
+        outline, sections, row, 4.0 * touch, work
+    ):
+        return True
+    return bool(curves_overlap(outline, sections, row, touch, work))
 
 
 @kernel
@@ -181,7 +180,10 @@ def look_for_overlaps(
         place_joints(hand.chain, family, turns, work.place)
         compose_inverse(hand.family_pose[family], T_palm_object, T)
         for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
-            overlaps[entry] = find_on_plane(hand, plane, touch, tree, rounds, closed, T, sections, plane, work)
+            for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
+                if outline_overlaps(hand, o, plane, touch, tree, rounds, closed, T, sections, plane, work):
+                    overlaps[entry] = o
+                    break
             if overlaps[entry] >= 0:
                 break
 

@@ -28,6 +28,12 @@ class ShapeKind(StrEnum):
     MESH = "mesh"
     """`size = (0, 0, 0)`; the triangles are in `mesh`, in the shape's frame"""
 
+    @property
+    def lengths(self) -> int:
+        """How many entries of `size` count."""
+        counts = {ShapeKind.MESH: 0, ShapeKind.SPHERE: 1, ShapeKind.CAPSULE: 2, ShapeKind.CYLINDER: 2}
+        return counts.get(self, 3)
+
 
 class CollisionSource(StrEnum):
     """Name which geometry of a model is meant (METHOD.md section 2); results compare only for the same choice."""

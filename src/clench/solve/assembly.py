@@ -20,7 +20,7 @@ from clench.grasp.surface import nearest_body
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
 
-from .causes import finger_cause, no_closing_joint
+from .causes import finger_cause, no_closing_joint, what_is_there
 from .certificate import Certificate
 from .solution import (
     Candidate,
@@ -206,9 +206,7 @@ def _body_name(t: Touch, problem: Problem) -> str:
 def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, str]:
     hand, name = problem.hand, c.plan.finger.name
     if c.overlap is not None:
-        when = (
-            "on this plane, where joints that turn in other planes would bring it" if c.late else f"before {name} moves"
-        )
+        when = "on this plane, where joints about another axis would bring it" if c.late else f"before {name} moves"
         return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} {when}."
     if problem.command.order == ClosingOrder.FINGERTIP and c.missed:
         first, tip = hand.links[c.touches[0].link].name, hand.links[c.plan.finger.tip_link].name
@@ -285,7 +283,7 @@ def _overlap_reason(found: LinkDepth, problem: Problem) -> dict[str, Any]:
 def _overlap_text(found: LinkDepth, problem: Problem) -> str:
     link = problem.hand.links[found.link].name
     if found.place is None:
-        return f"{link} overlaps {problem.obj.name}"
+        return f"{link} overlaps {what_is_there(problem)}"
     x, y, z = problem.T_world_object.apply(found.place)
     body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
     return f"{link} overlaps {body} by {found.depth * 1e3:.2f} mm at [{x:.4f}, {y:.4f}, {z:.4f}] m"

@@ -29,7 +29,7 @@ class CauseCode(StrEnum):
     BLOCKED_AT_START = "blocked_at_start"
     """a link overlaps the object or an obstacle before the finger moves"""
     BLOCKED_ON_THE_WAY = "blocked_on_the_way"
-    """on the plane alone, joints that turn in other planes would bring a link into the object"""
+    """on the plane alone, joints about another axis would bring a link into the object"""
     NO_CLOSING_JOINT = "no_closing_joint"
     """the finger has none"""
     NO_MOTION = "no_motion"
@@ -78,6 +78,11 @@ def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> 
     return {**_at_limit(c, link, gap, problem), **near}
 
 
+def what_is_there(problem: Problem) -> str:
+    """Return what a link overlaps where it is not known which body."""
+    return problem.obj.name if len(problem.packed.body_names) == 1 else f"{problem.obj.name} or an obstacle"
+
+
 def no_closing_joint(finger: str) -> dict[str, Any]:
     """Return the cause of a finger that nothing can close."""
     return {"code": CauseCode.NO_CLOSING_JOINT.value, "text": f"{finger} has no closing joint."}
@@ -87,13 +92,13 @@ def _blocked(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
     found, name = c.overlap, c.plan.finger.name
     assert found is not None
     link = problem.hand.links[found.link].name
-    place, body, depth = None, problem.obj.name, ""
+    place, body, depth = None, what_is_there(problem), ""
     if found.place is not None:
         place = problem.T_world_object.apply(found.place).tolist()
         body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
         depth = f" by {found.depth * 1e3:.2f} mm"
     if c.late:
-        text = f"On the plane, joints of {name} that turn in other planes would bring {link} into {body}"
+        text = f"On the plane, joints of {name} about another axis would bring {link} into {body}"
         text = f"{text}: close over the full width."
         return {"code": CauseCode.BLOCKED_ON_THE_WAY.value, "text": text, "link": link, "other": body}
     text = f"{link} overlaps {body}{depth} before {name} moves: start farther away, or with the finger more open."

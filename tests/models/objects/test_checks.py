@@ -9,6 +9,7 @@ from clench.base.errors import ObjectError
 from clench.base.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.checks import check_mesh, unit_warnings
+from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.topology import edge_defects, winding_number
 from clench.models.shapes import Shape, ShapeKind
 from clench.models.tessellation import tessellate
@@ -151,6 +152,13 @@ def test_units(extent, words):
     found = unit_warnings(np.array([[0.0, 0.0, 0.0], [0.0, extent, 0.0]]), "m")
     assert bool(found) == (words is not None)
     assert all(words in sentence for sentence in found)
+
+
+@pytest.mark.parametrize("text", ["cylinder:r=0.03,h=5e-324", "capsule:r=0.03,h=5e-324", "sphere:r=1e-14"])
+def test_lengths_of_nothing_are_refused(text):
+    """Half of the smallest number is none, and no flat cylinder has normals on its side."""
+    with pytest.raises(ObjectError, match=r"expected lengths from 1e-13 to 1e\+09 m, got "):
+        GraspObject.load(text)
 
 
 def test_the_input_is_never_changed():

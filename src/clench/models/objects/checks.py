@@ -82,11 +82,11 @@ def check_size(shape: Shape, name: str) -> None:
     if shape.mesh is not None:
         sizes = [float(np.ptp(shape.mesh.vertices, axis=0).max())]
     else:
-        sizes = [size for size in shape.size if size != 0.0]
-    if not sizes or min(sizes) < SMALLEST_LENGTH or max(sizes) > LARGEST_LENGTH:
+        sizes = list(shape.size[: shape.kind.lengths])
+    if min(sizes) < SMALLEST_LENGTH or max(sizes) > LARGEST_LENGTH:
         raise ObjectError(
             f"{name}: expected lengths from {SMALLEST_LENGTH:g} to {LARGEST_LENGTH:g} m, "
-            f"got {', '.join(f'{size:.4g}' for size in sizes) or 'none'}."
+            f"got {', '.join(f'{size:.4g}' for size in sizes)}."
         )
 
 

@@ -197,7 +197,7 @@ def _checked_shape(shape: Shape, name: str, role: BodyRole) -> tuple[Body, tuple
             raise ObjectError(f"{name}: a mesh shape without triangles.")
         checked = check_mesh(shape.mesh.vertices, shape.mesh.triangles, name)
         return Body(name, (replace(shape, mesh=checked.mesh),), role, closed=checked.closed), checked.warnings
-    count = {ShapeKind.SPHERE: 1, ShapeKind.CAPSULE: 2, ShapeKind.CYLINDER: 2}.get(shape.kind, 3)
+    count = shape.kind.lengths
     if not all(math.isfinite(v) for v in shape.size) or not all(v > 0 for v in shape.size[:count]):
         raise ObjectError(f"{name}: a {shape.kind} needs {count} finite half sizes above 0 m, got {shape.size}.")
     return Body(name, (shape,), role), ()
