@@ -15,7 +15,7 @@ from clench.apps.figures.curl_plane import plane_title
 from clench.apps.figures.finger_scenes import FingerScenes
 from clench.apps.figures.hand_view import _labels, viewpoints
 from clench.apps.figures.plane_scene import PlaneScene, bounds
-from clench.apps.figures.set_grid import MOST_SETS, _selected, _short
+from clench.apps.figures.set_grid import MOST_SETS, _selected, _short, _verdict
 from clench.apps.figures.surfaces import hand_surface, object_surface, thinned
 from clench.base.errors import FileError
 from clench.models.command import GraspCommand
@@ -256,6 +256,12 @@ def test_a_finger_that_overlaps_at_the_start_is_drawn(
     solution = clench.solve(hand, ball, inside)
     assert solution.fingers["index"].status is FingerStatus.BLOCKED
     assert all(size_of(f)[0] <= 1600 for f in draw_solution(hand, ball, inside, solution, tmp_path))
+
+
+def test_what_is_said_of_a_set_that_is_blocked() -> None:
+    blocked = make_candidate(status=FingerStatus.BLOCKED, contacts=(), penetration=None)
+    assert _verdict(blocked)[-1] == "blocked: it does not move"
+    assert _verdict(make_candidate(status=FingerStatus.LIMIT, contacts=(), penetration=None))[-1] == "no contact"
 
 
 def test_obstacles_are_told_from_the_object(hand: clench.Hand, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.solve.solution import Candidate, FingerResult
+from clench.solve.solution import Candidate, FingerResult, FingerStatus
 
 from . import style
 from .curl_plane import draw_plane, frame_plane, overlap, set_name
@@ -155,6 +155,8 @@ def _verdict(candidate: Candidate) -> list[str]:
         f"{name.replace('_', ' ')} {value:.3g}{_UNITS.get(name, '')}" for name, value in candidate.scores.items()
     )
     known = [] if candidate.contacts else ["no contact"]
+    if candidate.status is FingerStatus.BLOCKED:
+        known = ["blocked: it does not move"]
     if candidate.penetration is not None:
         known.append(overlap(candidate.penetration))
     return [line for line in (scores, "; ".join(known)) if line]
