@@ -235,6 +235,16 @@ def test_a_link_that_touched_holds_joints_about_another_axis_as_it_holds_those_a
     assert clench.solve_batch(hand, obj, [Pose.identity()], command(planes=1, full_width=False)).status[0] == "grasp"
 
 
+@pytest.mark.parametrize("text", ["cylinder:r=0.02,h=0.1", "ellipsoid:a=0.02,b=0.02,c=0.03"])
+def test_the_full_width_is_not_spoiled_by_its_one_plane(text):
+    """Swept as a polyhedron, it ends a little inside the round shape that the plane of the next family shows."""
+    lying = Pose([0.08, 0.0, 0.03], wxyz=[HALF, HALF, 0.0, 0.0])
+    obj = clench.GraspObject.load(text, pose=lying)
+    for place in (0.0, 1e-3, 2.3e-3):
+        index = clench.solve(two_families(), obj, command(planes=1, hand_pose=Pose([place, 0.0, 0.0]))).fingers["index"]
+        assert (index.status, index.candidates[index.chosen].plane) == ("touch", None)
+
+
 def test_what_a_link_would_be_brought_into_may_be_an_obstacle():
     obj = clench.GraspObject.load("sphere:r=0.005", pose=Pose([-0.1, 0.0, 0.03]))
     ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))

@@ -227,7 +227,10 @@ def close_item(
             wanted = group_family(hand, group)
             while family < wanted and answer.overlap[i] > SUNK:
                 family += 1
-                enter_family(hand, family, start, tree, rounds, closed, T_palm_object, own, items, i, work, answer)
+                swept = exact.wanted[i] != 0
+                enter_family(
+                    hand, family, start, tree, rounds, closed, T_palm_object, own, items, i, swept, work, answer
+                )
             if answer.overlap[i] <= SUNK:
                 break
             if family > start and not exact.wanted[i] and is_held(hand, family, group, items, i, work, answer):

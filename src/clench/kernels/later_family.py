@@ -47,13 +47,15 @@ def enter_family(
     own: SectionArrays,
     items: ItemArrays,
     i: int,
+    swept: bool,
     work: Work,
     answer: ClosingArrays,
 ) -> None:
     """Place a family at an item's present posture and cut the object by its planes, unless that was done before.
 
     On the one plane of an item a link that did not touch may overlap the object by now: joints about another axis
-    turned it there, in planes of their own. Then there is no set on this plane, and nothing moves.
+    turned it there, in planes of their own. Then there is no set on this plane, and nothing moves. Items that are
+    `swept` over their whole width see all links.
     """
     pose_family(hand, family, family == start, answer.turn[i], work, answer.pose[i])
     if family == start or items.low[i] >= items.high[i]:
@@ -63,7 +65,7 @@ def enter_family(
     low, high = hand.family_plane[family] + items.low[i], hand.family_plane[family] + items.high[i]
     wanted = cut_planes(hand, family, low, high, tree, rounds, T, own, base, work.pose[1])
     answer.overflow[i] = max(answer.overflow[i], wanted)
-    if wanted > 0 or high - low > 1:
+    if wanted > 0 or swept or high - low > 1:
         return
     place_joints(hand.chain, family, answer.turn[i], work.place)
     touch = TOUCH_FRACTION * hand.family_length[family]
