@@ -158,9 +158,12 @@ def test_other_names_units_offsets_and_directions(pincer: Hand, solution: GraspS
 
 def test_a_slower_controller_gets_a_slower_path(pincer: Hand, solution: GraspSolution) -> None:
     fast = run(FakeDriver(OPEN), pincer, solution)
-    slow = run(FakeDriver(OPEN, DriverLimits(velocities={"thumb": 0.25})), pincer, solution)
+    driver = FakeDriver(OPEN, DriverLimits(velocities={"thumb": 0.25}))
+    slow = run(driver, pincer, solution)
     assert slow.success, slow.reason
     assert slow.duration > 1.5 * fast.duration
+    for path in driver.commands:
+        assert (np.abs(np.diff(path.positions[:, 0])) <= 0.25 * np.diff(path.times) * (1.0 + 1e-6) + 1e-12).all()
 
 
 @pytest.mark.parametrize(

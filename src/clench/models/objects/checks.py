@@ -83,10 +83,10 @@ def check_size(shape: Shape, name: str) -> None:
         sizes = [float(np.ptp(shape.mesh.vertices, axis=0).max())]
     else:
         sizes = list(shape.size[: shape.kind.lengths])
-    if min(sizes) < SMALLEST_LENGTH or max(sizes) > LARGEST_LENGTH:
+    if not sizes or min(sizes) < SMALLEST_LENGTH or max(sizes) > LARGEST_LENGTH:
         raise ObjectError(
             f"{name}: expected lengths from {SMALLEST_LENGTH:g} to {LARGEST_LENGTH:g} m, "
-            f"got {', '.join(f'{size:.4g}' for size in sizes)}."
+            f"got {', '.join(f'{size:.4g}' for size in sizes) or 'none'}."
         )
 
 
