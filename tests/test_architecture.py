@@ -268,7 +268,7 @@ def test_a_kernel_that_allocates_unmarked_is_found() -> None:
 
 def test_import_is_light_and_quick() -> None:
     program = (
-        "import sys, time; t = time.perf_counter(); import clench; t = time.perf_counter() - t; "
+        "import sys, time; t = time.process_time(); import clench; t = time.process_time() - t; "
         f"print(t, sorted({HEAVY!r} & set(sys.modules)))"
     )
     runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True) for _ in "123"]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import fake_driver
 import numpy as np
 import pytest
+from virtual_clock import VirtualClock
 
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.scene import hash_bodies, hash_hand
@@ -156,3 +158,11 @@ def pinch(pincer: Hand, ball: GraspObject) -> GraspSolution:
             for n in ("thumb", "index")
         },
     )
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> VirtualClock:
+    """Let driven hands, controllers in memory and the tests' own module look at a clock that no machine holds up."""
+    made = VirtualClock()
+    made.use(monkeypatch, fake_driver, *[request.module] * hasattr(request.module, "time"))
+    return made

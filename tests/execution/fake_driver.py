@@ -45,10 +45,13 @@ class FakeDriver:
         self.connected = False
 
     def where(self) -> dict[str, float]:
+        return self.at(time.monotonic())
+
+    def at(self, moment: float) -> dict[str, float]:
         path = self.path  # a stop from another thread takes it away
         if path is None:
             return dict(self.start)
-        since = time.monotonic() - self.sent_at
+        since = moment - self.sent_at
         times = np.concatenate([[0.0], path.times])
         return {
             **self.start,
@@ -68,9 +71,10 @@ class FakeDriver:
     def command(self, path: JointPath) -> None:
         if not self.connected:
             raise DriverError("not connected")
+        now = time.monotonic()
         if not self.commands:
-            self.begun = time.monotonic()
-        self.start, self.path, self.sent_at = self.where(), path, time.monotonic()
+            self.begun = now
+        self.start, self.path, self.sent_at = self.at(now), path, now
         self.commands.append(path)
 
     def stop(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,6 +12,7 @@ import pytest
 from fake_driver import FakeDriver
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from virtual_clock import VirtualClock
 
 from clench.base.errors import CommandError, UnknownNameError
 from clench.execution.command_check import CommandCheck, CommandLimits, slowed_down
@@ -27,6 +27,7 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.solution import GraspSolution
 
 OPEN = {"thumb": 0.0, "index": 0.0}
+pytestmark = pytest.mark.usefixtures("clock")
 
 
 @pytest.fixture
@@ -223,14 +224,14 @@ def test_drivers_may_raise_anything(pincer: Hand, solution: GraspSolution) -> No
     assert report.reason == "Not carried out: The driver failed (KeyError: 'port')."
 
 
-def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution) -> None:
+def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution, clock: VirtualClock) -> None:
     driver = FakeDriver(OPEN)
     hand = DrivenHand(pincer, driver)
-    threading.Timer(0.3, hand.stop).start()
+    clock.after(0.3, hand.stop)
     report = execute(solution, hand, speed=0.2)
     assert report.reason.startswith("Stopped on request. The hand was told to stop: it was seen to stand still")
     assert report.joints["thumb"].reached < 0.9 * solution.joint_angles["thumb"]
-    assert driver.stopped_after == pytest.approx(0.3, abs=0.25)
+    assert driver.stopped_after == pytest.approx(0.3, abs=PERIOD)
 
 
 def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSolution) -> None:

@@ -17,6 +17,7 @@ from clench.models.hand.hand import Hand
 from clench.solve.solution import GraspSolution
 
 OPEN = {"thumb": 0.0, "index": 0.0}
+pytestmark = pytest.mark.usefixtures("clock")
 OFFSETS = {"thumb": 0.05, "index": 0.03, "index_tip": 0.03}
 
 

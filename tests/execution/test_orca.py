@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from virtual_clock import VirtualClock
 
 from clench.base.errors import CommandError, FileError
 from clench.execution.driven_hand import DrivenHand
@@ -20,6 +20,7 @@ pytest.importorskip("orca_core", reason="needs orca-core")
 
 from clench.execution.drivers.orca import OrcaDriver
 
+pytestmark = pytest.mark.usefixtures("clock")
 MAP = {
     "unit": "deg",
     "joints": {
@@ -70,10 +71,10 @@ def test_connecting_moves_nothing_and_stopping_holds() -> None:
     driver.disconnect()
 
 
-def test_stopped_on_the_way(pincer: Hand, pinch: GraspSolution, joint_map: JointMap) -> None:
+def test_stopped_on_the_way(pincer: Hand, pinch: GraspSolution, joint_map: JointMap, clock: VirtualClock) -> None:
     driver = OrcaDriver(mock=True)
     hand = DrivenHand(pincer, driver, joint_map=joint_map)
-    threading.Timer(1.0, hand.stop).start()
+    clock.after(1.0, hand.stop)
     report = execute(pinch, hand, speed=0.05)
     assert report.reason.startswith("Stopped on request. The hand was told to stop: it was seen to stand still")
 

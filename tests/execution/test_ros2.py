@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,13 +12,16 @@ import time
 import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from virtual_clock import VirtualClock
 
 from clench.base.errors import CommandError, UnknownNameError
+from clench.execution.driver import JointPath
 from clench.execution.drivers import ros2
 from clench.execution.drivers.ros2 import Ros2Driver, topic_name
 from clench.models.hand.hand import Hand
@@ -27,6 +31,8 @@ HERE = Path(__file__).parent
 #: Where ports of DDS are below those that the system hands out.
 DOMAIN = 1 + os.getpid() % 100
 HORIZON = 0.3
+#: Machines on which tests run side by side stop any of the processes for half a second, now and then.
+PATIENT = {"max_age": 2.0, "settling": 5.0}
 DRIVE = """
 import sys
 sys.path[:0] = {paths!r}
@@ -37,7 +43,8 @@ from clench.execution.drivers.ros2 import Ros2Driver
 from clench.execution.executing import execute
 hand, solution = pickle.loads(Path({inputs!r}).read_bytes())
 driver = Ros2Driver({controller!r}, joint_states={states!r}, interface={interface!r}, domain={domain})
-report = execute(solution, DrivenHand(hand, driver, connect_timeout=15.0, max_deviation=0.15), speed={speed})
+hand = DrivenHand(hand, driver, connect_timeout=15.0, **{options!r})
+report = execute(solution, hand, speed={speed})
 report.save({out!r})
 """
 
@@ -97,7 +104,7 @@ class World:
             *("--log", str(self.folder / "log.json"), *options),
         )
 
-    def drive(self, interface: str, speed: float) -> subprocess.Popen[Any]:
+    def drive(self, interface: str, speed: float, **options: float) -> subprocess.Popen[Any]:
         import pickle
 
         inputs = self.folder / "inputs.pickle"
@@ -110,6 +117,7 @@ class World:
             interface=interface,
             domain=DOMAIN,
             speed=speed,
+            options=PATIENT | options,
             out=str(self.folder / "report.json"),
         )
         return self.start("-c", program)
@@ -159,20 +167,24 @@ def targets(solution: GraspSolution) -> np.ndarray:
 )
 def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str, theirs: str) -> None:
     node = world.node(theirs)
-    report = world.report(world.drive(ours, 0.5))
+    report = world.report(world.drive(ours, 0.2))
     log = world.log(node)
     assert report["success"], report["reason"]
     assert report["actuator"] == f"ros2 ({SPOKEN[ours]})"
     assert log["refused"] == []
-    assert log["accepted"] > 5
-    # One path goes on where the one before it is: they never pull the hand to and fro.
-    assert len(log["jumps"]) == log["accepted"]
-    assert np.median(log["jumps"]) < 0.01
-    assert max(log["jumps"]) < 0.05
+    assert len(log["paths"]) > 5
+    # However long a message takes: every path begins on the one before it, and they never pull the hand to and fro.
+    for (times, points), (later, after) in pairwise(log["paths"]):
+        assert times[0] == later[0] == 0.0
+        on_path = np.stack([np.interp(np.linspace(0.0, times[-1], 4001), times, c) for c in np.transpose(points)], 1)
+        assert np.abs(on_path - after[0]).max(axis=1).min() < 1e-3
+    begins = np.array([points[0] for _, points in log["paths"]])
+    there = targets(world.solution) + np.array([2 * 0.05, 0.0])  # the thumb is opened first
+    assert (np.abs(np.diff(begins, axis=0)).sum(axis=0) < there + 0.15).all()
     samples = np.array(log["samples"])
     np.testing.assert_allclose(samples[-1, 1:], targets(world.solution), atol=1e-6)
-    rates = np.abs(np.diff(samples[:, 1:], axis=0)) / 0.01
-    assert np.median(rates[rates > 0]) < 1.6  # half of the limits of 3 and 2 rad/s, but for the jitter of the loop
+    rates = np.abs(np.diff(samples[:, 1:], axis=0)) / np.diff(samples[:, :1], axis=0).clip(1e-9)
+    assert np.median(rates[rates > 0]) < 0.65  # a fifth of the limits of 3 and 2 rad/s, but for the jitter of messages
     # What we report is what the controller did: every measured sample is on its way.
     measured = np.array(report["history"]["measured"])
     np.testing.assert_allclose(measured[0], [0.05, 0.0], atol=1e-9)
@@ -180,7 +192,7 @@ def test_a_trajectory_is_received_followed_and_reported(world: World, ours: str,
     np.testing.assert_allclose(measured[-1], samples[-1, 1:], atol=0.01)
     for column in range(2):
         near = np.abs(measured[:, column, None] - samples[None, :, 1 + column]).min(axis=1)
-        assert near.max() < 0.03
+        assert near.max() < 1e-9
 
 
 @pytest.mark.parametrize("theirs", RCLPY_FIRST)
@@ -205,18 +217,18 @@ def test_squeeze_and_next_steps_are_received_followed_and_reported(world: World,
 @pytest.mark.parametrize("theirs", RCLPY_FIRST)
 def test_a_cut_connection_stops_the_hand_and_is_reported(world: World, theirs: str) -> None:
     node = world.node(theirs, "--cut-after", "0.4")
-    report = world.report(world.drive("cyclonedds" if installed("cyclonedds") else "rclpy", 0.15))
+    report = world.report(world.drive("cyclonedds" if installed("cyclonedds") else "rclpy", 0.08))
     time.sleep(0.5)
     log = world.log(node)
     assert not report["success"]
     assert "Nobody listens on" in report["reason"] or "is stale" in report["reason"]
     assert "that was not confirmed; it was told nothing beyond 0.3 s" in report["reason"]
     samples = np.array(log["samples"])
-    later = samples[samples[:, 0] > log["cut"] + HORIZON + 0.1, 1:]
+    later = samples[samples[:, 0] > log["last"] + HORIZON, 1:]
     assert len(later) > 5
     assert np.ptp(later, axis=0).max() == 0.0  # it stands still
     assert (later[-1] < 0.9 * targets(world.solution)).all()  # on the way
-    assert (later[-1] > [0.01, 0.01]).any()
+    assert np.ptp(samples[:, 1:], axis=0).max() > 0.01
 
 
 @pytest.mark.parametrize("ours", RCLPY_FIRST)
@@ -249,19 +261,19 @@ def test_a_controller_that_dies_is_reported(world: World) -> None:
 @NEEDS["cyclonedds"]
 def test_a_state_that_is_sent_again_and_again_is_stale(world: World) -> None:
     node = world.node("cyclonedds", "--freeze-after", "0.5")
-    report = world.report(world.drive("cyclonedds", 0.05))
+    report = world.report(world.drive("cyclonedds", 0.05, max_age=0.5))
     log = world.log(node)
-    assert "is stale: 0." in report["reason"]
+    assert re.search(r"is stale: \d\.\d+ s old; at most 0\.5 s", report["reason"])
     assert log["samples"][-1][1] < 0.9 * targets(world.solution)[0]
 
 
 @NEEDS["cyclonedds"]
 def test_a_controller_of_other_joints_never_moves(world: World) -> None:
     node = world.node("cyclonedds", "--start", "0.05,0.0,0.0", joints="thumb,index,toe")
-    report = world.report(world.drive("cyclonedds", 1.0))
+    report = world.report(world.drive("cyclonedds", 1.0, max_deviation=0.15))
     log = world.log(node)
     assert "does not follow" in report["reason"]
-    assert log["accepted"] == 0
+    assert log["paths"] == []
     assert log["refused"]
     assert np.ptp(np.array(log["samples"])[:, 1:]) == pytest.approx(0.05)
 
@@ -272,7 +284,7 @@ def test_an_action_of_other_joints_refuses(world: World) -> None:
     node = world.node("action", "--start", "0.05,0.0,0.0", joints="thumb,index,toe")
     report = world.report(world.drive("action", 1.0))
     assert "refused the goal; does it have exactly these joints?" in report["reason"]
-    assert world.log(node)["accepted"] == 0
+    assert world.log(node)["paths"] == []
 
 
 @pytest.mark.parametrize("ours", CYCLONE_FIRST)
@@ -304,6 +316,44 @@ def test_nothing_installed(monkeypatch: pytest.MonkeyPatch) -> None:
         Ros2Driver().connect(0.1)
     with pytest.raises(CommandError, match="rclpy is not installed; source a ROS installation"):
         Ros2Driver(interface="rclpy").connect(0.1)
+
+
+@dataclass
+class Wire:
+    """Stand in for a link: the controller is measured where it was at first, whatever it is told."""
+
+    name: str = "wire"
+    published: list[tuple[list[float], list[list[float]]]] = field(default_factory=list)
+
+    def listeners(self) -> int:
+        return 1
+
+    def states(self) -> list[ros2.JointStates]:
+        return [ros2.JointStates({"thumb": 0.0}, 0)]
+
+    def publish(self, _: object, times: list[float], positions: list[list[float]]) -> None:
+        self.published.append((times, positions))
+
+    def close(self) -> None:
+        self.published.clear()
+
+
+def test_a_path_begins_where_the_one_before_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, wire = VirtualClock(), Wire()
+    monkeypatch.setattr(ros2, "time", clock)
+    monkeypatch.setattr(ros2, "open_link", lambda *_: wire)
+    driver = Ros2Driver()
+    driver.connect(1.0)
+    path = JointPath(("thumb",), np.array([0.1, 0.3]), np.array([[0.2], [0.8]]), 0.05)
+    for pause in (0.0, 0.05, 0.2, 9.0):
+        clock.sleep(pause)
+        driver.command(path)
+    # First where it is measured; then, however far behind that is, where it was told to be by now.
+    assert [positions[0] for _, positions in wire.published] == [
+        [0.0],
+        *([pytest.approx(at)] for at in (0.1, 0.5, 0.8)),
+    ]
+    assert wire.published[0] == ([0.0, 0.1, 0.3], [[0.0], [0.2], [0.8]])
 
 
 def test_names_and_domains(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,11 +18,12 @@ import numpy as np
 
 class Joints:
     def __init__(self, names: list[str], start: list[float]) -> None:
-        self.names, self.at = names, np.array(start)
-        self.times, self.points = np.zeros(1), self.at[None]
+        self.names = names
+        self.times, self.points = np.zeros(1), np.array([start])
         self.refused: list[str] = []
-        self.jumps: list[float] = []
-        self.accepted, self.last = 0, 0.0
+        #: What was accepted: times from when it came, and positions there.
+        self.paths: list[tuple[list[float], list[list[float]]]] = []
+        self.last = 0.0
 
     def take(self, names: list[str], times: list[float], points: list[list[float]]) -> None:
         if set(names) != set(self.names) or len(names) != len(self.names):
@@ -34,16 +35,14 @@ class Joints:
         else:
             order = [names.index(n) for n in self.names]
             now = time.monotonic()
-            told, times = np.array(points)[:, order], now + np.array(times)
-            if times[0] > now:  # from where it is, unless the trajectory says where it is by now
-                told, times = np.vstack([self.now(), told]), np.concatenate([[now], times])
-            else:
-                self.jumps.append(float(np.abs(told[0] - self.now()).max()))
-            self.points, self.times = told, times
-            self.accepted, self.last = self.accepted + 1, now
+            told = np.array(points)[:, order]
+            self.paths.append((times, told.tolist()))
+            if times[0] > 0.0:  # from where it is, unless the trajectory says where it is by now
+                told, times = np.vstack([self.at(now), told]), [0.0, *times]
+            self.points, self.times, self.last = told, now + np.array(times), now
 
-    def now(self) -> np.ndarray:
-        return np.array([np.interp(time.monotonic(), self.times, c) for c in self.points.T])
+    def at(self, moment: float) -> np.ndarray:
+        return np.array([np.interp(moment, self.times, c) for c in self.points.T])
 
 
 class Cyclone:
@@ -140,10 +139,10 @@ class Action(Rclpy):
             self.goals.pop().execute()
 
     def judge(self, goal: object) -> object:
-        before = self.joints.accepted
+        before = len(self.joints.paths)
         times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in goal.trajectory.points]
         self.joints.take(list(goal.trajectory.joint_names), times, [list(p.positions) for p in goal.trajectory.points])
-        return self.answers.ACCEPT if self.joints.accepted > before else self.answers.REJECT
+        return self.answers.ACCEPT if len(self.joints.paths) > before else self.answers.REJECT
 
     def start(self, goal: object) -> None:
         while self.goals:
@@ -183,27 +182,28 @@ def main() -> None:
     begun, moving, cut, samples = time.monotonic(), None, None, []
     ended: list[int] = []
     signal.signal(signal.SIGTERM, lambda *_: ended.append(1))
-    stamp, at = time.time_ns(), joints.now()
+    stamp, at = time.time_ns(), joints.at(begun)
     while not ended and time.monotonic() - begun < a.lifetime:
         if cut is None:
             dds.spin(joints)
-        if moving is None and joints.accepted:
-            moving = time.monotonic()
+        if moving is None and joints.paths:
+            moving = joints.last
             a.log.with_suffix(".moving").touch()
-        since = 0.0 if moving is None else time.monotonic() - moving
+        now = time.monotonic()
+        since, here = 0.0 if moving is None else now - moving, joints.at(now)
         if since > a.die_after:
             os._exit(9)
         if since > a.cut_after and cut is None:
             cut = since
             dds.cut()
         if since <= a.freeze_after:
-            stamp, at = time.time_ns(), joints.now()
-        samples.append([since, *joints.now().tolist()])
+            stamp, at = time.time_ns(), here
+        samples.append([since, *here.tolist()])
         if cut is None and not a.silent:
             dds.say([*joints.names, "elbow"], [*at.tolist(), 1.0], stamp)
         time.sleep(0.01)
-    log = {"accepted": joints.accepted, "refused": joints.refused, "cut": cut, "samples": samples}
-    log |= {"jumps": joints.jumps, "last": None if moving is None else joints.last - moving}
+    log = {"paths": joints.paths, "refused": joints.refused, "cut": cut, "samples": samples}
+    log |= {"last": None if moving is None else joints.last - moving}
     a.log.write_text(json.dumps(log))
     os._exit(0)
 

@@ -170,13 +170,13 @@ def test_two_writers_at_once(tmp_path: Path) -> None:
 
 def test_many_appends_are_quick(tmp_path: Path) -> None:
     with Record(tmp_path / "r.db") as record:
-        start = time.perf_counter()
+        start = time.process_time()
         ids = record.extend(make_solution(seed=i) for i in range(2000))
-        seconds = time.perf_counter() - start
+        seconds = time.process_time() - start
         assert record.read(ids[1234]).seed == 1234
-        start = time.perf_counter()
+        start = time.process_time()
         assert len(record.find(seed=1999, geometry_hash="0123abcd")) == 1
-        assert time.perf_counter() - start < 0.5
+        assert time.process_time() - start < 0.5
     assert seconds < 5.0
 
 

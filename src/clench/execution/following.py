@@ -23,6 +23,10 @@ PERIOD = 0.05
 #: How far ahead it is told [s]: how long a hand moves on after its connection was cut.
 HORIZON = 0.3
 _TOLD_NOTHING = f"it was told nothing beyond {HORIZON:g} s"
+#: How long after its moment a path may be told [s]; what takes longer is a pause of this program.
+LATE = 0.2 * PERIOD
+#: How often a path is computed again that a pause made late.
+_TRIES = 3
 #: Points of a path that are closer than this are one [s].
 CLOSEST = 1e-4
 #: How long is waited for a hand to stand still after a stop [s].
@@ -68,8 +72,8 @@ class TimedPlan:
         # Where it is when the next path is due, so that a driver that passes that on finds it.
         due = [PERIOD] if horizon - CLOSEST > PERIOD and (np.abs(inside - PERIOD) > CLOSEST).all() else []
         times = np.sort(np.concatenate([inside, due, [horizon]]))
-        rows = [list(self.at(moment + time).values()) for time in times]
-        return JointPath(joints=self.joints, times=times, positions=np.array(rows), period=PERIOD)
+        positions = np.stack([np.interp(moment + times, self.times, column) for column in self.positions.T], axis=1)
+        return JointPath(joints=self.joints, times=times, positions=positions, period=PERIOD)
 
 
 @dataclass
@@ -100,6 +104,32 @@ class Followed:
         self.times.append(moment)
         self.commanded.append(commanded)
         self.measured.append(state.positions)
+
+
+@dataclass
+class _Progress:
+    """Keep how far along a plan a hand is, by what it was told last.
+
+    Args:
+        ahead: how far it goes on along one path [s]. due: when the next path is to be told, by the clock [s].
+    """
+
+    ahead: float
+    due: float = 0.0
+    _begin: float = 0.0
+    _told: float | None = None
+
+    def moment(self) -> float:
+        """Return where on the plan the hand is [s]: after a pause, at the end of what it was told."""
+        if self._told is None:
+            return self._begin
+        return self._begin + min(time.monotonic() - self._told, self.ahead)
+
+    def told(self, moment: float, before: float, after: float) -> None:
+        """Note a path from a moment of the plan [s], and when the controller was told it: between two times."""
+        self._begin, self._told = moment, before
+        # Where telling took long, nobody knows how far along its path the hand is: it comes to its end.
+        self.due = before + PERIOD if after - before <= PERIOD else after + self.ahead
 
 
 @dataclass(frozen=True)
@@ -136,27 +166,36 @@ class Follower:
         return found
 
     def _move(self, plan: TimedPlan, found: Followed) -> None:
-        begun = latest = time.monotonic()
         one_target = isinstance(self.driver, OneTargetDriver) and self.driver.one_target
-        moment, ahead = 0.0, PERIOD if one_target else HORIZON
+        begun, progress = time.monotonic(), _Progress(PERIOD if one_target else HORIZON)
         while True:
-            state, expected = self.driver.read(), plan.at(moment)
+            state = self.driver.read()
+            moment = progress.moment()
+            expected = plan.at(moment)
             self.check.state(state, plan.at(moment - state.age(plan.joints)))
-            found.sample(latest - begun, expected, state)
+            found.sample(time.monotonic() - begun, expected, state)
             if self.stopping.is_set():
                 raise DriverError("Stopped on request.")
             if moment >= plan.duration:
                 return
-            self._tell(plan, moment, expected)
-            self.stopping.wait(max(0.0, latest + PERIOD - time.monotonic()))
-            now = time.monotonic()
-            # After a pause of this program the hand stands where it was told last: the plan goes on from there.
-            moment, latest = moment + min(now - latest, ahead), now
+            self._tell(plan, progress)
+            self.stopping.wait(max(0.0, progress.due - time.monotonic()))
 
-    def _tell(self, plan: TimedPlan, moment: float, expected: Mapping[str, float]) -> None:
-        path = plan.window(moment, HORIZON)
-        self.check.command(path, expected)
+    def _tell(self, plan: TimedPlan, progress: _Progress) -> None:
+        """Tell what comes next, computed anew where a pause made it late: it would pull the hand back."""
+        for _ in range(_TRIES):
+            seen, moment = time.monotonic(), progress.moment()
+            path = self._path(plan, moment)
+            told = time.monotonic()
+            if told - seen <= LATE:
+                break
         self.driver.command(path)
+        progress.told(moment, told, time.monotonic())
+
+    def _path(self, plan: TimedPlan, moment: float) -> JointPath:
+        path = plan.window(moment, HORIZON)
+        self.check.command(path, plan.at(moment))
+        return path
 
     def _settle(self, plan: TimedPlan, found: Followed) -> None:
         begun, before, told = time.monotonic(), found.times[-1], False
@@ -171,7 +210,7 @@ class Follower:
             if all(abs(state.positions[name] - end[name]) <= near for name, near in self.arrived.items()):
                 return
             if not told:  # a driver that passes on one target without saying so may not have been told the end
-                self._tell(plan, plan.duration, end)
+                self.driver.command(self._path(plan, plan.duration))
                 told = True
 
     def _stop(self, found: Followed, wait: float = STOP_WAIT) -> bool:

@@ -173,9 +173,9 @@ def test_meshes_lie_where_mujoco_puts_them(shared_data: Path, model: str) -> Non
 
 
 def test_loading_a_quarter_million_triangles_takes_seconds(shared_data: Path) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     hand = Hand.load(shared_data / LEAP)
-    took = time.perf_counter() - start
+    took = time.process_time() - start
     drawn = [s.mesh for link in hand.links for s in link.shapes[CollisionSource.VISUAL] if s.mesh is not None]
     assert sum(len(mesh.triangles) for mesh in drawn) > 250_000
     # Three times the goal of 3 s, for machines that others share.

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
 
+import numpy as np
+
 from clench.base.errors import CommandError, UnknownNameError
 from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
 
@@ -165,9 +167,10 @@ class Ros2Driver:
             raise DriverError(f"Nobody listens on '{self.topic}' any more.")
         now = time.monotonic()
         at = self._positions if self._sent is None else self._sent[1].at(now - self._sent[0])
-        first = [at[name] for name in path.joints]
-        link.publish(path.joints, [0.0, *path.times.tolist()], [first, *path.positions.tolist()])
-        self._sent = (now, path)
+        times = np.concatenate([[0.0], path.times])
+        positions = np.vstack([[at[name] for name in path.joints], path.positions])
+        link.publish(path.joints, times.tolist(), positions.tolist())
+        self._sent = (now, JointPath(path.joints, times, positions, path.period))
 
     def stop(self) -> None:
         """Tell the controller to hold where the joints were measured last, or were told to be by now.
