@@ -25,14 +25,15 @@ class VirtualClock:
         self.sleep(self.pause())
         return self.now
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, seconds: float, woken: Callable[[], bool] = lambda: False) -> None:
         until = self.now + seconds
         for when, call in sorted(self.due, key=lambda entry: entry[0]):
-            if when <= until:
+            if when <= until and not woken():
                 self.due.remove((when, call))
                 self.now = max(self.now, when)
                 call()
-        self.now = max(self.now, until)
+        if not woken():
+            self.now = max(self.now, until)
 
     def after(self, seconds: float, call: Callable[[], object]) -> None:
         """Have something called when so much time went by, as another thread would."""
@@ -61,6 +62,5 @@ class VirtualEvent:
         return self.happened
 
     def wait(self, timeout: float) -> bool:
-        if not self.happened:
-            self.clock.sleep(timeout)
+        self.clock.sleep(timeout, self.is_set)
         return self.happened

@@ -6,6 +6,7 @@ no more arrives, and the hand stands still at the end of what it was told.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Mapping
@@ -66,13 +67,23 @@ class TimedPlan:
         values = [float(np.interp(moment, self.times, column)) for column in self.positions.T]
         return dict(zip(self.joints, values, strict=True))
 
+    def nearest(self, state: HandState, first: float, last: float) -> dict[str, float]:
+        """Return where between two moments [s] every joint is nearest to where it is, one by one."""
+        inside = (self.times > first) & (self.times < last)
+        found = {}
+        for name, column in zip(self.joints, self.positions.T, strict=True):
+            passed = [*np.interp([first, last], self.times, column), *column[inside]]
+            found[name] = float(np.clip(state.positions.get(name, np.nan), min(passed), max(passed)))
+        return found
+
     def window(self, moment: float, horizon: float) -> JointPath:
         """Return the way-points of the next `horizon` [s], with times from `moment` [s] on."""
         inside = self.times[(self.times > moment + CLOSEST) & (self.times < moment + horizon - CLOSEST)] - moment
         # Where it is when the next path is due, so that a driver that passes that on finds it.
         due = [PERIOD] if horizon - CLOSEST > PERIOD and (np.abs(inside - PERIOD) > CLOSEST).all() else []
         times = np.sort(np.concatenate([inside, due, [horizon]]))
-        positions = np.stack([np.interp(moment + times, self.times, column) for column in self.positions.T], axis=1)
+        columns = [np.interp(moment + times, self.times, column) for column in self.positions.T]
+        positions = np.reshape(columns, (len(columns), len(times))).T
         return JointPath(joints=self.joints, times=times, positions=positions, period=PERIOD)
 
 
@@ -108,28 +119,36 @@ class Followed:
 
 @dataclass
 class _Progress:
-    """Keep how far along a plan a hand is, by what it was told last.
+    """Keep how far along a plan a hand is, by what it was told last and when.
+
+    A controller goes along a path from when it has it, which is somewhen while it is told.
 
     Args:
-        ahead: how far it goes on along one path [s]. due: when the next path is to be told, by the clock [s].
+        ahead: how far the hand goes on along one path [s]. begin: moment of the plan at which the last path begins [s].
+        before, after: between which times that was told [s]; not a number when none was.
     """
 
     ahead: float
-    due: float = 0.0
-    _begin: float = 0.0
-    _told: float | None = None
+    begin: float = 0.0
+    before: float = math.nan
+    after: float = math.nan
 
-    def moment(self) -> float:
-        """Return where on the plan the hand is [s]: after a pause, at the end of what it was told."""
-        if self._told is None:
-            return self._begin
-        return self._begin + min(time.monotonic() - self._told, self.ahead)
+    def moment(self, now: float) -> float:
+        """Return where on the plan the hand is, at most [s]: after a pause, at the end of what it was told."""
+        return self.begin + self._gone(now - self.before, 0.0)
 
-    def told(self, moment: float, before: float, after: float) -> None:
-        """Note a path from a moment of the plan [s], and when the controller was told it: between two times."""
-        self._begin, self._told = moment, before
+    def span(self, first: float, last: float) -> tuple[float, float]:
+        """Return between which moments of the plan [s] the hand was at a time between two [s]."""
+        return self.begin + self._gone(first - self.after, -math.inf), self.moment(last)
+
+    @property
+    def due(self) -> float:
+        """When the next path is to be told [s]."""
         # Where telling took long, nobody knows how far along its path the hand is: it comes to its end.
-        self.due = before + PERIOD if after - before <= PERIOD else after + self.ahead
+        return self.before + PERIOD if self.after - self.before <= PERIOD else self.after + self.ahead
+
+    def _gone(self, since: float, least: float) -> float:
+        return 0.0 if math.isnan(self.before) else min(max(since, least), self.ahead)
 
 
 @dataclass(frozen=True)
@@ -152,8 +171,10 @@ class Follower:
         """Follow a plan to its end, or stop the hand and say why; a stop is sent whatever is raised here."""
         found = Followed()
         try:
-            self._move(plan, found)
-            self._settle(plan, found)
+            one_target = isinstance(self.driver, OneTargetDriver) and self.driver.one_target
+            progress = _Progress(PERIOD if one_target else HORIZON)
+            self._move(plan, found, progress)
+            self._settle(plan, found, progress)
         except DriverError as error:
             found.trouble = str(error)
             found.stopped = self._stop(found)
@@ -165,52 +186,54 @@ class Follower:
             raise
         return found
 
-    def _move(self, plan: TimedPlan, found: Followed) -> None:
-        one_target = isinstance(self.driver, OneTargetDriver) and self.driver.one_target
-        begun, progress = time.monotonic(), _Progress(PERIOD if one_target else HORIZON)
-        while True:
-            state = self.driver.read()
-            moment = progress.moment()
-            expected = plan.at(moment)
-            self.check.state(state, plan.at(moment - state.age(plan.joints)))
-            found.sample(time.monotonic() - begun, expected, state)
-            if self.stopping.is_set():
-                raise DriverError("Stopped on request.")
-            if moment >= plan.duration:
-                return
+    def _move(self, plan: TimedPlan, found: Followed, progress: _Progress) -> None:
+        begun = time.monotonic()
+        while self._look(plan, found, progress, begun) < plan.duration:
             self._tell(plan, progress)
             self.stopping.wait(max(0.0, progress.due - time.monotonic()))
+
+    def _look(self, plan: TimedPlan, found: Followed, progress: _Progress, begun: float) -> float:
+        """Read where the hand is, and check that it is on its way; return the moment of the plan."""
+        asked = time.monotonic()
+        state = self.driver.read()
+        now = time.monotonic()
+        age = state.age(plan.joints)
+        self.check.state(state, plan.nearest(state, *progress.span(asked - age, now - age)))
+        moment = progress.moment(now)
+        found.sample(now - begun, plan.at(moment), state)
+        self._go_on()
+        return moment
+
+    def _go_on(self) -> None:
+        if self.stopping.is_set():
+            raise DriverError("Stopped on request.")
 
     def _tell(self, plan: TimedPlan, progress: _Progress) -> None:
         """Tell what comes next, computed anew where a pause made it late: it would pull the hand back."""
         for _ in range(_TRIES):
-            seen, moment = time.monotonic(), progress.moment()
-            path = self._path(plan, moment)
-            told = time.monotonic()
-            if told - seen <= LATE:
+            seen = time.monotonic()
+            moment = progress.moment(seen)
+            path = plan.window(moment, HORIZON)
+            self.check.command(path, plan.at(moment))
+            before = time.monotonic()
+            if before - seen <= LATE:
                 break
+        self._go_on()
         self.driver.command(path)
-        progress.told(moment, told, time.monotonic())
+        progress.begin, progress.before, progress.after = moment, before, time.monotonic()
 
-    def _path(self, plan: TimedPlan, moment: float) -> JointPath:
-        path = plan.window(moment, HORIZON)
-        self.check.command(path, plan.at(moment))
-        return path
-
-    def _settle(self, plan: TimedPlan, found: Followed) -> None:
+    def _settle(self, plan: TimedPlan, found: Followed, progress: _Progress) -> None:
         begun, before, told = time.monotonic(), found.times[-1], False
         end = plan.at(plan.duration)
         while time.monotonic() - begun < self.settling:
             self.stopping.wait(PERIOD)
-            if self.stopping.is_set():
-                raise DriverError("Stopped on request.")
-            state = self.driver.read()
-            self.check.state(state, end)
-            found.sample(before + time.monotonic() - begun, end, state)
-            if all(abs(state.positions[name] - end[name]) <= near for name, near in self.arrived.items()):
+            self._go_on()
+            self._look(plan, found, progress, begun - before)
+            here = found.measured[-1]
+            if all(abs(here[name] - end[name]) <= near for name, near in self.arrived.items()):
                 return
             if not told:  # a driver that passes on one target without saying so may not have been told the end
-                self.driver.command(self._path(plan, plan.duration))
+                self._tell(plan, progress)
                 told = True
 
     def _stop(self, found: Followed, wait: float = STOP_WAIT) -> bool:
