@@ -205,6 +205,8 @@ class DrivenHand:
         planned = (solution.squeeze or {}).get("tensions")
         if planned is None or self.hand.tendons is None or not isinstance(self.driver, TendonDriver):
             return ""
+        if self._stopping.is_set():
+            return "The tendons were not pulled: stopped on request."
         tensions = np.asarray(planned, dtype=np.float64)
         try:
             check_tensions(tensions, self.hand.tendons)

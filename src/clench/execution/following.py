@@ -67,21 +67,23 @@ class TimedPlan:
         values = [float(np.interp(moment, self.times, column)) for column in self.positions.T]
         return dict(zip(self.joints, values, strict=True))
 
-    def nearest(self, state: HandState, first: float, last: float) -> dict[str, float]:
-        """Return where between two moments [s] every joint is nearest to where it is, one by one."""
+    def nearest(self, name: str, value: float, first: float, last: float) -> float:
+        """Return where a joint is nearest to a value on its way between two moments [s]."""
+        column = self.positions[:, self.joints.index(name)]
         inside = (self.times > first) & (self.times < last)
-        found = {}
-        for name, column in zip(self.joints, self.positions.T, strict=True):
-            passed = [*np.interp([first, last], self.times, column), *column[inside]]
-            found[name] = float(np.clip(state.positions.get(name, np.nan), min(passed), max(passed)))
-        return found
+        passed = [*np.interp([first, last], self.times, column), *column[inside]]
+        return float(np.clip(value, min(passed), max(passed)))
 
     def window(self, moment: float, horizon: float) -> JointPath:
-        """Return the way-points of the next `horizon` [s], with times from `moment` [s] on."""
-        inside = self.times[(self.times > moment + CLOSEST) & (self.times < moment + horizon - CLOSEST)] - moment
-        # Where it is when the next path is due, so that a driver that passes that on finds it.
-        due = [PERIOD] if horizon - CLOSEST > PERIOD and (np.abs(inside - PERIOD) > CLOSEST).all() else []
-        times = np.sort(np.concatenate([inside, due, [horizon]]))
+        """Return the way-points of the next `horizon` [s], with times from `moment` [s] on.
+
+        The first one is where the plan is when the next path is due: a hand that is not quite where it is thought to be
+        has until then to get there, and a driver that passes that one on finds it.
+        """
+        due = [PERIOD] if horizon - CLOSEST > PERIOD else []
+        after, until = moment + sum(due) + CLOSEST, moment + horizon - CLOSEST
+        inside = self.times[(self.times > after) & (self.times < until)] - moment
+        times = np.concatenate([due, inside, [horizon]])
         columns = [np.interp(moment + times, self.times, column) for column in self.positions.T]
         positions = np.reshape(columns, (len(columns), len(times))).T
         return JointPath(joints=self.joints, times=times, positions=positions, period=PERIOD)
@@ -138,8 +140,11 @@ class _Progress:
         return self.begin + self._gone(now - self.before, 0.0)
 
     def span(self, first: float, last: float) -> tuple[float, float]:
-        """Return between which moments of the plan [s] the hand was at a time between two [s]."""
-        return self.begin + self._gone(first - self.after, -math.inf), self.moment(last)
+        """Return between which moments of the plan [s] the hand was at a time between two [s].
+
+        It may not yet have made up for a path that came up to a period late, or be where the next one begins already.
+        """
+        return self.begin + self._gone(first - self.after, -math.inf) - PERIOD, self.moment(last) + PERIOD
 
     @property
     def due(self) -> float:
@@ -197,8 +202,12 @@ class Follower:
         asked = time.monotonic()
         state = self.driver.read()
         now = time.monotonic()
-        age = state.age(plan.joints)
-        self.check.state(state, plan.nearest(state, *progress.span(asked - age, now - age)))
+        expected = {}
+        for name in plan.joints:
+            age = max(0.0, state.age([name]))
+            span = progress.span(asked - age, now - age)
+            expected[name] = plan.nearest(name, state.positions.get(name, math.nan), *span)
+        self.check.state(state, expected)
         moment = progress.moment(now)
         found.sample(now - begun, plan.at(moment), state)
         self._go_on()
@@ -225,12 +234,13 @@ class Follower:
     def _settle(self, plan: TimedPlan, found: Followed, progress: _Progress) -> None:
         begun, before, told = time.monotonic(), found.times[-1], False
         end = plan.at(plan.duration)
-        while time.monotonic() - begun < self.settling:
+        while True:
             self.stopping.wait(PERIOD)
-            self._go_on()
             self._look(plan, found, progress, begun - before)
             here = found.measured[-1]
             if all(abs(here[name] - end[name]) <= near for name, near in self.arrived.items()):
+                return
+            if told and time.monotonic() - begun >= self.settling:
                 return
             if not told:  # a driver that passes on one target without saying so may not have been told the end
                 self._tell(plan, progress)
