@@ -298,6 +298,9 @@ def test_a_solution_of_another_geometry_never_reaches_the_driver(pincer: Hand, s
     assert driver.commands == []
 
 
+TENDONS = TendonMap(("thumb", "index"), ((0.01, 0.0), (0.0, 0.01)), (0.0, 1.0), (50.0, 60.0))
+
+
 class Puller(FakeDriver):
     """A controller that pulls tendons, too."""
 
@@ -308,8 +311,7 @@ class Puller(FakeDriver):
 
 
 def test_the_squeeze_of_a_tendon_driven_hand(pincer: Hand, solution: GraspSolution) -> None:
-    tendons = TendonMap(("thumb", "index"), ((0.01, 0.0), (0.0, 0.01)), (0.0, 1.0), (50.0, 60.0))
-    hand = replace(pincer, tendons=tendons)
+    hand = replace(pincer, tendons=TENDONS)
     planned = replace(solution, squeeze={"tensions": [12.0, 1.0]})
     driver = Puller(OPEN)
     report = run(driver, hand, planned)
@@ -333,9 +335,8 @@ def test_the_squeeze_of_a_tendon_driven_hand(pincer: Hand, solution: GraspSoluti
 def test_after_a_stop_no_tendon_is_pulled(
     pincer: Hand, solution: GraspSolution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tendons = TendonMap(("thumb", "index"), ((0.01, 0.0), (0.0, 0.01)), (0.0, 1.0), (50.0, 60.0))
     driver = Puller(OPEN)
-    hand = DrivenHand(replace(pincer, tendons=tendons), driver)
+    hand = DrivenHand(replace(pincer, tendons=TENDONS), driver)
     monkeypatch.setattr(driven_hand, "squeeze_by_driver", lambda *_: [hand.stop(), Followed()][1])
     report = execute(replace(solution, squeeze={"tensions": [12.0, 1.0]}), hand)
     assert "The tendons were not pulled: stopped on request." in report.notes

@@ -116,6 +116,7 @@ class Ros2Driver:
         self._positions: dict[str, float] = {}
         self._received: dict[str, float] = {}
         self._stamps: dict[str, int] = {}
+        #: When, and the path from there on, where it began among its points.
         self._sent: tuple[float, JointPath] | None = None
 
     @property
