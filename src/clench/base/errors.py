@@ -54,6 +54,10 @@ class CommandError(ClenchError):
     """Say that a grasp command is malformed, with the path of the key."""
 
 
+class MotionError(ClenchError):
+    """Say that no path of a hand is free, and what the hand would meet."""
+
+
 class UnknownNameError(ClenchError):
     """Say that a name does not exist, guess what was meant, and list what exists.
 

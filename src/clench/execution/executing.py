@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-from clench.base.errors import CommandError
+from clench.base.errors import CommandError, MotionError
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -13,7 +13,6 @@ from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
 
 from .report import ExecutionReport
-from .step_check import step_overlap
 from .trajectory import Trajectory, plan_trajectory
 
 
@@ -41,8 +40,8 @@ def execute(
 ) -> ExecutionReport:
     """Carry out a solution: open, close along the computed path, all fingers arriving together; go to its next steps.
 
-    A solution that is not valid, or whose next steps drive links into each other, is not carried out; the report says
-    why.
+    A solution that is not valid is not carried out. Neither is one without a free path: every link is checked against
+    every other link, the object and obstacles along the whole motion, see `plan_trajectory`. The report says why.
 
     Args:
         solution: what to carry out.
@@ -61,16 +60,18 @@ def execute(
     if solution.hand != actuator.hand.name:
         raise CommandError(f"The solution is for hand '{solution.hand}', the actuator moves '{actuator.hand.name}'.")
     check_geometry(solution, actuator.hand, actuator.obj)
-    trajectory = plan_trajectory(solution, actuator.hand, obj=actuator.obj, speed=speed)
+    try:
+        trajectory = plan_trajectory(solution, actuator.hand, obj=actuator.obj, speed=speed, force=force)
+        why = None
+    except MotionError as error:
+        why = str(error)
     if not (force or solution.is_valid()):
         found = solution.violations()
         why = found[0] if found else f"its status is '{solution.status.value}'"
+    if why is not None:
         return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {why.rstrip('.')}.")
-    if not force:
-        driven = step_overlap(actuator.hand, trajectory.after, CollisionSource(solution.collision_source))
-        if driven is not None:
-            return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {driven}")
-    return actuator.carry_out(solution, trajectory)
+    report = actuator.carry_out(solution, trajectory)
+    return replace(report, notes=(*report.notes, *trajectory.notes))
 
 
 def check_geometry(solution: GraspSolution, hand: Hand, obj: GraspObject | None) -> None:

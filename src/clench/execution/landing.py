@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray, invert
-from clench.base.tolerances import ALLOWED_PENETRATION
+from clench.base.pose import FloatArray
 from clench.grasp.mechanics.contacts import make_contacts
 from clench.grasp.mechanics.jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
 from clench.models.hand.hand import Finger, Hand, JointRole
-from clench.models.objects.grasp_object import GraspObject
-from clench.models.shapes import CollisionSource
 from clench.solve.posture import posture
 from clench.solve.solution import Contact, GraspSolution
 
@@ -28,8 +24,6 @@ _FARTHEST: Final = 0.5
 _UNEVEN: Final = 1e4
 #: A follower that is this far from where its coupling has it does not move on a straight line [rad].
 _UNCOUPLED: Final = 1e-7
-#: Between two looks at a path no link moves farther than this [m], but there are no more than so many looks.
-_LOOK, _MOST_LOOKS = 0.002, 200
 
 
 def plan_landing(solution: GraspSolution, hand: Hand, clearance: float = CLEARANCE) -> FloatArray | None:
@@ -134,48 +128,3 @@ def _even_rates(rows: FloatArray, low: FloatArray, high: FloatArray) -> FloatArr
     bounds = [*zip(low, high, strict=True), *[(0.0, None)] * (count + 1)]
     found = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs")
     return None if found.x is None else np.asarray(found.x[:count])
-
-
-def is_clear(
-    solution: GraspSolution, hand: Hand, obj: GraspObject, path: Sequence[FloatArray], source: CollisionSource
-) -> bool:
-    """Tell whether no link penetrates the object on a path, by the exact depth at postures close to each other.
-
-    Args:
-        solution: says where hand and object are. hand, obj: what it was computed for.
-        path: way-points between which joints move on straight lines [rad], each shape (J,). source: of the hand.
-    """
-    from clench.grasp.depths import hand_depths
-    from clench.grasp.scene import pack_object
-
-    packed = pack_object(obj)
-    T = invert(solution.hand_pose.matrix) @ solution.object_pose.matrix
-    for q in looks(hand, path):
-        for found in hand_depths(hand, q, packed, T, source):
-            if found.depth > max(ALLOWED_PENETRATION, hand.links[found.link].pad_indentation):
-                return False
-    return True
-
-
-def looks(hand: Hand, path: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return postures of a path between which no link moves far, both ends included.
-
-    Args:
-        hand: the hand. path: way-points between which joints move on straight lines [rad], each shape (J,).
-    """
-    from clench.grasp.depths import link_meshes
-
-    reach = {mesh.link: mesh.radius + float(np.linalg.norm(mesh.center)) for mesh in link_meshes(hand)}
-    found = [path[0]]
-    for a, b in pairwise(path):
-        Ta, Tb = hand.link_poses(a), hand.link_poses(b)
-        moved = max(
-            (
-                float(np.linalg.norm(Tb[i][:3, 3] - Ta[i][:3, 3]) + r * np.linalg.norm(Tb[i][:3, :3] - Ta[i][:3, :3]))
-                for i, r in reach.items()
-            ),
-            default=0.0,
-        )
-        count = max(1, min(_MOST_LOOKS, int(np.ceil(moved / _LOOK))))
-        found += [a + (k / count) * (b - a) for k in range(1, count + 1)]
-    return found

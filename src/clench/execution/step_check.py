@@ -1,31 +1,62 @@
-"""Look for links of the hand that a next step would drive into each other."""
+"""Check what a hand does after the touch: the squeeze, and the next steps of the work."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
+from clench.base.errors import MotionError
 from clench.base.pose import FloatArray
-from clench.grasp.depths import link_meshes
-from clench.grasp.self_check import overlap_depth
-from clench.models.hand.allowed import adjacent_pairs
+from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
+from clench.solve.posture import posture
+from clench.solve.solution import GraspSolution
 
-from .landing import looks
-from .next_steps import NEXT_STEP, Phase
+from .next_steps import NEXT_STEP, Phase, squeeze_offsets
 
-#: Links that overlap by so much more than when the steps begin are driven into each other [m]: fingers may touch.
-DRIVEN_IN: Final = 1e-3
+
+def refuse_after(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -> None:
+    """Raise an error if the squeeze or a next step would drive links of the hand into each other.
+
+    Args:
+        solution: the solution. hand: what it was computed for. phases: what comes after the touch.
+
+    Raises:
+        MotionError: the sentence names the step and the links.
+    """
+    sentence = squeeze_overlap(solution, hand, squeeze_offsets(solution, hand)) or step_overlap(
+        hand, phases, CollisionSource(solution.collision_source)
+    )
+    if sentence is not None:
+        raise MotionError(sentence)
+
+
+def squeeze_overlap(solution: GraspSolution, hand: Hand, offsets: FloatArray) -> str | None:
+    """Return a sentence about the first two links that a squeeze drives into each other; None without.
+
+    The object holds the fingers that touch it: they press and do not move, whatever angles they are told. So fingers
+    that touch are not checked against each other, but against the rest of the hand.
+
+    Args:
+        solution: the solution. hand: what it was computed for. offsets: angles beyond the touch [rad], shape (J,).
+    """
+    if not offsets.any():
+        return None
+    touching = {c.finger for c in solution.contacts if not c.passed}
+    held = [link for f in hand.fingers if f.name in touching for link in f.links]
+    q = posture(solution.joint_angles, hand, "joint_angles")
+    path = np.array([q, q + offsets])
+    found = find_path_overlap(hand, path, CollisionSource(solution.collision_source), held=held)
+    return None if found is None else f"In the squeeze, {found.sentence}."
 
 
 def step_overlap(hand: Hand, phases: Sequence[Phase], source: CollisionSource) -> str | None:
     """Return a sentence about the first two links that next steps drive into each other; None when there are none.
 
-    Pairs that may overlap, and links next to each other, are not looked at.
+    The object moves with the hand or stays behind, so only the hand is checked. Links that the squeeze presses into
+    each other may stay as deep as they are when the steps begin.
 
     Args:
         hand: the hand. phases: what comes after the touch. source: geometry of the links.
@@ -33,34 +64,10 @@ def step_overlap(hand: Hand, phases: Sequence[Phase], source: CollisionSource) -
     steps = [phase for phase in phases if phase.name == NEXT_STEP]
     if not steps:
         return None
-    pairs = _Pairs(hand, source)
-    before = pairs.depths(steps[0].positions[0])
-    for phase in steps:
-        for q in looks(hand, list(phase.positions)):
-            for (a, b), depth in pairs.depths(q).items():
-                if depth > before.get((a, b), 0.0) + DRIVEN_IN:
-                    names = hand.links[a].name, hand.links[b].name
-                    return f"Next step {1 + (phase.step or 0)} would drive '{names[0]}' into '{names[1]}'."
-    return None
-
-
-class _Pairs:
-    """Measure how deep links overlap each other that must not."""
-
-    def __init__(self, hand: Hand, source: CollisionSource) -> None:
-        self._hand = hand
-        self._meshes = link_meshes(hand, source)
-        left_out = set(hand.allowed_pairs) | adjacent_pairs(hand.links)
-        numbers = itertools.combinations(range(len(self._meshes)), 2)
-        found = [(a, b) for a, b in numbers if (self._meshes[a].link, self._meshes[b].link) not in left_out]
-        self._pairs = np.array(found, dtype=np.int64).reshape(-1, 2)
-        radii = np.array([mesh.radius for mesh in self._meshes])
-        self._reach = radii[self._pairs].sum(axis=1)
-
-    def depths(self, q: FloatArray) -> dict[tuple[int, int], float]:
-        """Return the depth [m] of every pair of links that may be near each other in a posture, shape (J,) [rad]."""
-        poses = self._hand.link_poses(q)
-        centers = np.array([poses[m.link][:3, :3] @ m.center + poses[m.link][:3, 3] for m in self._meshes])
-        apart = np.linalg.norm(np.subtract(*centers.reshape(-1, 3)[self._pairs].transpose(1, 0, 2)), axis=1)
-        near = [(self._meshes[a], self._meshes[b]) for a, b in self._pairs[apart <= self._reach]]
-        return {(a.link, b.link): overlap_depth(a, b, poses) for a, b in near}
+    path = np.vstack([steps[0].positions[:1], *(phase.positions[1:] for phase in steps)])
+    found = find_path_overlap(hand, path, source)
+    if found is None:
+        return None
+    ends = np.cumsum([len(phase.positions) - 1 for phase in steps])
+    number = min(int(np.searchsorted(ends, found.place)), len(steps) - 1)
+    return f"In next step {1 + (steps[number].step or 0)}, {found.sentence}."

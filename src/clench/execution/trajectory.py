@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,29 +12,19 @@ import numpy as np
 from clench.base.errors import CommandError, FileError
 from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
-from clench.models.command import ClosingOrder
-from clench.models.hand.hand import DEFAULT_SPEED, Hand, JointRole
+from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.models.shapes import CollisionSource
-from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
-from .closing_path import STILL, closing_path, distinct
-from .landing import CLEARANCE, LANDING_SPEED, is_clear, plan_landing
+from .landing import CLEARANCE
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
-from .timing import ACCELERATION, TimedPath, time_path
+from .step_check import refuse_after
+from .timing import ACCELERATION
+from .way_to_touch import WayFinder, refuse_way
 
 SCHEMA = "clench.trajectory/1"
 #: No smaller fraction of the velocity limits makes sense, or can be computed with [-].
 SLOWEST = 1e-6
-#: Way-points per stage; speed rises from zero and falls to zero within each.
-STAGE_STEPS = 8
-#: Way-points of a path on which all joints move at once, besides those at which one stops.
-AT_ONCE_STEPS = 32
-#: Where the way from a pregrasp is not clear, one nearer to the touch is tried: shares of the clearance [-].
-_CLEARANCES = (1.0, 0.4, 0.1)
-#: Times [s], shape (N,), and postures [rad], shape (N, J).
-_Part = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +40,8 @@ class Trajectory:
         pregrasp: number of the way-point from which all contacts are reached at once; None when there is none.
         after: where the solution has next steps: what comes after the touch, the squeeze and the steps.
         speed: fraction of the velocity limits that was used [-]. acceleration: largest of every joint [rad/s²].
+        turns: names of the fingers that move at the same time on the way to the pregrasp, or to the touch without one;
+            fingers of a later turn wait for those before.
     """
 
     hand: str
@@ -63,6 +54,23 @@ class Trajectory:
     after: tuple[Phase, ...] = ()
     speed: float = 1.0
     acceleration: float = ACCELERATION
+    turns: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def touches_at_once(self) -> bool:
+        """Whether all fingers touch at the same moment: from a pregrasp, or where one turn has all fingers."""
+        return self.pregrasp is not None or len(self.turns) <= 1
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences about fingers that wait, and about fingers that do not touch at the same moment."""
+        if len(self.turns) <= 1:
+            return ()
+        order = ", then ".join(" and ".join(f"'{name}'" for name in turn) for turn in self.turns)
+        waits = f"Fingers wait for each other, so that they do not meet: {order}."
+        if self.touches_at_once:
+            return (waits,)
+        return (waits, "The fingers do not touch at the same moment, so the object may be pushed.")
 
     @property
     def duration(self) -> float:
@@ -94,6 +102,7 @@ class Trajectory:
             "velocity_limits": self.velocity_limits.tolist(),
             "speed": self.speed,
             "acceleration": self.acceleration,
+            "turns": [list(turn) for turn in self.turns],
             "pregrasp": pregrasp,
             "points": [
                 *(
@@ -130,15 +139,24 @@ def plan_trajectory(
     speed: float = 1.0,
     acceleration: float = ACCELERATION,
     clearance: float = CLEARANCE,
+    force: bool = False,
 ) -> Trajectory:
-    """Time a path to the touch, so that all fingers touch at the same moment, slowly; then to the next steps.
+    """Plan a free path from the open hand to the touch, and on to the next steps, and time it.
 
-    With the object, the hand goes to a pregrasp off it, and from there straight to all contacts at once, at 10 mm/s.
-    The way to the pregrasp is a straight line in joint space where the exact depth shows that to be clear, else every
-    finger goes joint by joint. Without the object, or where none of this is clear, every finger goes through its
-    closing path as it was computed; then a finger's later joints close after its first ones touched. The slowest finger
-    sets the duration, the others are slowed down to it. Posture joints that differ between the open hand and the
-    solution move first. Where all joints closed at once, they do so here, each until it was held.
+    The path is proven: over all of it, no link of the hand overlaps another link, the object or an obstacle by more
+    than 10 µm, in the geometry of the solution. Pairs of links that may overlap are listed in the hand report.
+
+    The first free path of the following ones is returned.
+
+    1. With the object, the hand moves to a pregrasp off the object. From there all fingers touch at the same moment, at
+       10 mm/s. All fingers move to the pregrasp on a straight line in joint space. A finger that would meet something
+       on this line goes along its closing path, joint by joint. Where two fingers would meet, one waits for the other.
+    2. Without the object, or without a free pregrasp, every finger goes through its closing path. Then the later joints
+       of a finger close after the first ones touched, and fingers may touch one after another.
+
+    Of the fingers that move at the same time, the slowest one sets the duration. Posture joints that differ between the
+    open hand and the solution move first. Without the object, the fingers go along paths that the solution's
+    certificate covers, and only links are checked against each other.
 
     Args:
         solution: the solution.
@@ -146,9 +164,11 @@ def plan_trajectory(
         obj: the object it was computed for; the solution says where it is.
         speed: fraction of the velocity limits to use, above 0 and up to 1.
         acceleration: largest of every joint [rad/s²].
-        clearance: of the pregrasp [m]; less where the way from there is not clear.
+        clearance: of the pregrasp [m]; less where the way from there is not free.
+        force: return a path even if none is free.
 
     Raises:
+        MotionError: no free path was found; the sentence names the links that would overlap, and when.
         CommandError: the solution is of another hand, lacks a joint, has more than one round, or a next step outside a
             joint's limits; or `speed`, `acceleration` or `clearance` is out of range.
         UnknownNameError: a next step of a joint that the hand does not have.
@@ -166,149 +186,27 @@ def plan_trajectory(
     limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
     pace = _pace(limits, speed, acceleration)
     after = plan_after_touch(solution, hand, pace)
-    times, positions, pregrasp = _to_touch(solution, hand, obj, pace, clearance)
-    names = solution.hand, solution.object, hand.joint_names
-    return Trajectory(*names, times, positions, limits, pregrasp, after, float(speed), float(acceleration))
+    way = WayFinder(solution, hand, obj, pace).find(clearance)
+    if not force:
+        refuse_way(way, hand)
+        refuse_after(solution, hand, after)
+    return Trajectory(
+        hand=solution.hand,
+        object=solution.object,
+        joints=hand.joint_names,
+        times=way.times,
+        positions=way.positions,
+        velocity_limits=limits,
+        pregrasp=way.pregrasp,
+        after=after,
+        speed=float(speed),
+        acceleration=float(acceleration),
+        turns=way.turns,
+    )
 
 
 def _pace(limits: FloatArray, speed: float, acceleration: float) -> tuple[FloatArray, FloatArray]:
     return limits * speed, np.full(len(limits), float(acceleration))
-
-
-def _to_touch(
-    solution: GraspSolution,
-    hand: Hand,
-    obj: GraspObject | None,
-    pace: tuple[FloatArray, FloatArray],
-    clearance: float,
-) -> tuple[FloatArray, FloatArray, int | None]:
-    """Return times and postures from the open hand to the touch, and the number of the pregrasp."""
-    end = posture(solution.joint_angles, hand, "joint_angles")
-    for share in _CLEARANCES if obj is not None else ():
-        assert obj is not None
-        found = _landed(solution, hand, obj, pace, share * clearance)
-        if found is not None:
-            (before, way), (later, path) = found
-            pregrasp = len(before) - 1
-            times = np.concatenate([before[:-1], before[-1] + later])
-            # Where nothing touches, there is nothing to stand off.
-            return times, np.vstack([way[:-1], path]), pregrasp if pregrasp < len(times) - 1 else None
-    return *_way(solution, hand, end, pace, straight=False), None
-
-
-def _landed(
-    solution: GraspSolution, hand: Hand, obj: GraspObject, pace: tuple[FloatArray, FloatArray], clearance: float
-) -> tuple[_Part, _Part] | None:
-    """Return the way to a pregrasp and the straight line from there to all contacts at once; None when not clear."""
-    end = posture(solution.joint_angles, hand, "joint_angles")
-    landing = plan_landing(solution, hand, clearance)
-    if landing is None:
-        return None
-    source = CollisionSource(solution.collision_source)
-    if not is_clear(solution, hand, obj, [landing, end], source):
-        return None
-    slow = np.minimum(pace[0], np.abs(end - landing) * (LANDING_SPEED / clearance))
-    last = _joined([time_path([np.array([landing, end])], slow, pace[1])], end, [range(len(end))])
-    for straight in (True, False):
-        way = _way(solution, hand, landing, pace, straight=straight)
-        if is_clear(solution, hand, obj, list(way[1]), source):
-            return way, last
-    return None
-
-
-def _way(
-    solution: GraspSolution, hand: Hand, end: FloatArray, pace: tuple[FloatArray, FloatArray], *, straight: bool
-) -> _Part:
-    """Return times and postures from the open hand to a posture: in one line, or as the fingers closed."""
-    start = posture(solution.open_angles, hand, "open_angles")
-    turned, opening = _preparation(hand, start, end)
-    if straight:
-        stages = [[np.array([turned, end])]] * len(hand.fingers)
-    elif _closed_at_once(solution):
-        stages = [_path_at_once(solution, hand, turned, end)] * len(hand.fingers)
-    else:
-        stages = [list(_stages(hand, f.joints, turned, end)) for f in hand.fingers]
-    before = time_path(opening, *pace)
-    times, path = _joined([before], turned, [range(len(end))])
-    grid, positions = _joined([time_path(found, *pace) for found in stages], end, [f.joints for f in hand.fingers])
-    return np.concatenate([times[:-1], times[-1] + grid]), np.vstack([path[:-1], positions])
-
-
-def _joined(paths: list[TimedPath], end: FloatArray, joints: Sequence[Sequence[int]]) -> _Part:
-    """Return times and postures of paths that are gone through at the same time, each by some of the joints."""
-    duration = max((path.duration for path in paths), default=0.0)
-    grid = distinct(np.concatenate([np.zeros(1), *(path.samples(duration) for path in paths)]))
-    positions = np.tile(paths[0].corners[0] if paths else end, (len(grid), 1))
-    for own, path in zip(joints, paths, strict=True):
-        moved = [j for j in own if np.ptp(path.corners[:, j]) > 0.0]
-        if moved:
-            positions[:, moved] = np.array([path.stretched_at(t, duration) for t in grid])[:, moved]
-    positions[-1] = end
-    return grid, positions
-
-
-def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
-    """Return the open posture after everything but the closing joints has moved, and the path there."""
-    in_fingers = {j for finger in hand.fingers for j in finger.joints}
-    first = [
-        j
-        for j, joint in enumerate(hand.joints)
-        if abs(end[j] - start[j]) > STILL and (joint.role is not JointRole.CLOSING or j not in in_fingers)
-    ]
-    turned = start.copy()
-    turned[first] = end[first]
-    return turned, [_eased(start, turned)] if first else [start[None]]
-
-
-def _closed_at_once(solution: GraspSolution) -> bool:
-    orders = [c.order for name in solution.fingers for c in _chosen(solution, name)]
-    return any(order != ClosingOrder.PROXIMAL_FIRST for order in orders)
-
-
-def _path_at_once(solution: GraspSolution, hand: Hand, start: FloatArray, end: FloatArray) -> list[FloatArray]:
-    """Return the path on which all joints move, each at its speed and until its end, as stages."""
-    speed = np.array([solution.speeds.get(name, 1.0) for name in hand.joint_names])
-    path = closing_path(hand, range(len(start)), start, end, speed, AT_ONCE_STEPS)
-    return [path, _eased(path[-1], end)] if np.abs(end - path[-1]).max(initial=0.0) > STILL else [path]
-
-
-def _stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatArray) -> Iterator[FloatArray]:
-    """Yield the stages of a finger: way-points of all joints, shape (n, J), of which only the finger's move."""
-    q = start.copy()
-    yield q[None].copy()
-    followers = {c.follower for c in hand.couplings}
-    for leader in joints:
-        if leader in followers:
-            continue
-        group = [leader, *(j for j in _followers(hand, leader) if j in joints)]
-        path = closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
-        yield path
-        q = path[-1].copy()
-    target = q.copy()
-    target[list(joints)] = end[list(joints)]
-    yield _eased(q, target)
-
-
-def _followers(hand: Hand, leader: int) -> list[int]:
-    found: list[int] = []
-    for coupling in hand.couplings:
-        if coupling.leader == leader or coupling.leader in found:
-            found.append(coupling.follower)
-    return found
-
-
-def _chosen(solution: GraspSolution, finger: str) -> tuple[Any, ...]:
-    result = solution.fingers.get(finger)
-    best = None if result is None else result.best
-    return () if best is None else (best,)
-
-
-def _eased(start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return way-points, evenly spaced in time, that leave and arrive slowly, shape (n, J)."""
-    s = np.linspace(0.0, 1.0, STAGE_STEPS + 1)[:, None]
-    path: FloatArray = start + (s * s * (3.0 - 2.0 * s)) * (end - start)
-    path[-1] = end
-    return path
 
 
 class _PointForm(msgspec.Struct):
@@ -326,6 +224,7 @@ class _Form(msgspec.Struct):
     points: list[_PointForm]
     speed: float = 1.0
     acceleration: float = ACCELERATION
+    turns: list[list[str]] = []
 
 
 def _read(data: Any, source: str) -> Trajectory:
@@ -365,4 +264,5 @@ def _read(data: Any, source: str) -> Trajectory:
         after=phases_after(phases[last:], times[last:], positions[last:]),
         speed=form.speed,
         acceleration=form.acceleration,
+        turns=tuple(tuple(turn) for turn in form.turns),
     )

@@ -1,0 +1,337 @@
+"""Find a free path from the open hand to the touch: straight, along the closing paths, or finger after finger.
+
+Every path is proven before it is returned: see `clench.grasp.path_check`. Where two fingers would meet, one of them
+waits until the other one has arrived. Where a finger would meet the object or the palm on a straight line in joint
+space, the finger goes along its closing path instead, joint by joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from clench.base.errors import MotionError
+from clench.base.pose import FloatArray, invert
+from clench.grasp.path_check import PathOverlap, PlacedObject, find_path_overlap
+from clench.grasp.scene import pack_object
+from clench.models.command import ClosingOrder
+from clench.models.hand.hand import Hand, JointRole
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
+from clench.solve.posture import posture
+from clench.solve.solution import GraspSolution
+
+from .closing_path import STILL, closing_path, distinct
+from .landing import LANDING_SPEED, plan_landing
+from .timing import TimedPath, time_path
+
+#: Way-points per stage; speed rises from zero and falls to zero within each.
+STAGE_STEPS: Final = 8
+#: Way-points of a path on which all joints move at once, besides those at which one stops.
+AT_ONCE_STEPS: Final = 32
+#: Where no way to a pregrasp is free, one nearer to the touch is tried: shares of the clearance [-].
+_CLEARANCES: Final = (1.0, 0.4, 0.1)
+#: So many plans are checked for one pregrasp at most.
+_MOST_PLANS: Final = 24
+#: Times [s], shape (N,), and postures [rad], shape (N, J).
+_Part = tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class FingerPlan:
+    """Say when each finger moves, and along which path.
+
+    Args:
+        turn: of each finger; fingers of one turn move at the same time, those of the next one wait for them.
+        straight: whether each finger moves on a straight line in joint space, or else along its closing path.
+    """
+
+    turn: tuple[int, ...]
+    straight: tuple[bool, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Hold a path from the open hand to the touch.
+
+    Args:
+        times: [s], shape (N,), from 0. positions: [rad], shape (N, J).
+        pregrasp: number of the way-point from which all contacts are reached at once; None without one.
+        turns: names of the fingers that move to the pregrasp, or to the touch, at the same time; first turn first.
+        overlap: the first overlap of a path that is not free; None where it is.
+    """
+
+    times: FloatArray
+    positions: FloatArray
+    pregrasp: int | None
+    turns: tuple[tuple[str, ...], ...]
+    overlap: PathOverlap | None = None
+
+
+class WayFinder:
+    """Search for a free path of a hand to the touch.
+
+    Args:
+        solution: the solution. hand, obj: what it was computed for; without the object only links are kept apart.
+        pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
+    """
+
+    def __init__(
+        self, solution: GraspSolution, hand: Hand, obj: GraspObject | None, pace: tuple[FloatArray, FloatArray]
+    ) -> None:
+        self.solution, self.hand, self.pace = solution, hand, pace
+        self.source = CollisionSource(solution.collision_source)
+        self.around = None if obj is None else placed_object(solution, obj)
+        self.start = posture(solution.open_angles, hand, "open_angles")
+        self.end = posture(solution.joint_angles, hand, "joint_angles")
+
+    def find(self, clearance: float) -> Way:
+        """Return the first path that is free; where none is, the first one that was tried, with its overlap.
+
+        Args:
+            clearance: of the pregrasp [m].
+        """
+        failed: list[Way] = []
+        for share in _CLEARANCES if self.around is not None else ():
+            landing = self._landing(share * clearance)
+            if landing is None:
+                continue
+            goal, last = landing
+            way = self._search(goal, straight=True, last=last)
+            if way.overlap is None:
+                return way
+            failed.append(way)
+        way = self._search(self.end, straight=False, last=None)
+        if way.overlap is not None:
+            # The order of the certificate: one finger after another, along the paths that were computed.
+            order = list(self.solution.fingers)
+            turns = [order.index(f.name) if f.name in order else len(order) for f in self.hand.fingers]
+            count = len(self.hand.fingers)
+            certified = self._checked(FingerPlan(tuple(turns), (False,) * count), self.end, None)
+            if certified.overlap is None:
+                return certified
+        return way if way.overlap is None or not failed else failed[0]
+
+    def _landing(self, clearance: float) -> tuple[FloatArray, _Part] | None:
+        """Return a pregrasp and the straight line from there to all contacts at once; None where it is not free."""
+        goal = plan_landing(self.solution, self.hand, clearance)
+        if goal is None or self._overlap(np.array([goal, self.end])) is not None:
+            return None
+        slow = np.minimum(self.pace[0], np.abs(self.end - goal) * (LANDING_SPEED / clearance))
+        line = time_path([np.array([goal, self.end])], slow, self.pace[1])
+        return goal, _joined([line], self.end, [range(len(self.end))])
+
+    def _overlap(self, path: FloatArray) -> PathOverlap | None:
+        return find_path_overlap(self.hand, path, self.source, self.around)
+
+    def _search(self, goal: FloatArray, *, straight: bool, last: _Part | None) -> Way:
+        """Return a free way to a posture; where none is found the first one tried, with its overlap."""
+        count = len(self.hand.fingers)
+        plans = [FingerPlan((0,) * count, (straight,) * count)]
+        seen, first = set(plans), None
+        for _ in range(_MOST_PLANS):
+            if not plans:
+                break
+            plan = plans.pop(0)
+            way = self._checked(plan, goal, last)
+            if way.overlap is None:
+                return way
+            first = first or way
+            for other in self._alternatives(plan, way.overlap):
+                if other not in seen:
+                    seen.add(other)
+                    plans.append(other)
+        assert first is not None
+        return first
+
+    def _checked(self, plan: FingerPlan, goal: FloatArray, last: _Part | None) -> Way:
+        times, positions = self._timed(plan, goal)
+        overlap = self._overlap(positions)
+        pregrasp = None
+        if last is not None:
+            pregrasp = len(times) - 1
+            times = np.concatenate([times[:-1], times[-1] + last[0]])
+            positions = np.vstack([positions[:-1], last[1]])
+            # Where nothing touches, there is nothing to stand off.
+            pregrasp = pregrasp if pregrasp < len(times) - 1 else None
+        names = [f.name for f in self.hand.fingers]
+        moved = [bool((self.start[f.own] != goal[f.own]).any()) for f in self.hand.fingers]
+        turns = (
+            tuple(n for n, t, moves in zip(names, plan.turn, moved, strict=True) if t == k and moves)
+            for k in range(max(plan.turn, default=0) + 1)
+        )
+        return Way(times, positions, pregrasp, tuple(turn for turn in turns if turn), overlap)
+
+    def _alternatives(self, plan: FingerPlan, overlap: PathOverlap) -> Iterator[FingerPlan]:
+        """Yield plans that may avoid an overlap: one of two fingers waits, or a finger goes along its closing path."""
+        met = [self._finger_of(overlap.link), None if overlap.with_object else self._finger_of(overlap.other)]
+        fingers = [f for f in dict.fromkeys(met) if f is not None]
+        if len(fingers) == 2 and plan.turn[fingers[0]] == plan.turn[fingers[1]]:
+            # The finger that was closed later waits first.
+            for waits in sorted(fingers, key=self._rank, reverse=True):
+                yield replace(plan, turn=_later(plan.turn, waits))
+        for finger in fingers:
+            if plan.straight[finger]:
+                yield replace(plan, straight=tuple(s and k != finger for k, s in enumerate(plan.straight)))
+        if len(fingers) == 2 and plan.turn[fingers[0]] != plan.turn[fingers[1]]:
+            earlier, later = sorted(fingers, key=lambda f: plan.turn[f])
+            swapped = list(plan.turn)
+            swapped[earlier], swapped[later] = plan.turn[later], plan.turn[earlier]
+            yield replace(plan, turn=tuple(swapped))
+
+    def _rank(self, finger: int) -> int:
+        names = list(self.solution.fingers)
+        name = self.hand.fingers[finger].name
+        return names.index(name) if name in names else len(names)
+
+    def _finger_of(self, link: str) -> int | None:
+        number = self.hand.link_index(link)
+        return next((k for k, f in enumerate(self.hand.fingers) if number in f.links), None)
+
+    def _timed(self, plan: FingerPlan, goal: FloatArray) -> _Part:
+        """Return times and postures from the open hand to a posture."""
+        turned, opening = _preparation(self.hand, self.start, goal)
+        parts = [_joined([time_path(opening, *self.pace)], turned, [range(len(goal))])]
+        q = turned
+        for turn in range(max(plan.turn, default=0) + 1):
+            own = [f for f, t in zip(self.hand.fingers, plan.turn, strict=True) if t == turn]
+            straight = [s for s, t in zip(plan.straight, plan.turn, strict=True) if t == turn]
+            target = q.copy()
+            for finger in own:
+                target[finger.own] = goal[finger.own]
+            if (target == q).all():
+                continue
+            paths = [
+                time_path(self._stages(f.joints, q, target, straight=s), *self.pace)
+                for f, s in zip(own, straight, strict=True)
+            ]
+            parts.append(_joined(paths, target, [f.joints for f in own]))
+            q = target
+        return _concatenated(parts, goal)
+
+    def _stages(
+        self, joints: tuple[int, ...], start: FloatArray, end: FloatArray, *, straight: bool
+    ) -> list[FloatArray]:
+        """Return the stages of one finger; the other fingers rest."""
+        goal = start.copy()
+        goal[list(joints)] = end[list(joints)]
+        if straight:
+            return [np.array([start, goal])]
+        if _closed_at_once(self.solution):
+            return _path_at_once(self.solution, self.hand, joints, start, goal)
+        return list(_closing_stages(self.hand, joints, start, goal))
+
+
+def placed_object(solution: GraspSolution, obj: GraspObject) -> PlacedObject:
+    """Return the object of a solution where the palm sees it."""
+    return PlacedObject(pack_object(obj), invert(solution.hand_pose.matrix) @ solution.object_pose.matrix)
+
+
+def refuse_way(way: Way, hand: Hand) -> None:
+    """Raise an error that says why no path is free.
+
+    Raises:
+        MotionError: the way is not free.
+    """
+    found = way.overlap
+    if found is None:
+        return
+    k = min(int(found.place), len(way.times) - 1)
+    after = min(k + 1, len(way.times) - 1)
+    time = way.times[k] + (found.place - k) * (way.times[after] - way.times[k])
+    raise MotionError(
+        f"No free path to the touch was found for hand '{hand.name}': {found.sentence} "
+        f"{time:.2f} s after the start of the straight path; other orders of the fingers and paths joint by joint "
+        "failed, too."
+    )
+
+
+def _later(turn: tuple[int, ...], waits: int) -> tuple[int, ...]:
+    """Return turns in which one finger moves after those that it moved with, and before those that moved after."""
+    own = turn[waits]
+    return tuple(t + 1 if k == waits or t > own else t for k, t in enumerate(turn))
+
+
+def _concatenated(parts: Sequence[_Part], goal: FloatArray) -> _Part:
+    """Return parts that follow each other as one; where none moves, one way-point at the goal."""
+    times, positions = parts[0]
+    for later, path in parts[1:]:
+        times = np.concatenate([times[:-1], times[-1] + later])
+        positions = np.vstack([positions[:-1], path])
+    positions = positions.copy()
+    positions[-1] = goal
+    return times, positions
+
+
+def _joined(paths: list[TimedPath], end: FloatArray, joints: Sequence[Sequence[int]]) -> _Part:
+    """Return times and postures of paths that are gone through at the same time, each by some of the joints."""
+    duration = max((path.duration for path in paths), default=0.0)
+    grid = distinct(np.concatenate([np.zeros(1), *(path.samples(duration) for path in paths)]))
+    positions = np.tile(paths[0].corners[0] if paths else end, (len(grid), 1))
+    for own, path in zip(joints, paths, strict=True):
+        moved = [j for j in own if np.ptp(path.corners[:, j]) > 0.0]
+        if moved:
+            positions[:, moved] = np.array([path.stretched_at(t, duration) for t in grid])[:, moved]
+    positions[-1] = end
+    return grid, positions
+
+
+def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
+    """Return the open posture after everything but the closing joints has moved, and the path there."""
+    in_fingers = {j for finger in hand.fingers for j in finger.joints}
+    first = [
+        j
+        for j, joint in enumerate(hand.joints)
+        if abs(end[j] - start[j]) > STILL and (joint.role is not JointRole.CLOSING or j not in in_fingers)
+    ]
+    turned = start.copy()
+    turned[first] = end[first]
+    return turned, [_eased(start, turned)] if first else [start[None]]
+
+
+def _closed_at_once(solution: GraspSolution) -> bool:
+    chosen = [result.best for result in solution.fingers.values()]
+    return any(best is not None and best.order != ClosingOrder.PROXIMAL_FIRST for best in chosen)
+
+
+def _path_at_once(
+    solution: GraspSolution, hand: Hand, joints: Sequence[int], start: FloatArray, end: FloatArray
+) -> list[FloatArray]:
+    """Return the path on which joints move together, each at its speed and until its end, as stages."""
+    speed = np.array([solution.speeds.get(name, 1.0) for name in hand.joint_names])
+    path = closing_path(hand, joints, start, end, speed, AT_ONCE_STEPS)
+    return [path, _eased(path[-1], end)] if np.abs(end - path[-1]).max(initial=0.0) > STILL else [path]
+
+
+def _closing_stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatArray) -> Iterator[FloatArray]:
+    """Yield the stages of a finger: way-points of all joints, shape (n, J), of which only the finger's move."""
+    q = start.copy()
+    yield q[None].copy()
+    followers = {c.follower for c in hand.couplings}
+    for leader in joints:
+        if leader in followers:
+            continue
+        group = [leader, *(j for j in _followers(hand, leader) if j in joints)]
+        path = closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
+        yield path
+        q = path[-1].copy()
+    yield _eased(q, end)
+
+
+def _followers(hand: Hand, leader: int) -> list[int]:
+    found: list[int] = []
+    for coupling in hand.couplings:
+        if coupling.leader == leader or coupling.leader in found:
+            found.append(coupling.follower)
+    return found
+
+
+def _eased(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return way-points, evenly spaced in time, that leave and arrive slowly, shape (n, J)."""
+    s = np.linspace(0.0, 1.0, STAGE_STEPS + 1)[:, None]
+    path: FloatArray = start + (s * s * (3.0 - 2.0 * s)) * (end - start)
+    path[-1] = end
+    return path

@@ -1,0 +1,235 @@
+"""Find where a hand first overlaps itself, the object or an obstacle on a path in joint space (METHOD.md section 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.keeping import kept_by_identity
+from clench.base.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+from .depths import hand_depths, link_mesh_arrays, object_mesh
+from .exact import HandBodies, hand_bodies
+from .linkage import hand_frames
+from .scene import PackedObject
+from .surface import nearest_body
+
+if TYPE_CHECKING:
+    from clench.kernels.pair_motion import PathProblem
+
+_KEPT_HANDS: Final = 16
+#: Way-points whose joints are this close to a straight line lie on it [rad].
+STRAIGHT: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedObject:
+    """Name an object and its place beside the hand.
+
+    Args:
+        packed: the object, with its obstacles. T_palm_object: shape (4, 4).
+    """
+
+    packed: PackedObject
+    T_palm_object: FloatArray
+
+
+@dataclass(frozen=True)
+class PathOverlap:
+    """Describe the first overlap on a path.
+
+    Args:
+        place: number of the way-point before it, plus the share of the way to the next one.
+        link: name of a link. other: name of the other link, or of the body of the object.
+        with_object: whether `other` is a body of the object.
+        depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm.
+        position: place in the palm's frame [m]; None where the overlap is too shallow to locate.
+    """
+
+    place: float
+    link: str
+    other: str
+    with_object: bool
+    depth: float
+    position: tuple[float, float, float] | None = None
+
+    @property
+    def sentence(self) -> str:
+        """One sentence without a full stop, e.g. "'thumb_tip' would overlap 'index_tip' by 3.2 mm"."""
+        what = "the object's " if self.with_object else ""
+        return f"'{self.link}' would overlap {what}'{self.other}' by at least {self.depth * 1e3:.2g} mm"
+
+
+def find_path_overlap(
+    hand: Hand,
+    path: FloatArray,
+    source: CollisionSource,
+    around: PlacedObject | None = None,
+    *,
+    held: Collection[int] = (),
+) -> PathOverlap | None:
+    """Return the first overlap on a path of the whole hand; None proves that the path is free.
+
+    Every link is checked against every other link and against the object with its obstacles, over the whole path. The
+    exact sweep goes on until two bodies touch. From there, steps are so short that the bodies cannot overlap by more
+    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs`) are left out. A
+    pair that overlaps where the path begins may stay as deep as it was since, until it is apart. A soft pad may be
+    indented by the object as far as the hand file says.
+
+    Args:
+        hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.
+        source: geometry of the links. around: the object; None checks the hand alone.
+        held: links that something holds where they are; they are not checked against each other.
+    """
+    from clench.kernels.path_overlap import first_overlap
+
+    points, kept = _corners(np.ascontiguousarray(path, dtype=np.float64))
+    problem = _problem(hand, points, source, around, held)
+    out = np.zeros(2)
+    found = first_overlap(problem, out)
+    if found < 0:
+        return None
+    m, r = problem.pairs[found].tolist()
+    corner = min(int(out[0]), len(points) - 1)
+    share = out[0] - corner
+    after = min(corner + 1, len(points) - 1)
+    q = points[corner] + share * (points[after] - points[corner])
+    place = float(kept[corner] + share * (kept[after] - kept[corner]))
+    name = hand.links[m].name
+    if r >= 0:
+        return PathOverlap(place, name, hand.links[r].name, False, float(out[1]))
+    assert around is not None
+    return _with_object(hand, q, m, source, around, place, float(out[1]))
+
+
+def _with_object(
+    hand: Hand, q: FloatArray, link: int, source: CollisionSource, around: PlacedObject, place: float, depth: float
+) -> PathOverlap:
+    deepest = hand_depths(hand, q, around.packed, around.T_palm_object, source, links=[link])
+    spot = next((d.place for d in deepest if d.place is not None), None)
+    names = around.packed.body_names
+    body, position = names[0] if names else "object", None
+    if spot is not None:
+        body = names[nearest_body(around.packed, spot)]
+        x, y, z = (around.T_palm_object @ np.append(spot, 1.0))[:3].tolist()
+        position = (x, y, z)
+    return PathOverlap(place, hand.links[link].name, body, True, depth, position)
+
+
+def _corners(path: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return the way-points of a path at which its direction changes, and their numbers."""
+    kept = [0]
+    for k in range(1, len(path) - 1):
+        a, b, c = path[kept[-1]], path[k], path[k + 1]
+        whole = c - a
+        length = float(whole @ whole)
+        share = float((b - a) @ whole) / length if length > 0.0 else -1.0
+        if 0.0 <= share <= 1.0 and np.abs(a + share * whole - b).max() <= STRAIGHT:
+            continue
+        kept.append(k)
+    if len(path) > 1:
+        kept.append(len(path) - 1)
+    return np.ascontiguousarray(path[kept]), np.array(kept, dtype=np.int64)
+
+
+def _problem(
+    hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None, held: Collection[int]
+) -> PathProblem:
+    from clench.kernels.bodies import no_body
+    from clench.kernels.link_meshes import ObjectMesh
+    from clench.kernels.pair_motion import PathProblem
+    from clench.kernels.tree import build_tree
+
+    bodies, meshes = hand_bodies(hand, source), link_mesh_arrays(hand, source)
+    tables = _tables(hand, source)
+    if around is None:
+        pairs, body, T = tables.between, no_body(), np.eye(4)
+        none = build_tree(np.empty((0, 3)), np.empty((0, 3)))
+        solid = ObjectMesh(none, np.empty(0, dtype=np.uint8), True, np.empty((0, 3)))
+    else:
+        pairs, body, T = tables.all, around.packed.bodies, around.T_palm_object
+        solid = object_mesh(around.packed)
+    if held:
+        pairs = np.ascontiguousarray(pairs[~np.isin(pairs, list(held)).all(axis=1)])
+    pads = np.array([hand.links[m].pad_indentation if r < 0 else 0.0 for m, r in pairs.tolist()], dtype=np.float64)
+    return PathProblem(
+        frames=hand_frames(hand),
+        links=bodies.links,
+        meshes=meshes,
+        mesh=tables.mesh,
+        lineage=tables.lineage,
+        reach=tables.reach,
+        pairs=pairs,
+        allowed=pads,
+        object=body,
+        solid=solid,
+        T_palm_object=np.ascontiguousarray(np.asarray(T, dtype=np.float64)[:3]),
+        path=path,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Tables:
+    """Hold what is the same for every path of a hand; see `PathProblem`. `between` are the pairs without the object."""
+
+    mesh: NDArray[np.int64]
+    lineage: NDArray[np.int64]
+    reach: FloatArray
+    all: NDArray[np.int64]
+    between: NDArray[np.int64]
+
+
+@kept_by_identity(_KEPT_HANDS)
+def _tables(hand: Hand, source: CollisionSource) -> _Tables:
+    bodies, meshes = hand_bodies(hand, source), link_mesh_arrays(hand, source)
+    count = len(hand.links)
+    mesh = np.full(count, -1, dtype=np.int64)
+    mesh[meshes.link] = np.arange(len(meshes.link))
+    lineage = np.eye(count, dtype=np.int64)
+    for i, link in enumerate(hand.links):
+        if link.parent >= 0:
+            lineage[i] |= lineage[link.parent]
+    solid = [i for i in hand.solid_links if bodies.links.root[i] >= 0]
+    between = [(m, r) for m in solid for r in solid if r < m and bodies.across[m, r]]
+    all_pairs = [*between, *((m, -1) for m in solid)]
+    return _Tables(
+        mesh,
+        lineage,
+        _reach(hand, bodies, lineage),
+        np.array(all_pairs, dtype=np.int64).reshape(-1, 2),
+        np.array(between, dtype=np.int64).reshape(-1, 2),
+    )
+
+
+def _reach(hand: Hand, bodies: HandBodies, lineage: NDArray[np.int64]) -> FloatArray:
+    """Return bounds on the distance of every link's points from every joint's axis, shape (L, J).
+
+    A point of a link is never farther from a joint's anchor than along the links between them. The way from a link's
+    origin to the next one goes through the anchor of the joint between, because both parts keep their length.
+    """
+    links, joints = hand.links, hand.joints
+    up = np.zeros((len(links), 2))  # from a link's origin to its own anchor, and from there to its parent's origin
+    for i, link in enumerate(links):
+        anchor = joints[link.joint].anchor if link.joint >= 0 else np.zeros(3)
+        up[i] = np.linalg.norm(anchor), np.linalg.norm((link.T_parent_link @ np.append(anchor, 1.0))[:3])
+    reach = np.zeros((len(links), len(joints)))
+    for m in range(len(links)):
+        if bodies.links.root[m] < 0:
+            continue
+        ball = bodies.links.node[bodies.links.root[m]]
+        own = float(np.linalg.norm(ball[:3]) + ball[3])
+        for i, link in enumerate(links):
+            if link.joint < 0:
+                continue
+            # All origins on the way from link m to link i, and from there to the anchor of its joint.
+            above_m = np.flatnonzero(lineage[m] & ~lineage[i] & 1)
+            above_i = np.flatnonzero(lineage[i] & ~lineage[m] & 1)
+            way = float(up[above_m].sum() + up[above_i].sum())
+            reach[m, link.joint] = own + (way + up[i, 0] if lineage[m, i] else way - up[i, 0])
+    return reach
