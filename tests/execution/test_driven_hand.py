@@ -19,7 +19,7 @@ from clench.execution import driven_hand
 from clench.execution.driven_hand import DrivenHand
 from clench.execution.driver import DriverError, DriverLimits, JointPath
 from clench.execution.executing import execute
-from clench.execution.following import HORIZON, PERIOD, Followed, TimedPlan
+from clench.execution.following import HORIZON, PERIOD, TimedPlan
 from clench.execution.joint_map import JointMap, MappedJoint
 from clench.models.hand.hand import Hand
 from clench.models.hand.tendons import TendonMap
@@ -327,7 +327,7 @@ def test_the_squeeze_of_a_tendon_driven_hand(pincer: Hand, solution: GraspSoluti
         report = run(driver, hand, replace(solution, squeeze={"tensions": wrong}))
         assert any(note.startswith("The tendons were not pulled: " + message) for note in report.notes), report.notes
         assert not hasattr(driver, "pulled")
-        assert driver.stops == 1
+        assert driver.stops == 0
     plain = FakeDriver(OPEN)
     assert len(run(plain, hand, planned).notes) == 2  # a driver without tendons is asked nothing
 
@@ -337,9 +337,10 @@ def test_after_a_stop_no_tendon_is_pulled(
 ) -> None:
     driver = Puller(OPEN)
     hand = DrivenHand(replace(pincer, tendons=TENDONS), driver)
-    monkeypatch.setattr(driven_hand, "squeeze_by_driver", lambda *_: [hand.stop(), Followed()][1])
+    monkeypatch.setattr(driven_hand, "squeeze_by_driver", lambda *_: hand.stop())
     report = execute(replace(solution, squeeze={"tensions": [12.0, 1.0]}), hand)
-    assert "The tendons were not pulled: stopped on request." in report.notes
+    assert report.reason.startswith("Stopped on request. The hand was told to stop")
+    assert "The tendons were not pulled." in report.notes
     assert not hasattr(driver, "pulled")
 
 

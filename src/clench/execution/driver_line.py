@@ -1,0 +1,169 @@
+"""Call a driver in a thread of its own, so that a call that does not return holds up neither a stop nor the report."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeVar
+
+from clench.base.errors import ClenchError
+
+from .driver import DriverError, HandDriver
+
+#: How long a call of a driver may take, but for `connect` [s].
+CALL_LIMIT: Final = 1.0
+#: How long a stop waits for a call that an interrupt left alone [s]: two messages on one line would mix.
+SHORTLY: Final = 0.1
+
+#: Calls after whose failure nobody knows what the hand does.
+MOVING_CALLS: Final = ("read", "command", "pull", "stop")
+
+T = TypeVar("T")
+_Outcome = tuple[Any, BaseException | None]
+
+
+@dataclass(eq=False)
+class _Call:
+    """Hold a call, and what came of it once it has returned."""
+
+    what: str
+    function: Callable[[], Any]
+    outcome: queue.SimpleQueue[_Outcome] = field(default_factory=queue.SimpleQueue)
+    abandoned: bool = False
+
+    def run(self) -> None:
+        try:
+            self.outcome.put((self.function(), None))
+        except BaseException as error:
+            self.outcome.put((None, error))
+
+
+class DriverLine:
+    """Call a driver, one call after the other, from one thread.
+
+    The caller waits for at most `CALL_LIMIT`. A call that has not returned by then is abandoned: the driver is called
+    no more except to stop and to disconnect, which come from further threads. When the abandoned call returns after
+    all, the hand is told to stop once more, because the call may have been a command.
+    """
+
+    def __init__(self, driver: HandDriver) -> None:
+        self._driver = driver
+        self._calls: queue.SimpleQueue[_Call | None] = queue.SimpleQueue()
+        self._under_way: _Call | None = None
+        self._closing = threading.RLock()
+        self._freed: Callable[[], None] | None = None
+        #: What the driver has not returned from, empty when it has.
+        self.stuck = ""
+        #: Whether one of `MOVING_CALLS` failed.
+        self.failed = False
+        self._thread = threading.Thread(target=self._serve, name="clench driver", daemon=True)
+        self._thread.start()
+
+    def call(self, what: str, function: Callable[[], T], limit: float | None = CALL_LIMIT) -> T:
+        """Run a function that calls the driver, and return what it returns.
+
+        Args:
+            what: name of the driver's method. function: runs in the thread of this line.
+            limit: how long it may take [s]; None: without end.
+
+        Raises:
+            DriverError: it raised an `Exception`, or took too long. BaseException: what else it raised.
+        """
+        if self.stuck:
+            raise DriverError(f"The driver has not returned from {self.stuck}().")
+        call = _Call(what, function)
+        self._calls.put(call)
+        self._under_way = call
+        result: T = self._answer(call, limit)
+        return result
+
+    def stop(self) -> None:
+        """Tell the hand to stop, in spite of a call that does not return.
+
+        Raises:
+            DriverError: the driver failed. BaseException: what else it raised.
+        """
+        self._aside("stop")
+
+    def disconnect(self) -> None:
+        """Let the controller go, however that ends."""
+        with suppress(Exception):
+            self._aside("disconnect")
+
+    def close(self, freed: Callable[[], None]) -> None:
+        """Call the driver no more; `freed` is called once the last call has returned."""
+        self._calls.put(None)
+        with self._closing:
+            if self.stuck:
+                self._freed = freed
+                return
+        freed()
+
+    def _aside(self, what: str) -> None:
+        """Call a method in turn, or in a further thread when the turn does not come."""
+        left, self._under_way = self._under_way, None
+        if left is not None and not self.stuck:  # an interrupt left it alone
+            with suppress(Exception):
+                self._answer(left, SHORTLY)
+        if not self.stuck:
+            self.call(what, getattr(self._driver, what))
+            return
+        call = _Call(what, getattr(self._driver, what))
+        threading.Thread(target=call.run, name=f"clench {what}", daemon=True).start()
+        try:
+            _, error = call.outcome.get(timeout=CALL_LIMIT)
+        except queue.Empty:
+            raise DriverError(f"{what}() of the driver has not returned after {CALL_LIMIT:g} s.") from None
+        if error is not None:
+            raise _as_driver_error(error, what)
+
+    def _answer(self, call: _Call, limit: float | None) -> Any:
+        try:
+            result, error = patiently(call.outcome, limit)
+        except queue.Empty:
+            self.failed |= call.what in MOVING_CALLS
+            with self._closing:
+                call.abandoned = True
+                if call.outcome.empty():
+                    self.stuck = call.what
+            raise DriverError(f"{call.what}() of the driver has not returned after {limit:g} s.") from None
+        self._under_way = None
+        if error is not None:
+            self.failed |= call.what in MOVING_CALLS
+            raise _as_driver_error(error, call.what)
+        return result
+
+    def _serve(self) -> None:
+        while (call := self._calls.get()) is not None:
+            call.run()
+            with self._closing:
+                if not call.abandoned:
+                    continue
+            with suppress(BaseException):
+                self._driver.stop()
+            if call.what == "connect":
+                with suppress(BaseException):
+                    self._driver.disconnect()
+            with self._closing:
+                self.stuck, freed = "", self._freed
+            if freed is not None:
+                freed()
+
+
+def patiently(outcome: queue.SimpleQueue[_Outcome], limit: float | None) -> _Outcome:
+    """Return what comes within a limit [s]; raise `queue.Empty` otherwise."""
+    return outcome.get(timeout=limit)
+
+
+def _as_driver_error(error: BaseException, what: str) -> BaseException:
+    """Return what is raised for an error of a driver: one kind for all its failures, others as they are."""
+    if isinstance(error, DriverError) or not isinstance(error, Exception):
+        return error
+    if isinstance(error, ClenchError):
+        return error if what == "connect" else DriverError(str(error))
+    told = DriverError(f"The driver failed ({type(error).__name__}: {error}).")
+    told.__cause__ = error
+    return told
