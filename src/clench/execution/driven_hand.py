@@ -24,6 +24,7 @@ from .driver_line import CALL_LIMIT
 from .driver_session import STOP_TRIES, DriverSession
 from .following import CLOSEST, Follower, TimedPlan
 from .halting import halt
+from .history import CommandsSent
 from .joint_map import JointMap, MappedJoint
 from .report import ExecutionReport
 from .supervision import Event, HandStoppedError, State, Supervision, supervision_of
@@ -156,7 +157,7 @@ class DrivenHand:
         try:
             session = DriverSession(self.driver)
         except HandStoppedError as error:
-            return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}")
+            return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}", sent=CommandsSent())
         raised: BaseException | None = None
         try:
             self._last_report = None
@@ -207,13 +208,11 @@ class DrivenHand:
                 session.close(disconnect=not self.stay_connected)
                 # A stop that came since then was told by whoever stopped the hand.
                 done.trouble = done.trouble or session.supervision.cause
-                self._last_report = report_on(
-                    done, session.sent, solution, self.hand, self.name, self.angle_tolerance
-                )
+                self._last_report = report_on(done, session.sent, solution, self.hand, self.name, self.angle_tolerance)
             except BaseException as error:
                 raised = error
             else:
-                return raised
+                return session.interrupt or raised
         session.close(disconnect=False)
         return raised
 

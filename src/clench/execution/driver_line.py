@@ -13,13 +13,18 @@ from clench.base.errors import ClenchError
 
 from .driver import DriverError, HandDriver
 
-#: How long a call of a driver may take, but for `connect` [s].
+#: How long a call of a driver may take, except `connect` and `disconnect` [s].
 CALL_LIMIT: Final = 1.0
+#: How long `disconnect` may take [s].
+LEAVING_LIMIT: Final = 5.0
 #: How long a stop waits for a call that an interrupt left alone [s]: two messages on one line would mix.
 SHORTLY: Final = 0.1
 
 #: Calls after whose failure nobody knows what the hand does.
 MOVING_CALLS: Final = ("read", "command", "pull", "stop")
+
+#: What is called when an abandoned call returns after all, where that is not `stop` alone.
+_WHEN_LATE: Final = {"connect": ("stop", "disconnect"), "disconnect": ()}
 
 T = TypeVar("T")
 _Outcome = tuple[Any, BaseException | None]
@@ -46,15 +51,15 @@ class DriverLine:
 
     The caller waits for at most `CALL_LIMIT`. A call that has not returned by then is abandoned: the driver is called
     no more except to stop and to disconnect, which come from further threads. When the abandoned call returns after
-    all, the hand is told to stop once more, because the call may have been a command.
+    all, the hand is told to stop once more: the call may have been a command.
     """
 
     def __init__(self, driver: HandDriver) -> None:
         self._driver = driver
         self._calls: queue.SimpleQueue[_Call | None] = queue.SimpleQueue()
         self._under_way: _Call | None = None
-        self._closing = threading.RLock()
-        self._freed: Callable[[], None] | None = None
+        self._abandoning = threading.Lock()
+        self._freed: Callable[[], None] = lambda: None
         #: What the driver has not returned from, empty when it has.
         self.stuck = ""
         #: Whether one of `MOVING_CALLS` failed.
@@ -80,43 +85,46 @@ class DriverLine:
         result: T = self._answer(call, limit)
         return result
 
+    @property
+    def left(self) -> bool:
+        """Whether an interrupt left a call alone, which goes on."""
+        return self._under_way is not None
+
     def stop(self) -> None:
         """Tell the hand to stop, in spite of a call that does not return.
 
         Raises:
             DriverError: the driver failed. BaseException: what else it raised.
         """
-        self._aside("stop")
+        self._aside("stop", CALL_LIMIT)
 
     def disconnect(self) -> None:
         """Let the controller go, however that ends."""
         with suppress(Exception):
-            self._aside("disconnect")
+            self._aside("disconnect", LEAVING_LIMIT)
 
     def close(self, freed: Callable[[], None]) -> None:
-        """Call the driver no more; `freed` is called once the last call has returned."""
+        """Call the driver no more; `freed` is called once the last call has returned, however late that is."""
+        self._freed = freed
         self._calls.put(None)
-        with self._closing:
-            if self.stuck:
-                self._freed = freed
-                return
-        freed()
+        if not self.stuck:
+            self._thread.join(CALL_LIMIT)
 
-    def _aside(self, what: str) -> None:
+    def _aside(self, what: str, limit: float) -> None:
         """Call a method in turn, or in a further thread when the turn does not come."""
         left, self._under_way = self._under_way, None
         if left is not None and not self.stuck:  # an interrupt left it alone
             with suppress(Exception):
                 self._answer(left, SHORTLY)
         if not self.stuck:
-            self.call(what, getattr(self._driver, what))
+            self.call(what, getattr(self._driver, what), limit)
             return
         call = _Call(what, getattr(self._driver, what))
         threading.Thread(target=call.run, name=f"clench {what}", daemon=True).start()
         try:
-            _, error = call.outcome.get(timeout=CALL_LIMIT)
+            _, error = call.outcome.get(timeout=limit)
         except queue.Empty:
-            raise DriverError(f"{what}() of the driver has not returned after {CALL_LIMIT:g} s.") from None
+            raise DriverError(f"{what}() of the driver has not returned after {limit:g} s.") from None
         if error is not None:
             raise _as_driver_error(error, what)
 
@@ -124,8 +132,9 @@ class DriverLine:
         try:
             result, error = patiently(call.outcome, limit)
         except queue.Empty:
+            self._under_way = None
             self.failed |= call.what in MOVING_CALLS
-            with self._closing:
+            with self._abandoning:
                 call.abandoned = True
                 if call.outcome.empty():
                     self.stuck = call.what
@@ -139,18 +148,14 @@ class DriverLine:
     def _serve(self) -> None:
         while (call := self._calls.get()) is not None:
             call.run()
-            with self._closing:
+            with self._abandoning:
                 if not call.abandoned:
                     continue
-            with suppress(BaseException):
-                self._driver.stop()
-            if call.what == "connect":
+            for late in _WHEN_LATE.get(call.what, ("stop",)):
                 with suppress(BaseException):
-                    self._driver.disconnect()
-            with self._closing:
-                self.stuck, freed = "", self._freed
-            if freed is not None:
-                freed()
+                    getattr(self._driver, late)()
+            self.stuck = ""
+        self._freed()
 
 
 def patiently(outcome: queue.SimpleQueue[_Outcome], limit: float | None) -> _Outcome:

@@ -14,6 +14,8 @@ from .supervision import Event, Supervision, supervision_of
 
 #: How often the hand is told to stop when the driver fails to do so.
 STOP_TRIES = 2
+#: How many interrupts a stop outlasts.
+INTERRUPTS = 10
 
 
 @dataclass
@@ -70,7 +72,9 @@ class DriverSession:
         except BaseException:
             self.supervision.end()
             raise
-        self._disconnected = self._closed = False
+        #: What interrupted the stop of the hand.
+        self.interrupt: BaseException | None = None
+        self._disconnected = False
 
     @property
     def failed(self) -> bool:
@@ -125,22 +129,32 @@ class DriverSession:
         self.supervision.wait(seconds)
 
     def stop(self) -> str:
-        """Tell the hand to stop, once more when the driver fails; return why it could not be told, else nothing."""
-        trouble = ""
-        for _ in range(STOP_TRIES):
+        """Tell the hand to stop, once more when the driver fails; return why it could not be told, else nothing.
+
+        An interrupt does not keep the hand from being told; it is in `interrupt` afterwards.
+        """
+        failures: list[str] = []
+        for _ in range(INTERRUPTS):
             try:
                 self._line.stop()
-            except BaseException as error:  # an interrupt, too, must not keep the hand from being told
-                trouble = f"{type(error).__name__}: {error}" if not isinstance(error, Exception) else str(error)
+            except BaseException as error:
+                self.keep_interrupt(error)
+                if not self._line.left:  # else the driver did not fail, and is still being told
+                    failures.append(str(error) if isinstance(error, Exception) else type(error).__name__)
+                if len(failures) == STOP_TRIES:
+                    break
             else:
                 return ""
-        return trouble
+        return failures[-1] if failures else "interrupted"
+
+    def keep_interrupt(self, error: BaseException) -> None:
+        """Keep an interrupt, to be raised once the hand was stopped; do nothing with an `Exception`."""
+        if not isinstance(error, Exception):
+            self.interrupt = error
 
     def close(self, *, disconnect: bool) -> None:
         """End the execution; a call that the driver has not returned from ends it when it returns."""
         if disconnect and not self._disconnected:
             self._disconnected = True  # an interrupt leads here again
             self._line.disconnect()
-        if not self._closed:
-            self._closed = True
-            self._line.close(self.supervision.end)
+        self._line.close(self.supervision.end)

@@ -71,7 +71,8 @@ def _comes_to_rest(session: DriverSession, check: CommandCheck, found: Followed)
                     found.sample(found.times[-1] + waited + _LOOK, found.commanded[-1], state)
                 return True
             before = state if fresh else None
-    except BaseException:  # the hand was told; another interrupt only ends the looking
+    except BaseException as error:  # the hand was told; an interrupt only ends the looking
+        session.keep_interrupt(error)
         return False
     return False
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from clench.base.pose import FloatArray
@@ -45,11 +45,11 @@ class CommandsSent:
         tensions: whether tensions of tendons were handed over.
     """
 
-    commands: int
-    unconfirmed: int
-    last: Mapping[str, float]
-    time: float | None
-    tensions: bool
+    commands: int = 0
+    unconfirmed: int = 0
+    last: Mapping[str, float] = field(default_factory=dict)
+    time: float | None = None
+    tensions: bool = False
 
     def text(self) -> str:
         """Say it in a sentence."""
