@@ -8,17 +8,21 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import clench
+from clench.apps.cli import actuators
 from clench.apps.cli.exchange import Format
+from clench.apps.cli.interrupts import stopped_by_signals
 from clench.apps.cli.main import main
 from clench.execution.driven_hand import DrivenHand
 from clench.execution.drivers.ros2 import RosInterface
 from clench.execution.formats.exchange import GraspFormat
+from clench.execution.supervision import Supervision
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.command_file import load_command
 from clench.models.shapes import CollisionSource
@@ -236,6 +240,105 @@ def test_names_that_lead_elsewhere_are_refused(
     assert main(["import", str(tmp_path / "g.yaml"), "--hand", "robonaut2", "--out", str(tmp_path / "c")]) == 2
     assert "the name cannot be that of a file" in capsys.readouterr().err
     assert not (tmp_path / "grasp_0.json").exists()
+
+
+class Servos:
+    """Go at once where they are told; a signal comes with the fifth command."""
+
+    name = "servos"
+    one_target = True
+    limits = clench.DriverLimits()
+
+    def __init__(self, joints: list[str], number: int, swallow: bool) -> None:
+        self.joints, self.number, self.swallow = tuple(joints), number, swallow
+        self.angles = dict.fromkeys(joints, 0.0)
+        self.calls: list[str] = []
+
+    def connect(self, timeout: float) -> None:
+        pass
+
+    def read(self) -> clench.HandState:
+        return clench.HandState(dict(self.angles))
+
+    def command(self, path: clench.JointPath) -> None:
+        self.calls.append("command")
+        self.angles.update(path.at(path.period))
+        if len(self.calls) == 5:
+            os.kill(os.getpid(), self.number)
+
+    def stop(self) -> None:
+        self.calls.append("stop")
+
+    def disconnect(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("swallow", [False, True])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_stops_the_hand_and_what_was_sent_is_kept(
+    solution: GraspSolution,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    number: int,
+    swallow: bool,
+) -> None:
+    """Also when the code that happens to run takes the interrupt for an error of its own, and goes on."""
+    hand = clench.Hand.load("robonaut2")
+    servos = Servos([joint.name for joint in hand.joints], number, swallow)
+    monkeypatch.setattr(actuators, "_driver", lambda *_: servos)
+    if swallow:
+        wait = Supervision.wait
+
+        def swallowing(supervision: Supervision, seconds: float) -> None:
+            with suppress(KeyboardInterrupt):
+                wait(supervision, seconds)
+
+        monkeypatch.setattr(Supervision, "wait", swallowing)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    options = ["--actuator", "ros2", "--speed", "0.2", "--out", str(tmp_path / "r.json"), "--json"]
+    try:
+        code = main(["execute", str(tmp_path / "s.json"), *options])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    report = json.loads((tmp_path / "r.json").read_text())
+    printed = capsys.readouterr()
+    assert json.loads(printed.out) == report
+    assert not report["success"]
+    assert report["sent"]["commands"] == 5
+    assert servos.calls == [*["command"] * 5, "stop"]
+    assert len(report["history"]["times"]) >= 5
+    if code == 130:
+        assert report["reason"].startswith("Interrupted (KeyboardInterrupt). The hand was told to stop: it was seen")
+        assert printed.err == "clench: error: interrupted.\n"
+    else:
+        assert swallow
+        assert code == 1
+        assert report["reason"].startswith("Stopped on request. The hand was told to stop: it was seen")
+
+
+def test_an_interrupt_before_anything_moves_leaves_no_report(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(clench, "execute", interrupted)
+    monkeypatch.setattr(actuators, "_driver", lambda *_: Servos([], 0, False))
+    options = ["--actuator", "ros2", "--out", str(tmp_path / "r.json")]
+    assert main(["execute", str(tmp_path / "s.json"), *options]) == 130
+    assert capsys.readouterr().err == "clench: error: interrupted.\n"
+    assert not (tmp_path / "r.json").exists()
+
+
+def test_what_was_ignored_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stopped_by_signals():
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

@@ -398,7 +398,19 @@ def test_no_state_is_from_the_future(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ros2, "open_link", lambda *_: wire)
     driver = Ros2Driver()
     driver.connect(1.0)
-    receive, driver._receive = driver._receive, lambda: (receive(), clock.sleep(0.1), receive())  # type: ignore[method-assign,assignment,return-value]
+
+    class Meanwhile:
+        """Let the other thread have the lock first."""
+
+        def __enter__(self) -> None:
+            clock.sleep(0.1)
+            driver._received["thumb"] = clock.now
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+    monkeypatch.setattr(driver, "_receive", lambda: None)
+    monkeypatch.setattr(driver, "_lock", Meanwhile())
     assert driver.read().ages == {"thumb": 0.0}
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 from types import ModuleType
-from typing import Any
 
 import pytest
 
-from clench.execution import driver_line, following, halting
+from clench.execution import following, halting
+from clench.execution.driver_line import Call
 from clench.execution.supervision import Supervision
 
 
@@ -51,14 +49,15 @@ class VirtualClock:
         for module in (following, halting, *modules):
             monkeypatch.setattr(module, "time", self)
         monkeypatch.setattr(Supervision, "wait", lambda supervision, seconds: self._wait(supervision, seconds))
-        monkeypatch.setattr(driver_line, "patiently", self._patiently)
+        wait = Call.wait
+        monkeypatch.setattr(Call, "wait", lambda call, _: self._patiently(lambda: wait(call, 0.05)))
 
     def _wait(self, supervision: Supervision, seconds: float) -> None:
         self.sleep(max(seconds, 0.0), lambda: bool(supervision.cause))
 
-    def _patiently(self, outcome: queue.SimpleQueue[Any], limit: float | None) -> Any:
+    def _patiently(self, wait: Callable[[], bool]) -> bool:
         """Wait for a call of a driver for as long as it takes, or until it is said to hang."""
         while not self.hanging.is_set():
-            with suppress(queue.Empty):
-                return outcome.get(timeout=0.05)
-        return outcome.get(timeout=0.05)
+            if wait():
+                return True
+        return wait()

@@ -27,23 +27,40 @@ MOVING_CALLS: Final = ("read", "command", "pull", "stop")
 _WHEN_LATE: Final = {"connect": ("stop", "disconnect"), "disconnect": ()}
 
 T = TypeVar("T")
-_Outcome = tuple[Any, BaseException | None]
 
 
 @dataclass(eq=False)
-class _Call:
-    """Hold a call, and what came of it once it has returned."""
+class Call:
+    """Hold a call of a driver, and what came of it once it has returned.
+
+    Args:
+        what: name of the driver's method. function: what is run. returned: whether it has returned.
+        result, error: what it returned or raised. abandoned: whether nobody waits for it any more.
+    """
 
     what: str
     function: Callable[[], Any]
-    outcome: queue.SimpleQueue[_Outcome] = field(default_factory=queue.SimpleQueue)
+    returned: bool = False
+    result: Any = None
+    error: BaseException | None = None
     abandoned: bool = False
+    _wake: queue.SimpleQueue[None] = field(default_factory=queue.SimpleQueue)
 
     def run(self) -> None:
+        """Run the function, and wake who waits."""
         try:
-            self.outcome.put((self.function(), None))
+            self.result = self.function()
         except BaseException as error:
-            self.outcome.put((None, error))
+            self.error = error
+        self.returned = True
+        self._wake.put(None)
+
+    def wait(self, limit: float | None) -> bool:
+        """Wait until it has returned, at most so long [s]; return whether it has. An interrupt loses nothing."""
+        with suppress(queue.Empty):
+            if not self.returned:
+                self._wake.get(timeout=limit)
+        return self.returned
 
 
 class DriverLine:
@@ -56,8 +73,8 @@ class DriverLine:
 
     def __init__(self, driver: HandDriver) -> None:
         self._driver = driver
-        self._calls: queue.SimpleQueue[_Call | None] = queue.SimpleQueue()
-        self._under_way: _Call | None = None
+        self._calls: queue.SimpleQueue[Call | None] = queue.SimpleQueue()
+        self._under_way: Call | None = None
         self._abandoning = threading.Lock()
         self._freed: Callable[[], None] = lambda: None
         #: What the driver has not returned from, empty when it has.
@@ -79,7 +96,7 @@ class DriverLine:
         """
         if self.stuck:
             raise DriverError(f"The driver has not returned from {self.stuck}().")
-        call = _Call(what, function)
+        call = Call(what, function)
         self._calls.put(call)
         self._under_way = call
         result: T = self._answer(call, limit)
@@ -119,31 +136,27 @@ class DriverLine:
         if not self.stuck:
             self.call(what, getattr(self._driver, what), limit)
             return
-        call = _Call(what, getattr(self._driver, what))
+        call = Call(what, getattr(self._driver, what))
         threading.Thread(target=call.run, name=f"clench {what}", daemon=True).start()
-        try:
-            _, error = call.outcome.get(timeout=limit)
-        except queue.Empty:
-            raise DriverError(f"{what}() of the driver has not returned after {limit:g} s.") from None
-        if error is not None:
-            raise _as_driver_error(error, what)
+        if not call.wait(limit):
+            raise DriverError(f"{what}() of the driver has not returned after {limit:g} s.")
+        if call.error is not None:
+            raise _as_driver_error(call.error, what)
 
-    def _answer(self, call: _Call, limit: float | None) -> Any:
-        try:
-            result, error = patiently(call.outcome, limit)
-        except queue.Empty:
+    def _answer(self, call: Call, limit: float | None) -> Any:
+        if not call.wait(limit):
             self._under_way = None
             self.failed |= call.what in MOVING_CALLS
             with self._abandoning:
                 call.abandoned = True
-                if call.outcome.empty():
+                if not call.returned:
                     self.stuck = call.what
-            raise DriverError(f"{call.what}() of the driver has not returned after {limit:g} s.") from None
+            raise DriverError(f"{call.what}() of the driver has not returned after {limit:g} s.")
         self._under_way = None
-        if error is not None:
+        if call.error is not None:
             self.failed |= call.what in MOVING_CALLS
-            raise _as_driver_error(error, call.what)
-        return result
+            raise _as_driver_error(call.error, call.what)
+        return call.result
 
     def _serve(self) -> None:
         while (call := self._calls.get()) is not None:
@@ -156,11 +169,6 @@ class DriverLine:
                     getattr(self._driver, late)()
             self.stuck = ""
         self._freed()
-
-
-def patiently(outcome: queue.SimpleQueue[_Outcome], limit: float | None) -> _Outcome:
-    """Return what comes within a limit [s]; raise `queue.Empty` otherwise."""
-    return outcome.get(timeout=limit)
 
 
 def _as_driver_error(error: BaseException, what: str) -> BaseException:

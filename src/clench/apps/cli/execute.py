@@ -7,7 +7,17 @@ from pathlib import Path
 from clench.base.errors import FileError
 from clench.base.json_files import check_writable
 
-from .actuators import ActuatorName, ActuatorOptions, DriveName, Interface, make_actuator, make_film, make_hold
+from .actuators import (
+    ActuatorName,
+    ActuatorOptions,
+    DriveName,
+    Interface,
+    make_actuator,
+    make_film,
+    make_hold,
+    report_of,
+    stop_of,
+)
 from .interrupts import stopped_by_signals
 
 
@@ -102,8 +112,12 @@ def execute(
         controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze, film, drive
     )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
-    with stopped_by_signals():
-        report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not skip_next_steps)
+    interrupted = False
+    try:
+        with stopped_by_signals(stop_of(moved)):
+            report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not skip_next_steps)
+    except KeyboardInterrupt:
+        report, interrupted = report_of(moved), True
     if film is not None:
         film.finish()
     if log is not None and report.history is None:
@@ -116,6 +130,8 @@ def execute(
         print_json(report.to_dict())
     else:
         print_report(report)
+    if interrupted:
+        raise KeyboardInterrupt
     return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
 
 
