@@ -107,6 +107,7 @@ def followed(
         clock.use(patched, fake_driver)
         check, found, trouble = CommandCheck(LIMITS, 0.5, deviation), Followed(), ""
         session = DriverSession(driver)
+        session.begin()
         try:
             Follower(session, check, settling, dict.fromkeys(plan.joints, 1e-6)).follow(plan, found)
         except DriverError as error:

@@ -109,6 +109,8 @@ def watched_transitions() -> Iterator[None]:
 
             def watched(self: Supervision, *arguments: Any) -> Any:
                 before = self.state
+                if method == "end" and self.doing is State.IDLE:  # ended before, or never begun
+                    return original(self, *arguments)
                 returned = original(self, *arguments)
                 key = (before, event(*arguments))
                 assert key in TRANSITIONS, key
@@ -117,9 +119,9 @@ def watched_transitions() -> Iterator[None]:
 
             patched.setattr(Supervision, method, watched)
 
-        watch("begin", lambda: Event.BEGIN)
+        watch("begin", lambda _: Event.BEGIN)
         watch("enter", lambda event: event)
-        watch("end", lambda: Event.END)
+        watch("end", lambda _: Event.END)
         watch("_set", lambda event, _: event)
         watch("release", lambda: Event.RELEASE)
         yield

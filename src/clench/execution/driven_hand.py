@@ -27,7 +27,7 @@ from .halting import halt
 from .history import CommandsSent
 from .joint_map import JointMap, MappedJoint
 from .report import ExecutionReport
-from .supervision import Event, HandStoppedError, State, Supervision, supervision_of
+from .supervision import Event, ExecutionRefusedError, State, Supervision, supervision_of
 from .trajectory import Trajectory
 
 #: How often a stop looks whether a command on its way has arrived [s].
@@ -154,14 +154,14 @@ class DrivenHand:
         """
         done = Done(self.joint_map.of(self.hand))
         posture(solution.joint_angles, self.hand, "joint_angles")
-        try:
-            session = DriverSession(self.driver)
-        except HandStoppedError as error:
-            return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}", sent=CommandsSent())
+        session = DriverSession(self.driver)
         raised: BaseException | None = None
         try:
+            session.begin()
             self._last_report = None
             self._move(session, solution, trajectory, done)
+        except ExecutionRefusedError as error:
+            return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}", sent=CommandsSent())
         except BaseException as error:
             raised = error
         raised = self._conclude(session, solution, done, raised)

@@ -77,11 +77,15 @@ class DriverLine:
         self._under_way: Call | None = None
         self._abandoning = threading.Lock()
         self._freed: Callable[[], None] = lambda: None
+        self._closing = False
         #: What the driver has not returned from, empty when it has.
         self.stuck = ""
         #: Whether one of `MOVING_CALLS` failed.
         self.failed = False
         self._thread = threading.Thread(target=self._serve, name="clench driver", daemon=True)
+
+    def start(self) -> None:
+        """Begin to serve calls."""
         self._thread.start()
 
     def call(self, what: str, function: Callable[[], T], limit: float | None = CALL_LIMIT) -> T:
@@ -96,6 +100,8 @@ class DriverLine:
         """
         if self.stuck:
             raise DriverError(f"The driver has not returned from {self.stuck}().")
+        if self._closing:
+            raise DriverError("The execution has ended.")
         call = Call(what, function)
         self._calls.put(call)
         self._under_way = call
@@ -121,10 +127,16 @@ class DriverLine:
             self._aside("disconnect", LEAVING_LIMIT)
 
     def close(self, freed: Callable[[], None]) -> None:
-        """Call the driver no more; `freed` is called once the last call has returned, however late that is."""
+        """Call the driver no more; `freed` is called once the last call has returned, however late that is.
+
+        An interrupted `close` may be called again; `freed` is then called more than once.
+        """
         self._freed = freed
+        self._closing = True
         self._calls.put(None)
-        if not self.stuck:
+        if not self._thread.is_alive():
+            freed()
+        elif not self.stuck:
             self._thread.join(CALL_LIMIT)
 
     def _aside(self, what: str, limit: float) -> None:
@@ -133,7 +145,7 @@ class DriverLine:
         if left is not None and not self.stuck:  # an interrupt left it alone
             with suppress(Exception):
                 self._answer(left, SHORTLY)
-        if not self.stuck:
+        if self._thread.is_alive() and not (self.stuck or self._closing):
             self.call(what, getattr(self._driver, what), limit)
             return
         call = Call(what, getattr(self._driver, what))

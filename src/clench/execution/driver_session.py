@@ -56,25 +56,25 @@ class Sent:
 
 
 class DriverSession:
-    """Use a driver for one execution: no command passes once a stop is in force, and every one is counted.
-
-    Raises:
-        HandStoppedError: a stop is in force, or another execution uses the driver.
-    """
+    """Use a driver for one execution: no command passes once a stop is in force, and every one is counted."""
 
     def __init__(self, driver: HandDriver) -> None:
         self.driver = driver
         self.supervision: Supervision = supervision_of(driver)
         self.sent = Sent()
-        self.supervision.begin()
-        try:
-            self._line = DriverLine(driver)
-        except BaseException:
-            self.supervision.end()
-            raise
+        self._line = DriverLine(driver)
         #: What interrupted the stop of the hand.
         self.interrupt: BaseException | None = None
         self._disconnected = False
+
+    def begin(self) -> None:
+        """Begin; whatever happens then, `close` ends it.
+
+        Raises:
+            ExecutionRefusedError: a stop is in force, or another execution uses the driver.
+        """
+        self.supervision.begin(self)
+        self._line.start()
 
     @property
     def failed(self) -> bool:
@@ -157,4 +157,4 @@ class DriverSession:
         if disconnect and not self._disconnected:
             self._disconnected = True  # an interrupt leads here again
             self._line.disconnect()
-        self._line.close(self.supervision.end)
+        self._line.close(lambda: self.supervision.end(self))

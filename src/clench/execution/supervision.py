@@ -94,6 +94,13 @@ class HandStoppedError(DriverError):
     """Say that a stop is in force, or that another execution is under way: nothing is sent."""
 
 
+class ExecutionRefusedError(HandStoppedError):
+    """Say why an execution does not begin: the driver was not called."""
+
+
+_OWNER: Final = "owner"
+
+
 class Supervision:
     """Keep the state of the hand of one driver, for all threads.
 
@@ -103,7 +110,8 @@ class Supervision:
     """
 
     def __init__(self) -> None:
-        self._executing = threading.Lock()
+        # Taken with one call that cannot be interrupted half-way, and known to its owner whatever happens then.
+        self._owner: dict[str, object] = {}
         self._doing = State.IDLE
         self._stop: tuple[Event, str] | None = None
         self._wake: queue.SimpleQueue[None] = queue.SimpleQueue()
@@ -130,19 +138,20 @@ class Supervision:
         """Why a stop is in force, in one sentence; empty when none is."""
         return "" if self._stop is None else self._stop[1]
 
-    def begin(self) -> None:
-        """Begin an execution.
+    def begin(self, owner: object) -> None:
+        """Begin an execution, which belongs to an owner until the owner ends it.
 
         Raises:
-            HandStoppedError: a stop is in force, or another execution is under way; the message says what to do.
+            ExecutionRefusedError: a stop is in force, or another execution is under way; the message says what to do.
         """
-        if not self._executing.acquire(blocking=False):
-            raise HandStoppedError(
+        if self._owner.setdefault(_OWNER, owner) is not owner:
+            raise ExecutionRefusedError(
                 f"The driver is already in use: another execution is {self.state}; wait until it has ended."
             )
         if self._stop is not None:
-            self._executing.release()
-            raise HandStoppedError(f"A stop is in force ({self.cause.rstrip('.')}); release it with release_stop().")
+            cause = self.cause.rstrip(".")
+            self.end(owner)
+            raise ExecutionRefusedError(f"A stop is in force ({cause}); release it with release_stop().")
         while not self._wake.empty():
             self._wake.get()
         self._doing = TRANSITIONS[State.IDLE, Event.BEGIN]
@@ -189,10 +198,11 @@ class Supervision:
         """Put a stop in force because of a fault of the running execution, unless there is one already."""
         self._set(Event.FAULT, cause)
 
-    def end(self) -> None:
-        """End the execution; a stop stays in force."""
-        self._doing = State.IDLE
-        self._executing.release()
+    def end(self, owner: object) -> None:
+        """End the execution of an owner; a stop stays in force. Nothing happens when it has ended before."""
+        if self._owner.get(_OWNER) is owner:
+            self._doing = State.IDLE
+            del self._owner[_OWNER]
 
     def release(self) -> None:
         """Release the stop, so that executions may begin; nothing happens when none is in force.
@@ -200,13 +210,14 @@ class Supervision:
         Raises:
             HandStoppedError: an execution is still under way, or a call of the driver has not returned.
         """
-        if not self._executing.acquire(blocking=False):
+        owner = object()
+        if self._owner.setdefault(_OWNER, owner) is not owner:
             raise HandStoppedError(
                 f"The stop cannot be released yet: an execution is {self.state}, or a call of the driver has not "
                 f"returned."
             )
         self._stop = None
-        self._executing.release()
+        self.end(owner)
 
     def wait(self, seconds: float) -> None:
         """Wait for a time [s], or until a stop comes."""
