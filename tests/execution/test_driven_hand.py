@@ -174,11 +174,12 @@ def test_a_slower_controller_gets_a_slower_path(pincer: Hand, solution: GraspSol
             lambda t: {"age": t} if t > 0.2 else {},
             r"state of joint 'thumb' is stale: 0\.\d+ s old; at most 0\.15 s",
         ),
+        (lambda t: {"age": -0.01} if t > 0.2 else {}, r"state of joint 'thumb' is -0\.01 s old, from the future; are"),
         (lambda t: {"positions": {"index": np.nan}} if t > 0.2 else {}, r"Joint 'index' is said to be at nan rad\."),
         (lambda t: {"positions": {"index": None}} if t > 0.2 else {}, r"says nothing of joint 'index'\."),
         (lambda t: {"positions": {"thumb": 0.0}}, r"Joint 'thumb' does not follow: it is at 0 rad and was told to be"),
     ],
-    ids=["stale", "nan", "absent", "stuck"],
+    ids=["stale", "future", "nan", "absent", "stuck"],
 )
 def test_trouble_on_the_way_stops_the_hand(pincer: Hand, solution: GraspSolution, fault: object, reason: str) -> None:
     driver = FakeDriver(OPEN, fault=fault)  # type: ignore[arg-type]
@@ -193,6 +194,19 @@ def test_trouble_on_the_way_stops_the_hand(pincer: Hand, solution: GraspSolution
     assert driver.where()["thumb"] < 0.9 * solution.joint_angles["thumb"]
     time.sleep(2 * PERIOD)
     assert len(driver.commands) == sent
+
+
+def test_a_state_from_the_future_confirms_no_stop(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN, fault=lambda t: {"age": -0.01} if t > 0.2 else {})
+    report = run(driver, pincer, solution, speed=0.3)
+    assert "The hand was told to stop: that was not confirmed" in report.reason
+
+
+def test_nothing_is_sent_to_a_hand_whose_state_is_from_the_future(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN, fault=lambda _: {"age": -5.0})
+    report = run(driver, pincer, solution)
+    assert report.reason.startswith("Not carried out: The state of joint 'thumb' is -5 s old, from the future")
+    assert (driver.commands, driver.stops) == ([], 0)
 
 
 def test_a_controller_that_fails_stops_the_hand(pincer: Hand, solution: GraspSolution) -> None:

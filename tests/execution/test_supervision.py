@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gc
+import re
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import fake_driver
@@ -20,6 +22,7 @@ from recording_driver import MOVING, RecordingDriver
 from virtual_clock import VirtualClock
 
 from clench.base.errors import CommandError
+from clench.execution import supervision
 from clench.execution.driven_hand import DrivenHand
 from clench.execution.driver import DriverError
 from clench.execution.report import ExecutionReport
@@ -344,12 +347,11 @@ def test_drivers_share_nothing() -> None:
     first[2].stop()
     assert [supervision_of(driver) for driver in plain] == first
     assert [bool(found.cause) for found in first] == [True, False, True, False]
-    from clench.execution import supervision
-
-    known = len(supervision._supervised)
+    keys = [id(driver) for driver in plain]
     plain.clear()
     gc.collect()
-    assert len(supervision._supervised) == known - 2  # those that cannot be referred to weakly are kept
+    # Those that cannot be referred to weakly are kept, and with them their stops.
+    assert [key in supervision._supervised for key in keys] == [False, False, True, True]
 
 
 def hang(setting: Setting, clock: VirtualClock, number: int) -> tuple[threading.Event, ExecutionReport]:
@@ -412,6 +414,16 @@ def test_every_state_is_in_the_table_and_a_stop_is_possible_in_each() -> None:
         assert TRANSITIONS[state, Event.FAULT] is State.FAILING
     moving = {(event, after) for (state, event), after in TRANSITIONS.items() if state not in (State.IDLE, *ACTIVE)}
     assert not moving & {(event, after) for event in Event for after in ACTIVE}  # nothing leads back but a release
+
+
+def test_the_page_has_the_table() -> None:
+    page = (Path(__file__).parents[2] / "docs/controllers.md").read_text()
+    _, _, rest = page.partition("| state | event | next state |")
+    found: dict[tuple[str, str], str] = {}
+    for line in rest.split("\n\n")[0].splitlines()[2:]:
+        states, events, after = (re.findall(r"`(\w+)`", cell) for cell in line.strip("|").split("|"))
+        found |= {(state, event): (after or [state])[0] for state in states for event in events}
+    assert found == {(str(state), str(event)): str(after) for (state, event), after in TRANSITIONS.items()}
 
 
 def signalled(setting: Setting, number: int) -> Callable[[], None]:
