@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from virtual_clock import VirtualClock
 
 from clench.base.errors import CommandError, UnknownNameError
-from clench.execution import driven_hand
+from clench.execution import driven_hand, executing
 from clench.execution.driven_hand import DrivenHand
 from clench.execution.driver import DriverError, DriverLimits, JointPath
 from clench.execution.executing import execute
@@ -248,6 +248,23 @@ def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution, clock
     assert driver.stopped_after == pytest.approx(0.3, abs=PERIOD)
 
 
+def test_a_stop_while_the_trajectory_is_planned_is_heeded(
+    pincer: Hand, solution: GraspSolution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = FakeDriver(OPEN)
+    hand = DrivenHand(pincer, driver)
+    plan = executing.plan_trajectory
+    monkeypatch.setattr(executing, "plan_trajectory", lambda *a, **k: [hand.stop(), plan(*a, **k)][1])
+    report = execute(solution, hand)
+    assert report.reason == "Not carried out: A stop is in force (Stopped on request); release it with release_stop()."
+    assert report.sent is not None
+    assert report.sent.commands == 0
+    assert driver.commands == []
+    monkeypatch.undo()
+    hand.release_stop()
+    assert execute(solution, hand).success
+
+
 def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSolution) -> None:
     def fault(t: float) -> dict[str, object]:
         if t > 0.1:
@@ -255,10 +272,20 @@ def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSo
         return {}
 
     driver = FakeDriver(OPEN, fault=fault)
+    hand = DrivenHand(pincer, driver)
     with pytest.raises(KeyboardInterrupt):
-        run(driver, pincer, solution, speed=0.3)
+        execute(solution, hand, speed=0.3)
     assert driver.stops == 1
     assert not driver.connected
+    report = hand.last_report
+    assert report is not None
+    assert report.reason.startswith(
+        "Interrupted (KeyboardInterrupt). The hand was told to stop: that was not confirmed"
+    )
+    assert report.history is not None
+    assert len(report.history.times) > 1
+    count = len(driver.commands)
+    assert any(note.startswith(f"{count} commands were sent; the last one came 0.1") for note in report.notes)
 
 
 def test_nothing_moves_when_the_plan_breaks_a_limit(pincer: Hand, solution: GraspSolution) -> None:

@@ -164,7 +164,14 @@ class Supervised(RuleBasedStateMachine):
 
         simple = {"stop": stop, "execute": execute, "release": release, "stop and release": stop_and_release}
         errors = {error.__name__: throw(error) for error in ERRORS}
-        return (simple | errors)[kind]
+
+        def checked() -> None:
+            try:
+                (simple | errors)[kind]()
+            except AssertionError as error:  # would count as a failure of the driver
+                self.wrong.append(error)
+
+        return checked
 
     @rule(
         which=st.integers(0, 1),
@@ -180,10 +187,11 @@ class Supervised(RuleBasedStateMachine):
     def carry_out(self, which: int, happenings: dict[int, tuple[str, int]]) -> None:
         setting, driver = self.setting, self.setting.driver
         setting.again({number: self.happening(*what) for number, what in happenings.items()})
-        refused = self.stopped
+        refused, self.wrong = self.stopped, list[AssertionError]()
         report, raised = setting.carry_out(which)
         note(f"{driver.calls} {raised!r} {report and report.reason}")
         happened = {happenings[number][0] for number in happenings if number <= len(driver.calls)}
+        assert self.wrong == []
         assert report is not None
         if refused:
             assert driver.calls == []
@@ -513,3 +521,4 @@ def test_a_stop_from_another_thread_is_told_again_after_a_command_on_its_way(set
         time.sleep(0.001)
     assert order[order.index("stop") :][:2] == ["stop", "command"]
     assert "stop" in order[order.index("stop") + 2 :]  # before `stop` returned
+    assert driver.calls.count("stop") == 3  # twice by this thread, once by the execution
