@@ -5,12 +5,14 @@ from __future__ import annotations
 import gc
 import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import fake_driver
@@ -40,6 +42,7 @@ from clench.models.hand.hand import Hand
 from clench.models.hand.tendons import TendonMap
 from clench.solve.solution import GraspSolution
 
+EXECUTION = Path(supervision.__file__).parent
 OPEN = {"thumb": 0.0, "index": 0.0}
 TENDONS = TendonMap(("thumb", "index"), ((0.01, 0.0), (0.0, 0.01)), (0.0, 1.0), (50.0, 60.0))
 SQUEEZE = {
@@ -239,7 +242,7 @@ def test_any_order_of_executions_stops_faults_and_releases(pincer: Hand, pinch: 
         run_state_machine_as_test(
             Supervised,
             settings=settings(
-                max_examples=40, stateful_step_count=8, deadline=None, suppress_health_check=list(HealthCheck)
+                max_examples=80, stateful_step_count=10, deadline=None, suppress_health_check=list(HealthCheck)
             ),
         )
 
@@ -497,6 +500,55 @@ def test_a_second_interrupt_does_not_keep_the_hand_from_being_stopped(setting: S
     assert report.reason.startswith("The driver failed (OSError: on purpose). The hand was told to stop: it was seen")
     assert driver.last_order() == "stop"
     assert setting.hands[0].state is State.FAULTED
+
+
+class Interrupt:
+    """Raise KeyboardInterrupt before the n-th line of clench.execution that the executing thread comes to."""
+
+    def __init__(self, at: int) -> None:
+        self.at, self.lines, self.where = at, 0, ""
+
+    def __call__(self, frame: FrameType, event: str, _: object) -> Interrupt | None:
+        if str(EXECUTION) not in frame.f_code.co_filename:
+            return None
+        if event == "line":
+            self.lines += 1
+            if self.lines == self.at:
+                self.where = f"{frame.f_code.co_filename}:{frame.f_lineno}"
+                sys.settrace(None)
+                raise KeyboardInterrupt
+        return self
+
+
+@pytest.mark.parametrize("fault", [{}, {9: throw(OSError)}], ids=["no fault", "after a fault"])
+def test_an_interrupt_at_any_line_leaves_the_hand_stopped_and_the_driver_free(
+    setting: Setting, fault: dict[int, Callable[[], object]]
+) -> None:
+    before = sys.gettrace()
+
+    def interrupted(at: int) -> Interrupt:
+        setting.again(fault)
+        interrupt = Interrupt(at)
+        sys.settrace(interrupt)
+        try:
+            setting.carry_out()
+        finally:
+            sys.settrace(before)
+        return interrupt
+
+    count = interrupted(0).lines
+    setting.hands[0].release_stop()
+    assert count > 1000
+    for at in [*range(1, 100, 3), *range(100, count, 53)]:
+        interrupt = interrupted(at)
+        assert interrupt.where
+        if set(MOVING) & set(setting.driver.calls) and setting.driver.last_order() != "stop":
+            # Only when the execution has ended: everything was reached, and the hand was let go.
+            assert setting.driver.calls[-1] == "disconnect", interrupt.where
+            assert interrupt.where.startswith(str(EXECUTION / "driven_hand.py")), interrupt.where
+            assert not fault
+        assert setting.hands[0].state in AT_REST, interrupt.where
+        setting.hands[0].release_stop()
 
 
 def test_a_stop_from_another_thread_is_told_again_after_a_command_on_its_way(setting: Setting) -> None:

@@ -78,7 +78,7 @@ class DrivenHand:
         if not (np.isfinite(squeeze) and squeeze >= 0.0):
             raise CommandError(f"squeeze: expected a finite number of at least 0, got {squeeze!r}.")
         self._hand = hand
-        self.driver = driver
+        self._driver = driver
         self.joint_map = joint_map or JointMap()
         self.obj = obj
         self.angle_tolerance = angle_tolerance
@@ -95,6 +95,11 @@ class DrivenHand:
     def hand(self) -> Hand:
         """The hand that it moves."""
         return self._hand
+
+    @property
+    def driver(self) -> HandDriver:
+        """What talks to the controller."""
+        return self._driver
 
     @property
     def name(self) -> str:
@@ -157,14 +162,19 @@ class DrivenHand:
         session = DriverSession(self.driver)
         raised: BaseException | None = None
         try:
-            session.begin()
-            self._last_report = None
-            self._move(session, solution, trajectory, done)
-        except ExecutionRefusedError as error:
-            return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}", sent=CommandsSent())
-        except BaseException as error:
-            raised = error
-        raised = self._conclude(session, solution, done, raised)
+            try:
+                session.begin()
+                self._last_report = None
+                self._move(session, solution, trajectory, done)
+            except ExecutionRefusedError as error:
+                return ExecutionReport(
+                    self.name, success=False, reason=f"Not carried out: {error}", sent=CommandsSent()
+                )
+            except BaseException as error:
+                raised = error
+            raised = self._conclude(session, solution, done, raised)
+        except BaseException as error:  # an interrupt before the end was taken care of
+            raised = self._conclude(session, solution, done, error)
         if raised is not None and not isinstance(raised, DriverError):
             raise raised
         assert self._last_report is not None
