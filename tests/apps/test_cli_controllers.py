@@ -298,12 +298,8 @@ def test_a_signal_stops_the_hand_and_what_was_sent_is_kept(
             return wait(call, limit)
 
         monkeypatch.setattr(Call, "wait", swallowing)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     options = ["--actuator", "ros2", "--speed", "0.2", "--out", str(tmp_path / "r.json"), "--json"]
-    try:
-        code = main(["execute", str(tmp_path / "s.json"), *options])
-    finally:
-        signal.signal(signal.SIGINT, before)
+    code = main(["execute", str(tmp_path / "s.json"), *options])
     report = json.loads((tmp_path / "r.json").read_text())
     printed = capsys.readouterr()
     assert json.loads(printed.out) == report
@@ -335,22 +331,24 @@ def test_an_interrupt_before_anything_moves_leaves_no_report(
     assert not (tmp_path / "r.json").exists()
 
 
-def test_what_was_ignored_stays_ignored() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+@pytest.mark.parametrize(("number", "heeded"), [(signal.SIGINT, True), (signal.SIGHUP, False)])
+def test_of_signals_that_were_ignored_only_a_hangup_stays_so(number: signal.Signals, heeded: bool) -> None:
+    """A script ignores Ctrl-C for what it runs in the background; `nohup` ignores hangups."""
+    before = signal.signal(number, signal.SIG_IGN)
+    stops: list[bool] = []
     try:
-        with stopped_by_signals():
-            os.kill(os.getpid(), signal.SIGHUP)
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        with suppress(KeyboardInterrupt), stopped_by_signals(lambda: stops.append(True)):
+            signal.raise_signal(number)
+        assert signal.getsignal(number) is signal.SIG_IGN
     finally:
-        signal.signal(signal.SIGHUP, before)
+        signal.signal(number, before)
+    assert stops == [True] * heeded
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_being_told_to_end_stops_the_hand(tmp_path: Path, number: int) -> None:
     program = (
-        "import signal, time\n"
-        # A shell that runs the tests in the background has interrupts ignored.
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "import time\n"
         "from clench.apps.cli.interrupts import stopped_by_signals\n"
         "try:\n"
         "    with stopped_by_signals():\n"

@@ -13,7 +13,8 @@ from types import FrameType
 def stopped_by_signals(stop: Callable[[], None] = lambda: None) -> Iterator[None]:
     """Turn SIGTERM and SIGHUP into the interrupt that Ctrl-C is, so that whatever moves is stopped on the way out.
 
-    Signals that were ignored before, as `nohup` and shells in the background have it, stay ignored, except SIGTERM.
+    A shell script starts what runs in the background with Ctrl-C ignored; a moving hand heeds it all the same. Only
+    SIGHUP stays ignored where it was, because `nohup` asks for that.
 
     Args:
         stop: called in the signal handler, before the interrupt is raised: code of others may lose the interrupt.
@@ -26,8 +27,9 @@ def stopped_by_signals(stop: Callable[[], None] = lambda: None) -> Iterator[None
         stop()
         raise KeyboardInterrupt
 
-    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    heeded = [n for n in numbers if n == signal.SIGTERM or signal.getsignal(n) is not signal.SIG_IGN]
+    heeded = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        heeded.append(signal.SIGHUP)
     before = [(number, signal.signal(number, interrupt)) for number in heeded]
     try:
         yield
