@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from clench.base.errors import CommandError, FileError
+from clench.base.file_limits import JSON_BYTES
 from clench.base.files import expanded, read_file
+from clench.base.nesting import TOO_DEEP, is_too_deep
 from clench.base.numbers import is_finite_number
 from clench.base.pose import Pose
 
@@ -42,13 +44,17 @@ def load_command(path: str | Path) -> GraspCommand:
     """
     file = expanded(path)
     try:
-        data = json.loads(read_file(file), object_pairs_hook=_without_repeats)
+        data = json.loads(read_file(file, JSON_BYTES), object_pairs_hook=_without_repeats)
     except FileError:
         raise
     except CommandError as error:
         raise CommandError(f"{path}: {error}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise FileError(path, f"not JSON ({error}).") from None
+    except RecursionError:
+        raise FileError(path, f"not JSON that can be read: {TOO_DEEP}.") from None
+    if is_too_deep(data):
+        raise FileError(path, f"not JSON that can be read: {TOO_DEEP}.")
     return command_from_dict(data, str(path), folder=file.parent)
 
 
