@@ -134,7 +134,7 @@ def test_damaged_document(tmp_path: Path) -> None:
     raw.execute("UPDATE solves SET document = substr(document, 1, 100)")
     raw.commit()
     raw.close()
-    with Record(path) as record, pytest.raises(FileError, match=r"r\.db, solve 1: the document is damaged"):
+    with Record(path) as record, pytest.raises(FileError, match=r"r\.db, solve 1: not JSON"):
         record.read(entry_id)
 
 
