@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 #: What reading one file may take [bytes], [s].
 MEMORY = 2 << 30
 SECONDS = 30
-#: What an answer to a hostile file may take; the machine may have other work [s].
-WITHIN = 10.0
+#: What does nothing for so long waits for something that never comes [s].
+PATIENCE = 300
 
 
 class Outcome(NamedTuple):
@@ -67,6 +67,12 @@ def solution(path: str) -> None:
     clench.GraspSolution.load(path)
 
 
+def execute(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["execute", path]))
+
+
 def trajectory(path: str) -> None:
     import clench
 
@@ -110,10 +116,21 @@ def poses(path: str) -> None:
     raise SystemExit(main(["batch", "--hand", "patent15", "--object", "ball", "--poses", path]))
 
 
-READERS: dict[str, Callable[[str], None]] = {
-    f.__name__: f
-    for f in (hand, thing, command, solution, trajectory, record, grasps, calibration, hand_file, joint_map, poses)
-}
+_READERS = (
+    hand,
+    thing,
+    command,
+    solution,
+    execute,
+    trajectory,
+    record,
+    grasps,
+    calibration,
+    hand_file,
+    joint_map,
+    poses,
+)
+READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in _READERS}
 
 
 def _in_child(read: Callable[[str], None], path: str, place: int) -> None:
@@ -153,7 +170,7 @@ def _outcome(kind: str, path: str, place: int) -> Outcome:
         ended, found = os.waitpid(child, os.WNOHANG)
         if ended:
             status = os.waitstatus_to_exitcode(found)
-        elif time.perf_counter() - start > SECONDS:
+        elif time.perf_counter() - start > PATIENCE:
             os.kill(child, signal.SIGKILL)
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         else:

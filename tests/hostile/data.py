@@ -10,6 +10,7 @@ import sqlite3
 import struct
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,14 @@ LESS_DEEP = "[" * 900 + "]" * 900
 
 @lru_cache(maxsize=1)
 def good_solution() -> str:
+    """Return a grasp with its squeeze, as JSON."""
     import clench
 
     hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
-    return json.dumps(clench.solve(hand, ball, clench.GraspCommand(clench.Pose([0.0, 0.0, 0.1]))).to_dict())
+    commands = [clench.GraspCommand(pose) for pose in clench.approach_poses(hand, ball, 16, 0)]
+    found = next(s for s in (clench.solve(hand, ball, c) for c in commands) if s.status == "grasp")
+    named = replace(clench.complete(found, hand, ball), hand_model="patent15", object_model="ball")
+    return json.dumps(named.to_dict())
 
 
 def solution_with(change: Callable[[dict[str, Any]], None]) -> Writer:
@@ -192,6 +197,20 @@ def stored(arrays: dict[str, bytes]) -> bytes:
     return out.getvalue()
 
 
+def offsets_of(number: float) -> Callable[[dict[str, Any]], None]:
+    def change(document: dict[str, Any]) -> None:
+        document["squeeze"]["feasible"] = True
+        document["squeeze"]["offsets"] = dict.fromkeys(document["joint_angles"], number)
+
+    return change
+
+
+def trajectory(times: Any = (0.0, 1.0), angles: Any = (0.0, 0.1), **changed: Any) -> str:
+    points = [{"time": t, "phase": "closing", "positions": [q]} for t, q in zip(times, angles, strict=True)]
+    document = {"hand": "h", "object": "o", "joints": ["a"], "velocity_limits": [1.0], "points": points}
+    return json.dumps({"schema": "clench.trajectory/1", **document, **changed})
+
+
 TOML_KEYS = ".".join(["a"] * 20_000)
 
 DATA: dict[str, tuple[str, Writer]] = {
@@ -217,14 +236,26 @@ DATA: dict[str, tuple[str, Writer]] = {
     "solution speed huge": ("solution", solution_with(numbers_of(speeds=1e300))),
     "solution speed tiny": ("solution", solution_with(numbers_of(speeds=5e-324))),
     "solution angle huge": ("solution", solution_with(numbers_of(joint_angles=1e308))),
-    "solution offsets huge": (
-        "solution",
-        solution_with(
-            lambda d: d.update(squeeze={"feasible": True, "offsets": dict.fromkeys(d["joint_angles"], 1e308)})
-        ),
-    ),
-    "solution steps": ("solution", solution_with(lambda d: d.update(next_steps=[{"x": 1e308}] * 3))),
+    "solution open huge": ("solution", solution_with(numbers_of(open_angles=1e308))),
+    "solution offsets huge": ("solution", solution_with(offsets_of(1e308))),
+    "solution steps huge": ("solution", solution_with(lambda d: d.update(next_steps=[{"x": 1e308}] * 3))),
     "solution limits": ("solution", solution_with(lambda d: d.update(joint_limits={"a": [1.0, -1.0]}))),
+    "solution cause": ("solution", solution_with(lambda d: [f.update(cause={}) for f in d["fingers"].values()])),
+    "solution certificate": ("solution", solution_with(lambda d: d.update(certificate={"x": 1}))),
+    "executed angle": ("execute", solution_with(numbers_of(joint_angles=1e5))),
+    "executed open": ("execute", solution_with(numbers_of(open_angles=-1e5))),
+    "executed steps": ("execute", solution_with(lambda d: d.update(next_steps=[{"index_mcp": 1e5}]))),
+    "executed device": ("execute", solution_with(lambda d: d.update(hand_model="/dev/zero", object_model="/dev/zero"))),
+    "executed elsewhere": ("execute", solution_with(lambda d: d.update(object_model="/etc/passwd"))),
+    "executed object": ("execute", solution_with(lambda d: d.update(object_model="http://127.0.0.1:9/a.stl"))),
+    "trajectory speed": ("trajectory", file("t.json", trajectory(speed=1e300))),
+    "trajectory speed 0": ("trajectory", file("t.json", trajectory(speed=0.0))),
+    "trajectory acceleration": ("trajectory", file("t.json", trajectory(acceleration=-1.0))),
+    "trajectory limits": ("trajectory", file("t.json", trajectory(velocity_limits=[-1.0]))),
+    "trajectory tiny limits": ("trajectory", file("t.json", trajectory(velocity_limits=[5e-324]))),
+    "trajectory angles": ("trajectory", file("t.json", trajectory([0.0, 1.0], [0.0, 1e300]))),
+    "trajectory late": ("trajectory", file("t.json", trajectory([0.0, 1e300]))),
+    "trajectory early": ("trajectory", file("t.json", trajectory([-1e300, 1.0]))),
     "trajectory deep": ("trajectory", file("trajectory.json", LESS_DEEP)),
     "trajectory endless": ("trajectory", endless_file("trajectory.json")),
     "calibration deep": ("calibration", file("weights.toml", "x = " + LISTS)),
@@ -326,6 +357,11 @@ DATA: dict[str, tuple[str, Writer]] = {
 
 #: What is read as it is, or not, but harms nothing.
 HARMLESS: dict[str, tuple[str, Writer]] = {
+    "executed offsets": ("execute", solution_with(offsets_of(1e5))),
+    "executed speeds": ("execute", solution_with(numbers_of(speeds=1e5))),
+    "executed slow": ("execute", solution_with(numbers_of(speeds=1e-5))),
+    "executed many steps": ("execute", solution_with(lambda d: d.update(next_steps=[{}] * 500))),
+    "executed rounds": ("execute", solution_with(lambda d: d.update(rounds=10**9))),
     "record of many pages": ("record", says_that_it_is_large),
     "record with a table beside": ("record", record("CREATE TABLE notes (text)", "CREATE VIEW v AS SELECT 1")),
     "npy archive inside": ("grasps", file("g.npy", stored({"arr_0.npy": saved(np.zeros(3))}))),
