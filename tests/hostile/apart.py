@@ -191,8 +191,9 @@ def serve() -> None:
 
     import clench
     import clench.models.hand.loading
-    import clench.models.objects.loading  # noqa: F401
+    import clench.models.objects.loading
 
+    clench.Hand.load("patent15")
     asked: list[Any] = [json.loads(line) for line in sys.stdin]
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as place:
         os.chdir(folder)  # where engines leave their logs

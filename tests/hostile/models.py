@@ -105,9 +105,19 @@ def many_large_meshes(folder: Path) -> Path:
     )
 
 
+LAUGHS = "".join(f'<!ENTITY a{i} "{f"&a{i - 1};" * 10 if i else "ha"}">' for i in range(10))
+
+
+def collada_copies() -> bytes:
+    """Return a scene whose nodes hold two copies of the next node each."""
+    copies = [f"<instance_node url='#n{i + 1}'/>" * 2 for i in range(40)]
+    nodes = "".join(f'<node id="n{i}">{copy}</node>' for i, copy in enumerate(copies))
+    text = f'<library_nodes>{nodes}<node id="n40"/></library_nodes>'
+    return f'<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">{text}</COLLADA>'.encode()
+
+
 def laughs(folder: Path) -> Path:
-    entities = "".join(f'<!ENTITY a{i} "{f"&a{i - 1};" * 10 if i else "ha"}">' for i in range(10))
-    return written(folder, f'<!DOCTYPE mujoco [{entities}]><mujoco model="&a9;"/>')
+    return written(folder, f'<!DOCTYPE mujoco [{LAUGHS}]><mujoco model="&a9;"/>')
 
 
 def outside_entity(folder: Path) -> Path:
@@ -140,6 +150,14 @@ def long_chain(folder: Path) -> Path:
     return written(folder, f'<robot name="long">{links}{joints}</robot>', "hand.urdf")
 
 
+def picture_that_unpacks(folder: Path) -> Path:
+    """Write a small picture whose packed data are a gigabyte."""
+    packer = zlib.compressobj(9)
+    data = b"".join(packer.compress(bytes(1 << 20)) for _ in range(1024)) + packer.flush()
+    (folder / "t.png").write_bytes(png(64, 64, data))
+    return mjcf(head=TEXTURE)(folder)
+
+
 def mimic_circle(folder: Path) -> Path:
     limit = '<limit lower="-0.2" upper="1.5" effort="1" velocity="3"/></joint>'
     text = URDF.replace(limit, limit.replace("</joint>", '<mimic joint="index_b"/></joint>'))
@@ -152,7 +170,7 @@ BODY = '<body name="palm" pos="0 0 0">'
 GEOM = '<geom type="ellipsoid" size="0.03 0.01 0.01" pos="0.02 0 0"/>'
 PLUGIN = '<extension><plugin plugin="{}"><instance name="i"/></plugin></extension>'
 
-MODELS: dict[str, Writer] = {
+REFUSED: dict[str, Writer] = {
     "include bomb": include_bomb,
     "includes itself": includes_itself,
     "includes often": includes_often,
@@ -189,7 +207,10 @@ MODELS: dict[str, Writer] = {
     ),
     "texture 60000": with_file(mjcf(head=TEXTURE), "t.png", png(60_000, 60_000)),
     "texture 2^31": with_file(mjcf(head=TEXTURE), "t.png", png(2**31 - 1, 2**31 - 1)),
-    "texture bomb": with_file(mjcf(head=TEXTURE), "t.png", png(60_000, 60_000, zlib.compress(bytes(1 << 30), 9))),
+    "texture that unpacks": picture_that_unpacks,
+    "texture of a cube": with_file(
+        mjcf(head='<asset><texture name="t" type="cube" fileright="t.png"/></asset>'), "t.png", png(60_000, 60_000)
+    ),
     "texture of numbers": with_file(
         mjcf(head=TEXTURE.replace("t.png", "t.bin")), "t.bin", struct.pack("<ii", 60_000, 60_000)
     ),
@@ -236,7 +257,6 @@ MODELS: dict[str, Writer] = {
     "sizes": mjcf(head='<size nuserdata="2000000000" nkey="2000000000"/>'),
     "user sensor": mjcf(head='<sensor><user name="u" dim="2000000000"/></sensor>'),
     "plugin file": mjcf(head=PLUGIN.format("/tmp/evil.so")),
-    "plugin sdf": mjcf(head=PLUGIN.format("mujoco.sdf.torus")),
     "model asset": mjcf(head='<asset><model name="m" file="/etc/passwd"/></asset>'),
     "attach itself": mjcf(
         BODY,
@@ -254,7 +274,6 @@ MODELS: dict[str, Writer] = {
     "stiffness huge": mjcf('damping="0.1"', 'stiffness="1e300"'),
     "gain nan": mjcf('kp="3" ctrl', 'kp="nan" ctrl'),
     "force range inf": mjcf('forcerange="-1 1"', 'forcerange="-inf nan"'),
-    "timestep": mjcf(head='<option timestep="1e-300"/>'),
     "timestep nan": mjcf(head='<option timestep="nan" gravity="nan 0 0"/>'),
     "range huge": mjcf('range="0 1.4"', 'range="-1e300 1e300"'),
     "position huge": mjcf('pos="0.04 0 0"', 'pos="1e300 0 0"'),
@@ -265,8 +284,6 @@ MODELS: dict[str, Writer] = {
     "urdf inertia": urdf('ixx="1e-5"', 'ixx="nan"'),
     "urdf inertia huge": urdf('ixx="1e-5"', 'ixx="1e300"'),
     "urdf effort nan": urdf('effort="1"', 'effort="nan"'),
-    "urdf effort huge": urdf('effort="1"', 'effort="1e300"'),
-    "urdf velocity tiny": urdf('velocity="3"', 'velocity="1e-300"'),
     "urdf velocity nan": urdf('velocity="3"', 'velocity="nan"'),
     "urdf limit inf": urdf('upper="1.5"', 'upper="inf"'),
     "urdf limit huge": urdf('upper="1.5"', 'upper="1e300"'),
@@ -274,5 +291,18 @@ MODELS: dict[str, Writer] = {
     "urdf far mesh": urdf("link.stl", "http://127.0.0.1:9/link.stl"),
     "urdf package of the system": urdf("link.stl", "package://etc/passwd"),
     "urdf 3mf": with_file(urdf("link.stl", "l.3mf"), "l.3mf", b"PK\x03\x04" + bytes(60)),
+    "urdf archive": with_file(urdf("link.stl", "l.dae"), "l.dae", b"PK\x03\x04" + bytes(60)),
+    "urdf laughing mesh": with_file(
+        urdf("link.stl", "l.dae"), "l.dae", f"<!DOCTYPE x [{LAUGHS}]><COLLADA>&a9;</COLLADA>".encode()
+    ),
+    "urdf mesh of copies": with_file(urdf("link.stl", "l.dae"), "l.dae", collada_copies()),
     "urdf pickle": with_file(urdf("link.stl", "l.pkl"), "l.pkl", b"cos\nsystem\n(S'true'\ntR."),
+}
+
+#: What is loaded: it does no harm.
+HARMLESS: dict[str, Writer] = {
+    "plugin sdf": mjcf(head=PLUGIN.format("mujoco.sdf.torus")),
+    "timestep": mjcf(head='<option timestep="1e-300"/>'),
+    "urdf effort huge": urdf('effort="1"', 'effort="1e300"'),
+    "urdf velocity tiny": urdf('velocity="3"', 'velocity="1e-300"'),
 }
