@@ -36,7 +36,6 @@ grasps:
 JOINT_MAP = """[joints.index_a]
 name = "finger_joint"
 unit = "deg"
-scale = 1.0
 offset = 0.0
 [joints.thumb_a]
 name = "other_joint"
