@@ -61,6 +61,12 @@ def command(path: str) -> None:
     clench.load_command(path)
 
 
+def solve(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["solve", "--hand", "patent15", "--object", "ball", "--command", path]))
+
+
 def solution(path: str) -> None:
     import clench
 
@@ -116,21 +122,9 @@ def poses(path: str) -> None:
     raise SystemExit(main(["batch", "--hand", "patent15", "--object", "ball", "--poses", path]))
 
 
-_READERS = (
-    hand,
-    thing,
-    command,
-    solution,
-    execute,
-    trajectory,
-    record,
-    grasps,
-    calibration,
-    hand_file,
-    joint_map,
-    poses,
-)
-READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in _READERS}
+_ANSWERS = (hand, solve, execute, record, poses)
+_LOADERS = (thing, command, solution, trajectory, grasps, calibration, hand_file, joint_map)
+READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in (*_ANSWERS, *_LOADERS)}
 
 
 def _in_child(read: Callable[[str], None], path: str, place: int) -> None:
@@ -162,9 +156,9 @@ def _outcome(kind: str, path: str, place: int) -> Outcome:
     os.ftruncate(place, 0)
     os.lseek(place, 0, os.SEEK_SET)
     start = time.perf_counter()
-    child = os.fork()
+    read, child = READERS[kind], os.fork()
     if child == 0:
-        _in_child(READERS[kind], path, place)
+        _in_child(read, path, place)
     status = None
     while status is None:
         ended, found = os.waitpid(child, os.WNOHANG)

@@ -50,6 +50,15 @@ def solution_with(change: Callable[[dict[str, Any]], None]) -> Writer:
     return write
 
 
+def wide_scene(folder: Path) -> Path:
+    """Write a glTF file whose scene is a list of millions of lists."""
+    text = b'{"x":[' + b"[]," * 60_000_000 + b"1]}  "
+    text += b" " * (-len(text) % 4)
+    path = folder / "thing.glb"
+    path.write_bytes(struct.pack("<5I", 0x46546C67, 2, 20 + len(text), len(text), 0x4E4F534A) + text)
+    return path
+
+
 def deep_command(text: str) -> Writer:
     return file("command.json", json.dumps({**COMMAND, "next_steps": "DEEP"}).replace('"DEEP"', text))
 
@@ -166,6 +175,22 @@ COLUMNS = "i AS id, '' AS time, '' AS hand, '' AS object, 'grasp' AS status, 0 A
 VIEW = f"CREATE VIEW solves AS {ENDLESS} SELECT {COLUMNS}, 0 AS touching_fingers, x'' AS document FROM n"
 
 
+def command(**changed: Any) -> Writer:
+    return file("command.json", json.dumps({"hand_pose": COMMAND["hand_pose"], **changed}))
+
+
+def with_journal(folder: Path) -> Path:
+    """Leave a journal beside a record that has SQLite read another file, and delete it."""
+    name = str(folder / "victim").encode()
+    magic = bytes.fromhex("d9d505f920a163d7")
+    tail = struct.pack(">II", len(name), sum(name) & 0xFFFFFFFF) + magic
+    path = record()(folder)
+    (folder / "solves.sqlite-journal").write_bytes(
+        bytes.fromhex("d9d505f920a163d7") + bytes(504) + bytes(4) + name + tail
+    )
+    return path
+
+
 def malformed_pages(folder: Path) -> Path:
     path = record()(folder)
     data = bytearray(path.read_bytes())
@@ -214,6 +239,7 @@ def trajectory(times: Any = (0.0, 1.0), angles: Any = (0.0, 0.1), **changed: Any
 TOML_KEYS = ".".join(["a"] * 20_000)
 
 REFUSED: dict[str, tuple[str, Writer]] = {
+    "glb wide": ("thing", wide_scene),
     "command endless": ("command", endless_file("command.json")),
     "command device": ("command", link("command.json", "/dev/zero")),
     "command deep": ("command", file("command.json", LISTS)),
@@ -221,6 +247,12 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "command deep inside": ("command", deep_command(LISTS)),
     "command less deep": ("command", deep_command(LESS_DEEP)),
     "command long number": ("command", file("command.json", json.dumps(COMMAND).replace("0.01", "1" * 1_000_000))),
+    "command planes": ("solve", command(planes=10**9)),
+    "command rounds": ("solve", command(rounds=10**9)),
+    "command grids": ("solve", command(yaw_grid=[0.0] * 500, open_variants=[0.0] * 500)),
+    "command steps": ("command", command(next_steps=[{}] * 100_000)),
+    "command grid": ("command", command(yaw_grid=[0.0] * 100_000)),
+    "command wide": ("command", file("command.json", "[" + "[]," * 5_000_000 + "1]")),
     "command many": (
         "command",
         file("command.json", json.dumps({"hand_pose": 1, **{f"k{i}": 1 for i in range(100_000)}})),
@@ -229,6 +261,7 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "solution deep": ("solution", file("solution.json", LISTS)),
     "solution deep objects": ("solution", file("solution.json", OBJECTS)),
     "solution deep inside": ("solution", deep_solution),
+    "solution wide": ("solution", file("solution.json", "[" + "[]," * 5_000_000 + "1]")),
     "solution of nan": ("solution", file("solution.json", '{"schema": "clench.solution/1", "x": NaN}')),
     "solution rounds": ("solution", solution_with(lambda d: d.update(rounds=-1))),
     "solution speed 0": ("solution", solution_with(numbers_of(speeds=0.0))),
@@ -269,6 +302,7 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "joint map endless": ("joint_map", endless_file("x.toml")),
     "yaml laughs": ("grasps", laughing_yaml("list")),
     "yaml merges": ("grasps", laughing_yaml("merge")),
+    "yaml wide": ("grasps", file("grasps.yaml", YAML + "[" + "[]," * 2_500_000 + "1]")),
     "yaml itself": ("grasps", file("grasps.yaml", YAML + "&a [*a]\n")),
     "yaml key itself": ("grasps", file("grasps.yaml", YAML + "{g: &a {position: *a}}\n")),
     "yaml deep": ("grasps", file("grasps.yaml", YAML + "[" * DEEP + "]" * DEEP)),
@@ -290,6 +324,7 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "npy doubled": ("grasps", file("g.npy", doubled_lists())),
     "npy deep": ("grasps", file("g.npy", many_nested())),
     "npy memo": ("grasps", file("g.npy", pickled(b"\x80\x04}r\xff\xff\xff\x7f."))),
+    "npy wide": ("grasps", file("g.npy", pickled(b"\x80\x04" + b"]" * 8_000_000 + b"."))),
     "npy long bytes": ("grasps", file("g.npy", pickled(b"\x80\x04\x8e" + b"\xff" * 7 + b"\x7fx."))),
     "npy long number": ("grasps", file("g.npy", pickled(b"I" + b"9" * 100_000 + b"\n."))),
     "npy huge shape": (
@@ -351,6 +386,7 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "record less deep": ("record", record(f"UPDATE solves SET document = CAST('{LESS_DEEP}' AS BLOB)")),
     "record large": ("record", record("UPDATE solves SET document = zeroblob(200000000)")),
     "record text": ("record", record("UPDATE solves SET hand = zeroblob(10), touching_fingers = 'x'")),
+    "record journal": ("record", with_journal),
     "record device": ("record", link("solves.sqlite", "/dev/zero")),
 }
 

@@ -187,6 +187,8 @@ REFUSED: dict[str, Writer] = {
     "quadratic entities": quadratic,
     "deep mjcf": nested("default", 200_000),
     "deep urdf": nested("link", 200_000, ".urdf"),
+    "deepest": nested("a", 1_100_000),
+    "wide": lambda folder: written(folder, "<mujoco>" + "<a/>" * 2_000_000 + "</mujoco>"),
     "deep bodies": nested_bodies(3000),
     "deeper bodies": nested_bodies(100_000),
     "long chain": long_chain,

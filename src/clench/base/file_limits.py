@@ -15,8 +15,8 @@ MODEL_BYTES: Final = 8 * _MB
 MESH_BYTES: Final = 256 * _MB
 #: All meshes and textures of a hand model together [bytes].
 ASSET_BYTES: Final = 512 * _MB
-#: A JSON file, or the document of a recorded solve [bytes].
-JSON_BYTES: Final = 64 * _MB
+#: A JSON file, the document of a recorded solve, or the scene of a glTF file [bytes].
+JSON_BYTES: Final = 16 * _MB
 #: A TOML file: hand file, calibration file, joint map [bytes].
 TOML_BYTES: Final = 1 * _MB
 #: A YAML file of grasps [bytes].
@@ -24,7 +24,7 @@ YAML_BYTES: Final = 8 * _MB
 #: An npy file of poses [bytes].
 ARRAY_BYTES: Final = 1024 * _MB
 #: An npy file with a pickled dictionary of grasps [bytes].
-PICKLE_BYTES: Final = 64 * _MB
+PICKLE_BYTES: Final = 8 * _MB
 
 #: Levels of lists and objects in JSON, TOML, YAML and pickles.
 DOCUMENT_DEPTH: Final = 64
@@ -48,3 +48,8 @@ LINE_BYTES: Final = 65_536
 SCENE_PARTS: Final = 2_000
 #: Triangles of a mesh file, with the copies that a scene makes.
 MESH_TRIANGLES: Final = 10_000_000
+
+#: Planes and rounds of a command, and items of each of its lists.
+COMMAND_ITEMS: Final = 1_000
+#: Sets that the grids of a command make together.
+COMMAND_SETS: Final = 10_000

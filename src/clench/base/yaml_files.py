@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from .errors import FileError
 from .file_limits import DOCUMENT_DEPTH, DOCUMENT_VALUES, LINE_BYTES, YAML_BYTES
 from .files import read_text
 from .nesting import TOO_DEEP
+
+#: A value takes at most so many events of the parser, its start and its end.
+_EVENTS: Final = 2
 
 
 def read_yaml(path: str | Path) -> Any:
@@ -45,7 +48,9 @@ def _check_depth(events: Iterable[Any], path: str | Path) -> None:
     import yaml
 
     depth = 0
-    for event in events:
+    for count, event in enumerate(events):
+        if count > _EVENTS * DOCUMENT_VALUES:
+            raise FileError(path, f"not YAML that can be read: it has more than {DOCUMENT_VALUES} values.")
         if isinstance(event, yaml.ScalarEvent) and len(event.value) > LINE_BYTES:
             raise FileError(path, f"not YAML that can be read: a value has more than {LINE_BYTES} characters.")
         if isinstance(event, yaml.CollectionStartEvent):

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.base.file_limits import MESH_TRIANGLES, SCENE_PARTS
+from clench.base.file_limits import JSON_BYTES, MESH_TRIANGLES, SCENE_PARTS
 
 _MAGIC: Final = 0x46546C67
 _JSON: Final = 0x4E4F534A
@@ -26,6 +26,8 @@ def bare_glb(data: bytes) -> bytes:
     magic, version, _, length, kind = struct.unpack("<5I", data[:20])
     if magic != _MAGIC or version != 2 or kind != _JSON or length > len(data) - 20:
         raise ValueError("incorrect header on GLB file")
+    if length > JSON_BYTES:
+        raise ValueError(f"its scene has {length} bytes; expected up to {JSON_BYTES}")
     try:
         tree = msgspec.json.decode(data[20 : 20 + length].rstrip(b" \0"), type=dict[str, Any])
         _check(tree)

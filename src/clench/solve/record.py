@@ -54,6 +54,8 @@ _INSERT = """
 INSERT INTO solves (time, hand, object, status, seed, geometry_hash, touching_fingers, document)
 VALUES (?, ?, ?, ?, ?, ?, ?, ?)
 """
+#: The last bytes of a journal that names another file (sqlite.org/fileformat2.html, "The Rollback Journal").
+_NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
 _COLUMNS = ("id", "time", "hand", "object", "status", "seed", "geometry_hash", "touching_fingers")
 _Row = tuple[str, str, str, str, int | None, str, int, bytes]
 
@@ -97,6 +99,7 @@ class Record:
             raise FileError(path, "cannot be opened (no regular file).")
         if not os.path.isdir(self.path.parent):
             raise FileError(path, f"cannot be opened (no folder '{self.path.parent}').")
+        _refuse_journal(self.path)
         with self._clear_errors():
             self._is_read_only = not _can_be_written(self.path)
             self._connection = sqlite3.connect(
@@ -299,6 +302,25 @@ class Record:
 def _can_be_written(path: Path) -> bool:
     """Return whether SQLite can write a file and its log beside it; a file that is missing is made."""
     return os.access(path.parent, os.W_OK) and (not os.path.exists(path) or os.access(path, os.W_OK))
+
+
+def _refuse_journal(path: Path) -> None:
+    """Refuse a journal that names another file, which SQLite would read, and may delete.
+
+    SQLite writes such a name only where several databases are written together; clench never does that.
+
+    Raises:
+        FileError: with the journal.
+    """
+    journal = Path(f"{path}-journal")
+    try:
+        with open(journal, "rb") as file:
+            file.seek(-len(_NAMES_A_FILE), os.SEEK_END)
+            found = file.read() == _NAMES_A_FILE
+    except (OSError, ValueError):
+        return  # none, or one that is too short for a name
+    if found:
+        raise FileError(journal, "a journal that names another file, which clench never leaves; remove it.")
 
 
 def _address(path: Path) -> str:
