@@ -41,11 +41,14 @@ def test_poses_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (None, "no such file of poses."),
+        (None, "no such file; expected a NumPy file"),
         (b"hello", "not a NumPy file"),
         (np.zeros((2, 3)), "got shape (2, 3)."),
         (np.full((1, 7), np.nan), "[0]: expected finite numbers."),
-        (np.array(["a"]), "expected poses"),
+        (np.array(["a"]), "expected an array of real numbers, got one of str32."),
+        (np.array([[True] * 7]), "expected an array of real numbers, got one of bool."),
+        (np.array([[1.0 + 1j] + [0.0] * 6]), "expected an array of real numbers, got one of complex128."),
+        (np.empty((0, 7)), "expected at least one pose, got none."),
     ],
 )
 def test_bad_files(content: object, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

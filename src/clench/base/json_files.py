@@ -12,20 +12,23 @@ from typing import Any
 import msgspec
 
 from .errors import ClenchError, FileError
+from .file_limits import JSON_BYTES
 from .files import read_file
+from .nesting import TOO_DEEP, is_too_deep
 
 
-def non_finite_path(value: Any, key: str = "") -> str | None:
-    """Return the path of the first number that is NaN or infinite, or None."""
-    if isinstance(value, float):
-        return None if math.isfinite(value) else key
-    if isinstance(value, dict):
-        found = (non_finite_path(v, f"{key}.{k}" if key else str(k)) for k, v in value.items())
-    elif isinstance(value, list):
-        found = (non_finite_path(v, f"{key}[{i}]") for i, v in enumerate(value))
-    else:
-        return None
-    return next((f for f in found if f is not None), None)
+def non_finite_path(value: Any) -> str | None:
+    """Return the path of the first number that is NaN or infinite, or None; lists may be nested however deep."""
+    waiting: list[tuple[Any, str]] = [(value, "")]
+    while waiting:
+        part, key = waiting.pop()
+        if isinstance(part, float) and not math.isfinite(part):
+            return key
+        if isinstance(part, dict):
+            waiting.extend((v, f"{key}.{k}" if key else str(k)) for k, v in reversed(part.items()))
+        elif isinstance(part, list):
+            waiting.extend((v, f"{key}[{i}]") for i, v in reversed([*enumerate(part)]))
+    return None
 
 
 def encode_document(document: dict[str, Any], name: str) -> bytes:
@@ -45,12 +48,26 @@ def read_json(path: str | Path) -> Any:
     """Read a JSON file.
 
     Raises:
-        FileError: missing, unreadable or not JSON.
+        FileError: missing, unreadable, too large, or not JSON.
+    """
+    return parse_json(read_file(path, JSON_BYTES), path)
+
+
+def parse_json(data: bytes, source: str | Path) -> Any:
+    """Return what JSON says; `source` names it in messages.
+
+    Raises:
+        FileError: not JSON, or nested too deeply.
     """
     try:
-        return msgspec.json.decode(read_file(path))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileError(path, f"not JSON ({error}).") from None
+        value = msgspec.json.decode(data)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise FileError(source, f"not JSON ({error}).") from None
+    except RecursionError:
+        raise FileError(source, f"not JSON that can be read: {TOO_DEEP}.") from None
+    if is_too_deep(value):
+        raise FileError(source, f"not JSON that can be read: {TOO_DEEP}.")
+    return value
 
 
 def write_json(path: str | Path, document: dict[str, Any], name: str) -> None:

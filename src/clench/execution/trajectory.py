@@ -24,6 +24,7 @@ from .closing_path import STILL, closing_path, distinct
 from .landing import CLEARANCE, LANDING_SPEED, is_clear, plan_landing
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
 from .timing import ACCELERATION, TimedPath, time_path
+from .trajectory_checks import check_points, check_rates
 
 SCHEMA = "clench.trajectory/1"
 #: No smaller fraction of the velocity limits makes sense, or can be computed with [-].
@@ -338,6 +339,8 @@ def _read(data: Any, source: str) -> Trajectory:
         form = msgspec.convert(data, _Form)
     except msgspec.ValidationError as error:
         raise FileError(source, f"{str(error).replace('`', chr(39))}.") from None
+    check_rates(source, form.speed, form.acceleration, form.velocity_limits)
+    check_points(source, [(p.time, p.positions) for p in form.points])
     count = len(form.joints)
     if not form.points:
         raise FileError(source, "points: expected at least one.")

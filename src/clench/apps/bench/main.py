@@ -11,6 +11,7 @@ from clench.apps.cli.parsing import parse_call
 from clench.apps.cli.results import print_json
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.json_files import check_writable
+from clench.base.visible_text import visible
 
 from .report import BenchReport
 
@@ -300,7 +301,7 @@ def _print(report: BenchReport, json: bool) -> int:
     if json:
         print_json({"schema": SCHEMA, **report.values, "errors": list(report.errors)})
     else:
-        sys.stdout.write("".join(f"{line}\n" for line in report.lines()))
+        sys.stdout.write("".join(f"{visible(line)}\n" for line in report.lines()))
     for error in report.errors:
-        sys.stderr.write(f"clench: wrong answer: {error}\n")
+        sys.stderr.write(f"clench: wrong answer: {visible(str(error))}\n")
     return 1 if report.errors else 0

@@ -122,19 +122,12 @@ def _read(path: Path) -> np.ndarray:
     """Read an array of poses; which shapes there are is told by what solves them.
 
     Raises:
-        FileError: missing, or no array of numbers.
+        FileError: missing, no array of numbers, or empty.
     """
-    import numpy as np
-
+    from clench.base.array_files import read_array
     from clench.base.pose_arrays import pose_rows
 
-    if not path.is_file():
-        raise FileError(path, "no such file of poses.")
-    try:
-        array = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise FileError(path, f"not a NumPy file (.npy) of numbers ({error}).") from None
-    if not isinstance(array, np.ndarray):
-        array.close()
-        raise FileError(path, "expected one array (.npy), got an archive of several (.npz).")
-    return pose_rows(array, str(path))
+    rows = pose_rows(read_array(path), str(path))
+    if not len(rows):
+        raise FileError(path, "expected at least one pose, got none.")
+    return rows

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import io
-import pickle
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from clench.base.errors import CommandError, FileError
+from clench.base.file_limits import PICKLE_BYTES
+from clench.base.files import read_file
 from clench.base.json_files import write_atomically
+from clench.base.numbers import real_array
 from clench.base.pose import FloatArray, Pose
 from clench.solve.solution import GraspSolution
 
 from .grasp_posture import GraspPosture, before_the_grasp, squeezed
+from .inert_pickle import read_pickled_arrays
 
-#: What a file of arrays, numbers and names needs; nothing else is looked up, let alone called.
-_ALLOWED: Final = {
-    *((module, "_reconstruct") for module in ("numpy.core.multiarray", "numpy._core.multiarray")),
-    *((module, "scalar") for module in ("numpy.core.multiarray", "numpy._core.multiarray")),
-    *((module, "_frombuffer") for module in ("numpy.core.numeric", "numpy._core.numeric")),
-    ("numpy", "ndarray"),
-    ("numpy", "dtype"),
-}
 _POSTURES: Final = ("pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
 
 
@@ -60,19 +55,11 @@ def read_dexgraspbench(path: str | Path) -> list[GraspPosture]:
     Raises:
         FileError: missing, not an npy file, a pickle that asks for more than arrays, or a malformed key.
     """
-    try:
-        content = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise FileError(path, "no such file.") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
-    document = _unpickled(content, str(path))
-    if not isinstance(document, dict):
-        raise FileError(path, f"expected a dictionary, got {type(document).__name__}.")
+    document = read_pickled_arrays(read_file(path, PICKLE_BYTES), str(path))
     names = document.get("joint_names")
     rows = np.atleast_2d(_numbers(document, "grasp_qpos", str(path)))
     objects = np.atleast_2d(_numbers(document, "obj_pose", str(path), (1.0, 0.0, 0.0, 0.0)))
-    if rows.ndim != 2 or rows.shape[1] < 7:
+    if rows.ndim != 2 or rows.shape[1] < 7 or not len(rows):
         raise FileError(path, f"grasp_qpos: expected 7 numbers of the palm and the joints, got shape {rows.shape}.")
     if objects.shape not in ((1, 7), (len(rows), 7)):
         raise FileError(path, f"obj_pose: expected position and wxyz, got shape {objects.shape}.")
@@ -95,41 +82,12 @@ def _posture(number: int, row: FloatArray, place: FloatArray, names: Any, source
 
 def _numbers(document: dict[Any, Any], key: str, source: str, default_wxyz: tuple[float, ...] = ()) -> FloatArray:
     value = document.get(key, (0.0, 0.0, 0.0, *default_wxyz) if default_wxyz else None)
-    try:
-        numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise FileError(source, f"{key}: expected numbers.") from None
-    if value is None or not np.isfinite(numbers).all():
-        raise FileError(source, f"{key}: {'missing' if value is None else 'expected finite numbers'}.")
+    if value is None:
+        raise FileError(source, f"{key}: missing.")
+    numbers = real_array(value)
+    if numbers is None or not np.isfinite(numbers).all():
+        raise FileError(source, f"{key}: expected {'finite ' if numbers is not None else ''}numbers.")
     return numbers
-
-
-def _unpickled(content: bytes, source: str) -> Any:
-    stream = io.BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(stream)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(stream)
-    except (ValueError, OSError, EOFError) as error:
-        raise FileError(source, f"not an npy file ({error}).") from None
-    if shape != () or not dtype.hasobject:
-        raise FileError(source, f"expected one pickled dictionary, got an array of shape {shape}.")
-    try:
-        loaded = _ArraysOnly(stream).load()
-    except pickle.UnpicklingError as error:
-        raise FileError(source, f"is refused: {error}.") from None
-    except Exception as error:  # a damaged pickle can fail in any way
-        raise FileError(source, f"the pickle is damaged ({type(error).__name__}: {error}).") from None
-    return loaded.item() if isinstance(loaded, np.ndarray) and loaded.shape == () else loaded
-
-
-class _ArraysOnly(pickle.Unpickler):
-    """Refuse whatever is no array, number, text, list or dictionary."""
-
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) not in _ALLOWED:
-            raise pickle.UnpicklingError(f"the pickle asks for '{module}.{name}', which no grasp needs")
-        return super().find_class(module, name)
 
 
 def _pose(pose: Pose) -> FloatArray:

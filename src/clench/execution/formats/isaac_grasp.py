@@ -10,6 +10,7 @@ from clench.base.errors import CommandError, FileError
 from clench.base.json_files import write_atomically
 from clench.base.numbers import is_finite_number
 from clench.base.pose import Pose
+from clench.base.yaml_files import read_yaml
 from clench.solve.solution import GraspSolution
 
 from .grasp_posture import GraspPosture, before_the_grasp, palm_in_object
@@ -44,16 +45,7 @@ def read_isaac_grasp(path: str | Path) -> list[GraspPosture]:
     Raises:
         FileError: missing, not YAML, another format, or a malformed key, which the message names.
     """
-    import yaml
-
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise FileError(path, "no such file.") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise FileError(path, f"not YAML ({' '.join(str(error).split())}).") from None
+    data = read_yaml(path)
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise FileError(path, f"format: expected '{FORMAT}'.")
     if data.get("format_version") != VERSION:

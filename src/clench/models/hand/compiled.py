@@ -67,14 +67,14 @@ def compile_model(text: ModelText) -> CompiledModel:
 
     try:
         spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.assets))
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # it raises RuntimeError where memory is short
         raise FileError(text.label, f"MuJoCo cannot read it: {_first_lines(error)}") from None
     stated = _stated(spec, text)
     if stated.reversed:
         return _recompiled(spec, text.label, stated)
     try:
         return CompiledModel(spec, spec.compile(), text.xml, text.label, stated)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         if "volume" not in str(error) and "mjMINVAL" not in str(error):
             raise FileError(text.label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
     # Flat or open meshes have no volume to take a mass from: their surface does as well. What has none is given some.
@@ -186,7 +186,7 @@ def _recompiled(spec: Any, label: str, stated: StatedJoints) -> CompiledModel:
     try:
         model = spec.compile()
         return CompiledModel(spec, model, spec.to_xml(), label, stated)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         raise FileError(label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
 
 
