@@ -145,7 +145,7 @@ def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive) -> Driven:
     base = root.add_body(name=BASE)
     spec.attach(child, frame=base.add_frame(), prefix=PREFIX)
     bodies = {body.name for body in spec.bodies}
-    for a, b in hand.allowed_pairs:
+    for a, b in hand.allowed_pairs_for(CollisionSource.ENGINE):
         names = PREFIX + hand.links[a].name, PREFIX + hand.links[b].name
         if a != b and bodies.issuperset(names):
             spec.add_exclude(bodyname1=names[0], bodyname2=names[1])

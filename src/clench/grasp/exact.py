@@ -46,14 +46,14 @@ def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
         join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
         for i, link in enumerate(hand.links)
     ]
-    across = _across(hand)
+    across = _across(hand, source)
     return HandBodies(pack_bodies(parts), _within(hand, across), across)
 
 
-def _across(hand: Hand) -> np.ndarray:
+def _across(hand: Hand, source: CollisionSource) -> np.ndarray:
     checked = np.ones((len(hand.links),) * 2, dtype=np.int64)
     np.fill_diagonal(checked, 0)
-    for a, b in hand.allowed_pairs:
+    for a, b in hand.allowed_pairs_for(source):
         checked[a, b] = checked[b, a] = 0
     return checked
 

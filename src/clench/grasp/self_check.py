@@ -74,7 +74,7 @@ def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
 
 
 def _overlaps(hand: Hand, source: CollisionSource) -> list[Finding]:
-    allowed = set(hand.allowed_pairs)
+    allowed = set(hand.allowed_pairs_for(source))
     found = []
     for a, b, depth in open_overlaps(hand, source):
         names = (hand.links[a].name, hand.links[b].name)

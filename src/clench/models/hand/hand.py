@@ -224,6 +224,10 @@ class Hand:
         """Indices of the links that can touch, ascending: the fixed ones and those of the fingers."""
         return tuple(sorted({*self.fixed_links, *(link for finger in self.fingers for link in finger.links)}))
 
+    def allowed_pairs_for(self, source: CollisionSource) -> tuple[tuple[int, int], ...]:
+        """Return the pairs of link indices that may overlap when links have the shapes of one source, sorted."""
+        return self.allowed_pairs
+
     def joint_index(self, name: str) -> int:
         """Return the index of a joint.
 
