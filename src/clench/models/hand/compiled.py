@@ -94,6 +94,11 @@ def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
         return compiled
     spec = compiled.spec
     bodies = list(spec.bodies)
+    removed = {bodies[b].name for b in range(1, m.nbody) if b not in kept}
+    # MuJoCo takes what is tied to a removed body along, but not what looks at it.
+    for looking in [*spec.lights, *spec.cameras]:
+        if looking.targetbody in removed:
+            spec.delete(looking)
     for body in gone:
         spec.delete(bodies[body])
     for key in list(spec.keys):
