@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,7 +101,7 @@ def build_scene(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     _light(spec)
-    driven = _add_hand(spec, hand, lifted, drive)
+    driven = _add_hand(spec, hand, lifted, drive, hand.allowed_pairs_from(CollisionSource.ENGINE, q))
     if free is not None:
         # Without these, friction of the engine creeps: a held object slides out slowly.
         spec.option.impratio = 10.0
@@ -130,7 +131,7 @@ def _light(spec: Any) -> None:
     spec.add_texture(name="sky", width=16, height=96, rgb1=[1.0] * 3, rgb2=[1.0] * 3, **sky)
 
 
-def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive) -> Driven:
+def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive, allowed: Iterable[tuple[int, int]]) -> Driven:
     import mujoco
 
     child, driven = driving_spec(hand, drive, _joints_before_palm(hand))
@@ -145,7 +146,7 @@ def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive) -> Driven:
     base = root.add_body(name=BASE)
     spec.attach(child, frame=base.add_frame(), prefix=PREFIX)
     bodies = {body.name for body in spec.bodies}
-    for a, b in hand.allowed_pairs_for(CollisionSource.ENGINE):
+    for a, b in allowed:
         names = PREFIX + hand.links[a].name, PREFIX + hand.links[b].name
         if a != b and bodies.issuperset(names):
             spec.add_exclude(bodyname1=names[0], bodyname2=names[1])

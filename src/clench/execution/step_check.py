@@ -9,10 +9,9 @@ from typing import Final
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.grasp.depths import link_meshes
-from clench.grasp.self_check import overlap_depth
 from clench.models.hand.allowed import adjacent_pairs
 from clench.models.hand.hand import Hand
+from clench.models.hand.link_mesh import link_meshes, overlap_depth
 from clench.models.shapes import CollisionSource
 
 from .landing import looks

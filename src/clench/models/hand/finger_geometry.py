@@ -92,9 +92,10 @@ def built_alike(hand: Hand, one: Finger, other: Finger) -> bool:
         return False
     q = np.array([j.reference for j in hand.joints])
     a, b = (finger_line(hand, finger, q) for finger in (one, other))
-    turned = [np.abs(line.axes @ line.axes[-1]) for line in (a, b)]
-    apart = [np.linalg.norm(np.diff(line.anchors, axis=0), axis=1) for line in (a, b)]
-    return bool(np.allclose(*turned, atol=1e-2) and np.allclose(*apart, rtol=1e-2, atol=1e-4))
+    turned, turned_other = (np.abs(line.axes @ line.axes[-1]) for line in (a, b))
+    apart, apart_other = (np.linalg.norm(np.diff(line.anchors, axis=0), axis=1) for line in (a, b))
+    alike = np.allclose(turned, turned_other, atol=1e-2)
+    return bool(alike and np.allclose(apart, apart_other, rtol=1e-2, atol=1e-4))
 
 
 def axis_angle(a: FloatArray, b: FloatArray) -> float:

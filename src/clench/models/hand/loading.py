@@ -69,6 +69,7 @@ def load_hand(
         palm_center=np.zeros(3),
         palm_normal=np.zeros(3),
         default_source=source,
+        overlaps_allowed=True,
         tendons=_tendons(compiled, skeleton, overrides),
         findings=(*findings, *skeleton.findings, *found.findings, *reader.findings),
         spec_xml=compiled.xml,
