@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from clench.base.errors import HandError
+from clench.base.opengl import import_mujoco
 from clench.base.pose import FloatArray, Pose, invert
 from clench.grasp.mechanics.loads import GRAVITY
 from clench.models.hand.hand import Hand
@@ -92,8 +93,7 @@ def build_scene(
     Raises:
         HandError: the hand cannot be simulated. ObjectError: the object has a flat body.
     """
-    import mujoco
-
+    mujoco = import_mujoco()
     spec = mujoco.MjSpec()
     lifted = free is not None and free.test == HoldTest.LIFT
     spec.option.gravity = np.array([0.0, 0.0, -GRAVITY if lifted else 0.0])

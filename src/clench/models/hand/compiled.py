@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clench.base.errors import FileError, HandError
+from clench.base.opengl import import_mujoco
 
 from .model_files import ModelText
 
@@ -63,8 +64,7 @@ def compile_model(text: ModelText) -> CompiledModel:
     Raises:
         FileError: MuJoCo refuses it; its reason is passed on.
     """
-    import mujoco
-
+    mujoco = import_mujoco()
     try:
         spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.assets))
     except ValueError as error:
