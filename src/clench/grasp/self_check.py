@@ -8,6 +8,7 @@ from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.models.hand.allowed import adjacent_pairs
 from clench.models.hand.findings import Finding, FindingCode, Severity, in_hand_file
 from clench.models.hand.hand import Hand
+from clench.models.hand.hulls import check_hulls
 from clench.models.hand.link_mesh import link_meshes, overlap_depth
 from clench.models.hand.opposition import check_thumbs
 from clench.models.shapes import CollisionSource
@@ -21,6 +22,8 @@ def check_hand(hand: Hand, source: CollisionSource | str | None = None) -> tuple
     """
     chosen = hand.default_source if source is None else CollisionSource(source)
     found = [*hand.findings, *_overlaps(hand, chosen), *check_thumbs(hand)]
+    if chosen is CollisionSource.ENGINE:
+        found += check_hulls(hand)
     return tuple(sorted(found, key=lambda finding: finding.severity is Severity.NOTE))
 
 

@@ -28,6 +28,7 @@ from .model_files import ModelText, read_model
 from .palm import find_palm, hand_bodies
 from .roles import assign_roles
 from .tendons import TendonMap, model_tendons
+from .whole_meshes import with_whole_meshes
 
 #: Tips whose mean closing direction is shorter oppose each other: the palm faces along the fingers [-].
 _OPPOSED = 0.4
@@ -46,7 +47,7 @@ def load_hand(
         model: built-in name or path. hand_file: TOML overrides. palm: the palm link's name.
         collision_source: which geometry is meant unless a command says otherwise.
     """
-    text = read_model(model)
+    text = with_whole_meshes(read_model(model))
     overrides = find_hand_file(text.path, hand_file or text.hand_file)
     source = _source(collision_source, overrides)
     compiled, palm_body, findings = _hand_alone(text, palm or overrides.palm)
