@@ -5,9 +5,10 @@ import pytest
 from block_hands import block_hand
 
 from clench.base.pose import Pose
-from clench.grasp.depths import hand_depths, is_closed, link_meshes, retreat_distance, travel_to_touch
+from clench.grasp.depths import hand_depths, retreat_distance, travel_to_touch
 from clench.grasp.scene import pack_object
-from clench.models.mesh import TriangleMesh
+from clench.models.hand.link_mesh import link_meshes
+from clench.models.mesh import TriangleMesh, is_closed
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import Shape, ShapeKind
 

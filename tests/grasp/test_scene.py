@@ -10,10 +10,11 @@ from block_hands import block_hand
 
 import clench
 from clench.base.pose import Pose
-from clench.grasp.scene import KEPT_OBJECTS, ROUND_KINDS, hash_hand, pack_object, shape_mesh, tessellation_deviation
+from clench.grasp.scene import KEPT_OBJECTS, ROUND_KINDS, hash_hand, pack_object
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
+from clench.models.tessellation import shape_mesh, tessellation_deviation
 
 ROUND = {
     ShapeKind.SPHERE: (0.03, 0.0, 0.0),

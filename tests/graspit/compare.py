@@ -89,7 +89,7 @@ class Comparison:
         self.obj = clench.GraspObject.load(SHARED / "objects" / f"{name}.obj")
         self.object = [fcl.CollisionObject(_tree(s)) for body in self.obj.bodies for s in body.shapes]
         self.links = [[_tree(s) for s in link.shapes.get(hand.default_source, ())] for link in hand.links]
-        self.free = set(map(frozenset, hand.allowed_pairs))
+        self.free = set(map(frozenset, hand.allowed_pairs_for(hand.default_source)))
 
     def compare(self, case: dict[str, Any]) -> list[Compared]:
         """Close the hand as in a case and explain every finger."""

@@ -163,7 +163,7 @@ def looks(hand: Hand, path: Sequence[FloatArray]) -> list[FloatArray]:
     Args:
         hand: the hand. path: way-points between which joints move on straight lines [rad], each shape (J,).
     """
-    from clench.grasp.depths import link_meshes
+    from clench.models.hand.link_mesh import link_meshes
 
     reach = {mesh.link: mesh.radius + float(np.linalg.norm(mesh.center)) for mesh in link_meshes(hand)}
     found = [path[0]]

@@ -9,10 +9,9 @@ from typing import Final
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.grasp.depths import link_meshes
-from clench.grasp.self_check import overlap_depth
 from clench.models.hand.allowed import adjacent_pairs
 from clench.models.hand.hand import Hand
+from clench.models.hand.link_mesh import link_meshes, overlap_depth
 from clench.models.shapes import CollisionSource
 
 from .landing import looks
@@ -50,7 +49,7 @@ class _Pairs:
     def __init__(self, hand: Hand, source: CollisionSource) -> None:
         self._hand = hand
         self._meshes = link_meshes(hand, source)
-        left_out = set(hand.allowed_pairs) | adjacent_pairs(hand.links)
+        left_out = set(hand.allowed_pairs_for(source)) | adjacent_pairs(hand.links)
         numbers = itertools.combinations(range(len(self._meshes)), 2)
         found = [(a, b) for a, b in numbers if (self._meshes[a].link, self._meshes[b].link) not in left_out]
         self._pairs = np.array(found, dtype=np.int64).reshape(-1, 2)

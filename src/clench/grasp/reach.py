@@ -11,14 +11,15 @@ import numpy as np
 from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.hand.link_mesh import link_meshes
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
+from clench.models.tessellation import TESSELLATION_DEVIATION
 
-from .depths import link_meshes
-from .exact import hand_bodies
+from .exact import link_bodies
 from .linkage import placed_links
 from .plan import FingerPlan, last_closing_joint
-from .scene import TESSELLATION_DEVIATION, PackedObject, shape_elements
+from .scene import PackedObject, shape_elements
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays
@@ -66,9 +67,7 @@ def nearest_link(
 
     poses = placed_links(hand, q)
     wanted = np.array(links, dtype=np.int64)
-    gap, link = smallest_gap(
-        hand_bodies(hand, source).links, wanted, poses, target, np.ascontiguousarray(T_palm_target[:3])
-    )
+    gap, link = smallest_gap(link_bodies(hand, source), wanted, poses, target, np.ascontiguousarray(T_palm_target[:3]))
     return max(gap, 0.0), link
 
 

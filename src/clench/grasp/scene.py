@@ -16,18 +16,14 @@ from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.parts import part_points
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-
-from .parts import part_points
+from clench.models.tessellation import shape_mesh
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays, Elements
     from clench.kernels.tree import MeshTree
 
-#: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
-TESSELLATION_FRACTION: Final = 2e-3
-#: ... and in metres.
-TESSELLATION_DEVIATION: Final = 2e-5
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
 _KEPT_HANDS: Final = 16
@@ -109,23 +105,6 @@ def pack_object(obj: GraspObject) -> PackedObject:
     packed = _pack(obj.bodies, CollisionSource(obj.collision_source))
     _latest = (obj.bodies, obj.collision_source, packed)
     return packed
-
-
-def tessellation_deviation(shape: Shape) -> float:
-    """Return how far the triangles of a shape may be off [m]; 0 for meshes and boxes, which are exact."""
-    if shape.kind in (ShapeKind.MESH, ShapeKind.BOX):
-        return 0.0
-    return min(TESSELLATION_DEVIATION, TESSELLATION_FRACTION * max(shape.size))
-
-
-def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
-    """Return a shape's triangles in its body's or link's frame; with `engine`, a mesh is its convex hull."""
-    if shape.kind is ShapeKind.MESH and source is CollisionSource.ENGINE:
-        from clench.models.tessellation import convex_hull
-
-        assert shape.mesh is not None
-        return convex_hull(shape.mesh).transformed(shape.pose)
-    return shape.to_mesh(tessellation_deviation(shape) or TESSELLATION_DEVIATION)
 
 
 def shape_elements(shape: Shape, source: CollisionSource) -> Elements:

@@ -211,8 +211,8 @@ def _contacts_of(solved: Solved, palms: FloatArray) -> BatchContacts:
         joint=number[:, TOUCH_JOINT],
         plane=number[:, TOUCH_PLANE],
         passed=value[:, TOUCH_GAP] > PASSED_GAP,
-        position=np.einsum("cij,cj->ci", R, value[:, :3]) + palms[pose, 4:],
-        normal=np.einsum("cij,cj->ci", R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
+        position=turned(R, value[:, :3]) + palms[pose, 4:],
+        normal=turned(R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
         gap=value[:, TOUCH_GAP],
     )
 
@@ -226,6 +226,12 @@ def rotations(rows: FloatArray) -> FloatArray:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(entries), -1, 0)
+
+
+def turned(R: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return vectors (N, 3) turned by matrices (N, 3, 3), each with the same bits however many there are."""
+    x, y, z = (vectors[:, None, k] for k in range(3))
+    return R[:, :, 0] * x + R[:, :, 1] * y + R[:, :, 2] * z
 
 
 def _plane(plane: int | None) -> int:

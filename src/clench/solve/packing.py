@@ -47,5 +47,5 @@ def _packed_with(packed: PackedObject) -> _Kept:
 
 def _pack(made: Planned, packed: PackedObject, terms: tuple[tuple[int, float], ...]) -> PackedProblem:
     hand, source = made.hand, made.source
-    bodies = hand_bodies(hand, source)
+    bodies = hand_bodies(hand, source, made.start)
     return pack_problem(hand, made.plan, made.exact, packed, made.start, source, bodies, terms, len(made.idle))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clench.base.errors import FileError, HandError
+from clench.base.opengl import import_mujoco
 
 from .model_files import ModelText
 
@@ -63,8 +64,7 @@ def compile_model(text: ModelText) -> CompiledModel:
     Raises:
         FileError: MuJoCo refuses it; its reason is passed on.
     """
-    import mujoco
-
+    mujoco = import_mujoco()
     try:
         spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.assets))
     except (ValueError, RuntimeError) as error:  # it raises RuntimeError where memory is short
@@ -94,6 +94,11 @@ def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
         return compiled
     spec = compiled.spec
     bodies = list(spec.bodies)
+    removed = {bodies[b].name for b in range(1, m.nbody) if b not in kept}
+    # MuJoCo takes what is tied to a removed body along, but not what looks at it.
+    for looking in [*spec.lights, *spec.cameras]:
+        if looking.targetbody in removed:
+            spec.delete(looking)
     for body in gone:
         spec.delete(bodies[body])
     for key in list(spec.keys):
