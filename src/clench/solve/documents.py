@@ -110,6 +110,7 @@ class _SolutionForm(msgspec.Struct):
     speeds: _Map = {}
     rounds: int = 1
     next_steps: list[_Map] = []
+    object_scale: float = 1.0
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -122,6 +123,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "object": s.object,
         "hand_model": s.hand_model,
         "object_model": s.object_model,
+        "object_scale": float(s.object_scale),
         "geometry_hash": s.geometry_hash,
         "seed": None if s.seed is None else int(s.seed),
         "status": s.status.value,
@@ -179,6 +181,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         object=form.object,
         hand_model=form.hand_model,
         object_model=form.object_model,
+        object_scale=form.object_scale,
         geometry_hash=form.geometry_hash,
         seed=form.seed,
         status=form.status,

@@ -19,7 +19,7 @@ import clench
 from clench.base.errors import CommandError, FileError, UnknownNameError
 from clench.base.pose import Pose
 from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
-from clench.execution.formats.grasp_posture import GraspPosture, palm_in_object
+from clench.execution.formats.grasp_posture import GraspPosture
 from clench.models.hand.hand import Hand
 from clench.solve.solution import GraspSolution
 from handmade import make_solution

@@ -97,7 +97,7 @@ def squeeze_forces(
         disturbances: rows like it, shape (N, 6). enough: largest margin that is asked for [-].
         needed: without this margin the load does not count as held [-].
         spread: the load is anything from `load - spread` to `load + spread` [N], shape (6,); None: the load itself.
-        reserve: part of the friction that is counted on, where the load is held so; else all friction is counted on [-].
+        reserve: part of the friction that is counted on, where the load is held so; else all of it is counted on [-].
         most_force: the normal forces sum to at most this [N].
 
     Raises:
@@ -155,7 +155,7 @@ def _squeeze_of(
 
 
 def _gentle(task: SqueezeTask, best: tuple[HoldingForces, float]) -> tuple[HoldingForces, float]:
-    """Return forces of nearly the largest margin whose torques are small; of that margin where the solver finds none."""
+    """Return forces of nearly the largest margin whose torques are small; those given where the solver finds none."""
     # A margin that is enough is reached to the last digit; only one that falls short gives up a part.
     return _least_torque(task, min(task.enough, best[1] * (1.0 - _GIVEN_UP))) or best
 
