@@ -49,6 +49,8 @@ def question_arrays(question: Question) -> dict[str, np.ndarray[Any, Any]]:
 class SavedBatch:
     """Read a file of `GraspBatch.save`, to solve its grasps again.
 
+    It has `hand_model`, `object_model`, `object_scale` and `object_collision_source`, as solutions do.
+
     Args:
         path: the file.
 
@@ -73,14 +75,10 @@ class SavedBatch:
         if missing is not None:
             raise FileError(path, f"{missing}: missing; the batch was saved without what it was asked. Solve it again.")
 
-    def text(self, key: str) -> str:
-        """Return one of the names that it was saved with."""
-        return str(self._arrays[key])
-
-    @property
-    def object_scale(self) -> float:
-        """What the lengths of the object's model were multiplied by [-]."""
-        return float(self._arrays["object_scale"])
+        self.hand_model = str(self._arrays["hand_model"])
+        self.object_model = str(self._arrays["object_model"])
+        self.object_scale = float(self._arrays["object_scale"])
+        self.object_collision_source = str(self._arrays["object_collision_source"])
 
     def solutions(self, hand: Hand, obj: GraspObject) -> Iterator[GraspSolution]:
         """Yield the poses that are grasps, solved again.
@@ -94,7 +92,7 @@ class SavedBatch:
         from .solution import SolutionStatus
 
         arrays = self._arrays
-        document = json.loads(self.text("command"))
+        document = json.loads(str(arrays["command"]))
         for i in np.flatnonzero(arrays["status"] == SolutionStatus.GRASP.value):
             try:
                 postures = dict(zip(arrays["preshape_joints"].tolist(), arrays["preshape_angles"], strict=True))

@@ -65,23 +65,23 @@ def read_grasps(
     batches = [SavedBatch(file) for file in files if file.suffix == ".npz"]
     solutions = [s for file in files if file.suffix != ".npz" for s in _solutions(file)]
     notes: list[str] = []
-    of: Any = solutions[0] if solutions else None
-    first = next(iter(batches), None)
-    if of is None and first is None:
-        raise CommandError("solutions: expected at least one file.")
-    names = (
-        (of.hand_model, of.object_model) if first is None else (first.text("hand_model"), first.text("object_model"))
-    )
-    factor = scale if scale is not None else of.object_scale if first is None else first.object_scale
-    source = of.object_collision_source if first is None else first.text("object_collision_source")
+    if not (batches or solutions):
+        raise CommandError("solutions: expected at least one file with a solution.")
+    of = batches[0] if batches else solutions[0]
+    factor = of.object_scale if scale is None else scale
+    source = of.object_collision_source
     the_hand = _load(
-        lambda model: clench.Hand.load(model, hand_file=loaded_with[0], palm=loaded_with[1]), hand, names[0], notes
+        lambda model: clench.Hand.load(model, hand_file=loaded_with[0], palm=loaded_with[1]), hand, of.hand_model, notes
     )
     obj = _load(
-        lambda model: clench.GraspObject.load(model, scale=factor, collision_source=source), object, names[1], notes
+        lambda model: clench.GraspObject.load(model, scale=factor, collision_source=source),
+        object,
+        of.object_model,
+        notes,
     )
-    if object is None and scale is None and of is not None and the_hand is not None and obj is not None:
-        obj = _fitting(of, the_hand, obj, notes)
+    if object is None and scale is None and the_hand is not None and obj is not None:
+        for solution in solutions[:1]:
+            obj = _fitting(solution, the_hand, obj, notes)
     for batch in batches:
         solutions += _solved(batch, the_hand, obj)
     if not solutions:
@@ -103,8 +103,8 @@ def _solved(batch: SavedBatch, hand: Hand | None, obj: GraspObject | None) -> li
     from clench.kernels.warming import announce, warm_up
 
     if hand is None or obj is None:
-        what = "hand" if hand is None else "object"
-        raise FileError(batch.path, f"{what}_model: '{batch.text(what + '_model')}' cannot be loaded; give --{what}.")
+        what, model = ("hand", batch.hand_model) if hand is None else ("object", batch.object_model)
+        raise FileError(batch.path, f"{what}_model: '{model}' cannot be loaded; give --{what}.")
     announce()
     warm_up()
     return list(batch.solutions(hand, obj))

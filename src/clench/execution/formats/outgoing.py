@@ -147,6 +147,8 @@ def _completed(solution: GraspSolution, hand: Hand, obj: GraspObject, settings: 
     given = settings.hold, settings.mass, settings.friction
     if given == (None, None, None) and planned.get("any_direction"):
         return solution
+    mass: Any
+    friction: Any
     if settings.hold is not None:
         mass, friction = settings.hold.planned_for
         model, torsion = settings.hold.contact_model, settings.hold.torsion
