@@ -215,7 +215,7 @@ class GraspSolution(LateFields):
     speeds: Mapping[str, float] = field(default_factory=dict)
     rounds: int = 1
     next_steps: tuple[Mapping[str, float], ...] = ()
-    object_scale: float = 1.0
+    object_scale: float = field(default_factory=lambda: 1.0)
 
     @classmethod
     def deferred(cls, make: Callable[[], GraspSolution], **known: Any) -> GraspSolution:

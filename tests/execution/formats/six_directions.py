@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
 KEYS = ("obj_pose", "obj_scale", "obj_path", "pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
@@ -44,6 +43,8 @@ def holds(grasp: dict[str, Any], hand_file: Path, geoms: list[dict[str, Any]], s
 
 
 def _model(hand_file: Path, geoms: list[dict[str, Any]], settings: Settings) -> Any:
+    import mujoco
+
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.004
     spec.option.gravity = [0.0, 0.0, 0.0]
@@ -78,6 +79,8 @@ def _model(hand_file: Path, geoms: list[dict[str, Any]], settings: Settings) -> 
 
 
 def _held(model: Any, grasp: dict[str, Any], direction: np.ndarray, settings: Settings) -> bool:
+    import mujoco
+
     data = mujoco.MjData(model)
     rows = [np.asarray(grasp[key], dtype=float) for key in ("pregrasp_qpos", "grasp_qpos", "squeeze_qpos")]
     data.qpos[:] = [*rows[0], *grasp["obj_pose"]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -216,11 +216,20 @@ def _squeezed(
         offsets = _offsets(solution, hand, torques, stiffness)
     silent = [name for name, torque in torques.items() if torque and name not in offsets]
     angles = {name: angle + float(offsets.get(name, 0.0)) for name, angle in solution.joint_angles.items()}
+    notes = [*_beyond(solution, angles)]
     if not silent:
-        return angles, ()
+        return angles, tuple(notes)
     named = f"{', '.join(silent[:3])} and {len(silent) - 3} more" if len(silent) > 4 else ", ".join(silent)
     note = f"The model gives no servo gain of {named}: they are not told to squeeze. Give the stiffness of the servos."
-    return angles, (note,)
+    return angles, (*notes, note)
+
+
+def _beyond(solution: GraspSolution, angles: Mapping[str, float]) -> Iterator[str]:
+    """Yield a sentence where postures of the squeeze are beyond limits by more than the joint's whole range."""
+    for name, (low, high) in solution.joint_limits.items():
+        if name in angles and not 2.0 * low - high <= angles[name] <= 2.0 * high - low:
+            yield "The servos are soft: to squeeze, joints are told angles far beyond their limits. Servos may refuse."
+            return
 
 
 def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], stiffness: float) -> dict[str, float]:

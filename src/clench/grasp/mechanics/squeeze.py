@@ -141,6 +141,13 @@ def _squeeze_of(
     task: SqueezeTask, careful: SqueezeTask, needed: float
 ) -> tuple[tuple[HoldingForces, float] | None, SqueezeTask]:
     """Return forces with their margin, and the task that they fulfil: the careful one where it can be fulfilled."""
+    if needed == 0.0:
+        for each in (careful, task):
+            best = _largest_margin(each)
+            if best is not None:
+                return _gentle(each, best), each
+        return None, task
+    # Most squeezes reach all the margin that is asked for. Of the others, only what all friction holds can be held.
     found = _least_torque(careful, careful.enough)
     if found is not None:
         return found, careful
