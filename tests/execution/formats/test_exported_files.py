@@ -231,10 +231,8 @@ def test_the_object_is_named_by_its_folder_and_scale(tmp_path: Path) -> None:
 
 @pytest.mark.shared
 @pytest.mark.parametrize("stiffness", [None, 5.0])
-def test_exported_grasps_hold_in_the_six_direction_test(
-    shared_data: Path, tmp_path: Path, stiffness: float | None
-) -> None:
-    """The Shadow hand's own file is told what clench wrote: root, order of joints and offsets are right, or it drops."""
+def test_exported_grasps_hold_in_six_directions(shared_data: Path, tmp_path: Path, stiffness: float | None) -> None:
+    """The Shadow hand's own file is told what clench wrote: root, joint order and offsets are right, or it drops."""
     import mujoco
 
     file = shared_data / "hands" / "shadow_hand_mjcf" / "right_hand.xml"

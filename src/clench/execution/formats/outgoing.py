@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-import numpy as np
-
 from clench.base.defaults import MASS
 from clench.base.errors import CommandError
 from clench.base.pose import Pose, invert
@@ -239,24 +237,11 @@ def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], 
     if not stiffness > 0.0:
         raise CommandError(f"stiffness: expected a number above 0 Nm/rad, got {stiffness!r}.")
     dofs = degrees_of_freedom(hand, posture(solution.joint_angles, hand, "joint_angles"))
-    squares, found = _squares_of_tendons(hand), dict[str, float]()
-    for d, name in enumerate(dofs.names):
-        gain = stiffness * squares.get(name, 1.0)
+    found: dict[str, float] = {}
+    for d, (name, leader) in enumerate(zip(dofs.names, dofs.joints, strict=True)):
+        gain = stiffness * hand.joints[leader].servo_share
         for j in dofs.motion[:, d].nonzero()[0] if name in torques else ():
             found[hand.joints[j].name] = float(dofs.motion[j, d] * torques[name] / gain)
-    return found
-
-
-def _squares_of_tendons(hand: Hand) -> dict[str, float]:
-    """Return the sum of squared arms of the one tendon that pulls a joint, by joint; see `Joint.stiffness`."""
-    if hand.tendons is None:
-        return {}
-    arms = np.abs(np.array(hand.tendons.moment_arms))
-    found = {}
-    for name, row in zip(hand.tendons.joints, arms, strict=True):
-        columns = arms[:, row > 0.0].T  # a loop around a pulley is listed once for each way that it pulls
-        if len(columns) and (columns == columns[0]).all():
-            found[name] = float(columns[0] @ columns[0])
     return found
 
 

@@ -141,6 +141,7 @@ def _joint(
     if effort is not None and effort > EFFORT_PLACEHOLDER:
         effort = None
     axis = np.array(m.jnt_axis[j])
+    stiffness, share = _servo(m, j)
     return Joint(
         name=name,
         axis=axis / np.linalg.norm(axis),
@@ -150,7 +151,8 @@ def _joint(
         reference=reference,
         velocity=velocities.get(name),
         effort=effort,
-        stiffness=_stiffness(m, j),
+        stiffness=stiffness,
+        servo_share=share,
         friction_loss=float(m.dof_frictionloss[m.jnt_dofadr[j]]),
     )
 
@@ -198,10 +200,11 @@ def actuator_forces(model: Any, a: int) -> tuple[float, float]:
     return -float("inf"), float("inf")
 
 
-def _stiffness(model: Any, joint: int) -> float | None:
-    """Return the gain of the position servo of a joint, or of its fixed tendon [Nm/rad]; None without one.
+def _servo(model: Any, joint: int) -> tuple[float | None, float]:
+    """Return the gain that a position servo has at a joint [Nm/rad], and that gain beside the servo's own [-].
 
-    A tendon's servo counts as `k_p sum(c_i²)`: when every joint of the tendon is told `tau_i / stiffness` more than it
+    The servo is that of the joint or of its fixed tendon; without one the gain is None. A tendon's servo counts as
+    `k_p sum(c_i²)`: when every joint of the tendon is told `tau_i / stiffness` more than it
     has, with `tau_i = c_i F`, the tendon is told `F / k_p` more and pulls with the force F.
     """
     import mujoco
@@ -217,9 +220,9 @@ def _stiffness(model: Any, joint: int) -> float | None:
         elif model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_TENDON:
             arms = dict(fixed_tendon(model, target))
         if arms.get(joint, 0.0) != 0.0:
-            stiffness = gain * float(model.actuator_gear[a, 0]) ** 2 * sum(arm * arm for arm in arms.values())
-            return stiffness if np.isfinite(stiffness) else None
-    return None
+            share = float(model.actuator_gear[a, 0]) ** 2 * sum(arm * arm for arm in arms.values())
+            return (gain * share, share) if np.isfinite(gain * share) else (None, 1.0)
+    return None, 1.0
 
 
 def fixed_tendon(model: Any, tendon: int) -> list[tuple[int, float]]:
