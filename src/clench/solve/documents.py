@@ -76,6 +76,11 @@ class _SqueezeForm(msgspec.Struct):
     feasible: bool = False
     text: str = ""
     offsets: _Map = {}
+    torques: _Map = {}
+    mass: float = 0.0
+    mass_range: tuple[float, float] | None = None
+    friction: list[float] | None = None
+    contact_model: str = ""
     tensions: list[float] | None = None
 
 
@@ -174,7 +179,9 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         if key not in form.reason:
             raise FileError(source, f"reason.{key}: missing.")
     if form.squeeze is not None:  # is kept as it is, but what hands are told of it has to be of the right form
-        angles(_convert(form.squeeze, _SqueezeForm, source, "squeeze").offsets, "squeeze.offsets")
+        squeeze = _convert(form.squeeze, _SqueezeForm, source, "squeeze")
+        angles(squeeze.offsets, "squeeze.offsets")
+        angles(squeeze.torques, "squeeze.torques")
     return GraspSolution(
         clench_version=form.clench_version,
         hand=form.hand,

@@ -255,3 +255,13 @@ def test_exported_grasps_hold_in_six_directions(shared_data: Path, tmp_path: Pat
     wrist = clench.export_grasps(tmp_path / "w.npy", graded.solution, hand=hand, obj=box, root="rh_wrist")
     assert not wrist.notes or "obj_path" in wrist.notes[0]
     assert len(read_grasp(tmp_path / "w.npy")["grasp_qpos"]) == 7 + 23
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [({"torques": 3}, "torques"), ({"torques": {"a": "x"}}, "torques.a"), ({"mass_range": 1}, "mass_range")],
+)
+def test_a_squeeze_that_somebody_edited_is_refused(grip: Grip, change: dict[str, Any], key: str) -> None:
+    document = grip[2].to_dict() | {"squeeze": {"feasible": True, **change}}
+    with pytest.raises(clench.FileError, match=rf"squeeze.*{key}"):
+        GraspSolution.from_dict(document)
