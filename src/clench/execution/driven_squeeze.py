@@ -49,9 +49,13 @@ def plan_driven_squeeze(
         share: of the planned offsets [-].
     """
     plan = solution.squeeze or {}
+    told = plan.get("offsets", {})
+    silent = [
+        name for name, torque in plan.get("torques", {}).items() if torque and name in mapped and name not in told
+    ]
     offsets = {name: share * float(plan.get("offsets", {}).get(name, 0.0)) for name in mapped}
     if not any(offsets.values()):
-        return DrivenSqueeze()
+        return DrivenSqueeze(f"There was no squeeze: {_unknown(silent)}" if silent and share else "")
     if not plan.get("feasible"):
         return DrivenSqueeze(f"There was no squeeze: {plan.get('text', 'none is planned.')}")
     timed = _timed(solution, hand, mapped, offsets, check)
@@ -61,7 +65,16 @@ def plan_driven_squeeze(
         return DrivenSqueeze(f"There was no squeeze: {error}")
     largest = max(map(abs, offsets.values()))
     text = f"Joints were told up to {largest:.3g} rad beyond the touch, as the squeeze plan says."
+    if silent:
+        text += f" Not all of it was told: {_unknown(silent)}"
     return DrivenSqueeze(text, offsets, timed)
+
+
+def _unknown(joints: list[str]) -> str:
+    named = ", ".join(f"'{joint}'" for joint in joints)
+    return (
+        f"the hand's model gives no servo gain of {named}, so the angles that exert the planned torques are not known."
+    )
 
 
 def squeeze_by_driver(

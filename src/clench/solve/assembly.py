@@ -91,6 +91,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         object=problem.obj.name,
         hand_model=str(hand.path) if hand.path else hand.name,
         object_model=str(problem.obj.path) if problem.obj.path else problem.obj.name,
+        object_scale=problem.obj.scale,
         geometry_hash=f"{hash_hand(hand, problem.source)}+{packed.geometry_hash}",
         seed=command.seed,
         status=status,

@@ -80,6 +80,11 @@ class _SqueezeForm(msgspec.Struct):
     feasible: bool = False
     text: str = ""
     offsets: _Map = {}
+    torques: _Map = {}
+    mass: float = 0.0
+    mass_range: tuple[float, float] | None = None
+    friction: list[float] | None = None
+    contact_model: str = ""
     tensions: list[float] | None = None
 
 
@@ -114,6 +119,7 @@ class _SolutionForm(msgspec.Struct):
     speeds: _Map = {}
     rounds: int = 1
     next_steps: list[_Map] = []
+    object_scale: float = 1.0
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -126,6 +132,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "object": s.object,
         "hand_model": s.hand_model,
         "object_model": s.object_model,
+        "object_scale": float(s.object_scale),
         "geometry_hash": s.geometry_hash,
         "seed": None if s.seed is None else int(s.seed),
         "status": s.status.value,
@@ -177,13 +184,16 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
     if form.rounds < 0:
         raise FileError(source, f"rounds: expected at least 0, got {form.rounds}.")
     if form.squeeze is not None:  # is kept as it is, but what hands are told of it has to be of the right form
-        angles(_convert(form.squeeze, _SqueezeForm, source, "squeeze").offsets, "squeeze.offsets")
+        squeeze = _convert(form.squeeze, _SqueezeForm, source, "squeeze")
+        angles(squeeze.offsets, "squeeze.offsets")
+        angles(squeeze.torques, "squeeze.torques")
     return GraspSolution(
         clench_version=form.clench_version,
         hand=form.hand,
         object=form.object,
         hand_model=form.hand_model,
         object_model=form.object_model,
+        object_scale=form.object_scale,
         geometry_hash=form.geometry_hash,
         seed=form.seed,
         status=form.status,

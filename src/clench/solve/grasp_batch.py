@@ -16,6 +16,7 @@ from clench.base.errors import CommandError
 from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray, Pose
 
+from .saved_question import question_arrays
 from .solution import FingerStatus, GraspSolution, SolutionStatus
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ class GraspBatch(LateFields):
         return solve(self.question.hand, self.question.obj, self.command(i))
 
     def save(self, path: str | Path) -> None:
-        """Write all arrays to a NumPy file (.npz), atomically; the names are columns of text.
+        """Write all arrays, and what was asked, to a NumPy file (.npz), atomically; the names are columns of text.
 
         Raises:
             FileError: the file cannot be written.
@@ -169,6 +170,7 @@ class GraspBatch(LateFields):
         skipped = {"question", "contacts"}
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in skipped}
         arrays |= {f"contact_{f.name}": getattr(self.contacts, f.name) for f in fields(self.contacts)}
+        arrays |= question_arrays(self.question)
         arrays |= {"schema": np.array(SCHEMA), "status": self.status, "finger_status": self.finger_status}
         content = io.BytesIO()
         np.savez(content, **arrays)  # type: ignore[arg-type]

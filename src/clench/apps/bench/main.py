@@ -9,6 +9,7 @@ from typing import Literal
 
 from clench.apps.cli.parsing import parse_call
 from clench.apps.cli.results import print_json
+from clench.base.defaults import FRICTION, MASS
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.json_files import check_writable
 from clench.base.visible_text import visible
@@ -238,8 +239,8 @@ def hold(
     best: int = 5,
     others: int = 5,
     test: Literal["pulls", "lift"] = "pulls",
-    mass: float = 0.1,
-    friction: float = 0.6,
+    mass: float = MASS,
+    friction: float = FRICTION,
     seed: int = 0,
     table: Path | None = None,
     trials: Path | None = None,

@@ -30,7 +30,7 @@ def execute(
     object: str | None = None,
     hand_file: Path | None = None,
     palm: str | None = None,
-    scale: float = 1.0,
+    scale: float | None = None,
     speed: float = 1.0,
     force: bool = False,
     skip_next_steps: bool = False,
@@ -64,7 +64,7 @@ def execute(
         object: model of the object; the one that the solution names by default.
         hand_file: TOML file that was used to load the hand.
         palm: palm link that was used to load the hand.
-        scale: that was used to load the object.
+        scale: that was used to load the object; what the solution says by default.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, or next steps that drive links into each other, too.
         skip_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
@@ -105,7 +105,7 @@ def execute(
     the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(
         _named(object, the_solution.object_model, solution, "object"),
-        scale=scale,
+        scale=the_solution.object_scale if scale is None else scale,
         collision_source=the_solution.object_collision_source,
     )
     options = ActuatorOptions(

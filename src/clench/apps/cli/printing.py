@@ -264,6 +264,13 @@ def print_weights(weights: Mapping[str, float], sentence: str) -> None:
     console.print(_plain(sentence))
 
 
+def print_notes(notes: Sequence[str]) -> None:
+    """Print sentences about what is missing."""
+    console = _console()
+    for note in notes:
+        console.print(f"note: {_plain(note)}", soft_wrap=True)
+
+
 def print_files(files: Sequence[Path]) -> None:
     """Print where the files are."""
     console = _console()

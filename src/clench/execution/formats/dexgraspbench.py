@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,47 +17,64 @@ from clench.base.numbers import real_array
 from clench.base.pose import FloatArray, Pose
 from clench.solve.solution import GraspSolution
 
-from .grasp_posture import GraspPosture, before_the_grasp, squeezed
+from .grasp_posture import BASE, GraspPosture
 from .inert_pickle import read_pickled_arrays
+from .outgoing import OutgoingGrasp
 
 _POSTURES: Final = ("pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
 
 
-def write_dexgraspbench(path: str | Path, solution: GraspSolution) -> None:
-    """Write a solution: the palm's pose (position, then wxyz) and the joints in the order of `joint_names`.
+#: File that marks the folder of an object of DexGraspBench.
+_MARK: Final = Path("info") / "simplified.json"
 
-    Without a squeeze plan the squeeze posture is the grasp itself. `joint_names` and the palm as the root of the
-    postures are ours; DexGraspBench reads by key and leaves other keys alone.
+
+def write_dexgraspbench(path: str | Path, grasp: OutgoingGrasp) -> None:
+    """Write a grasp: pose of the frame (position, then wxyz), then the joints that it carries, in the model's order.
+
+    `joint_names` and `root` are ours; DexGraspBench reads by key and leaves other keys alone.
 
     Raises:
         FileError: the file cannot be written.
     """
-    palm = _pose(solution.hand_pose)
-    names = list(solution.joint_angles)
-    postures = (before_the_grasp(solution), solution.joint_angles, squeezed(solution))
+    root = _pose(grasp.T_world_frame)
+    postures = (grasp.pregrasp, grasp.solution.joint_angles, grasp.squeezed)
     document = {
-        "obj_pose": _pose(solution.object_pose),
-        "obj_scale": 1.0,
-        "obj_path": solution.object_model,
+        "obj_pose": _pose(grasp.solution.object_pose),
+        "obj_scale": float(grasp.solution.object_scale),
+        "obj_path": object_folder(grasp.solution),
         **{
-            key: np.concatenate([palm, [angles[name] for name in names]])
+            key: np.concatenate([root, [angles[name] for name in grasp.joints]])
             for key, angles in zip(_POSTURES, postures, strict=True)
         },
-        "joint_names": names,
+        "joint_names": list(grasp.joints),
+        "root": grasp.frame,
     }
     content = io.BytesIO()
     np.save(content, np.array(document, dtype=object), allow_pickle=True)
     write_atomically(path, content.getvalue())
 
 
+def object_folder(solution: GraspSolution) -> str:
+    """Return the folder of the object's model: the nearest one with DexGraspBench's info, else the file's own.
+
+    It is empty for an object that was not read from a file.
+    """
+    model = Path(solution.object_model)
+    if not (model.is_file() or len(model.parts) > 1):
+        return ""
+    return str(next((folder for folder in model.parents if (folder / _MARK).is_file()), model.parent))
+
+
 def read_dexgraspbench(path: str | Path) -> list[GraspPosture]:
-    """Read the grasp postures; of a stack of grasps, all.
+    """Read the grasp postures; of a stack of grasps, all. Their root is "world" unless the file says otherwise.
 
     Raises:
         FileError: missing, not an npy file, a pickle that asks for more than arrays, or a malformed key.
     """
     document = read_pickled_arrays(read_file(path, PICKLE_BYTES), str(path))
-    names = document.get("joint_names")
+    names, root = document.get("joint_names"), document.get("root", BASE)
+    if not isinstance(root, str):
+        raise FileError(path, f"root: expected the name of a link, got {root!r}.")
     rows = np.atleast_2d(_numbers(document, "grasp_qpos", str(path)))
     objects = np.atleast_2d(_numbers(document, "obj_pose", str(path), (1.0, 0.0, 0.0, 0.0)))
     if rows.ndim != 2 or rows.shape[1] < 7 or not len(rows):
@@ -64,7 +82,8 @@ def read_dexgraspbench(path: str | Path) -> list[GraspPosture]:
     if objects.shape not in ((1, 7), (len(rows), 7)):
         raise FileError(path, f"obj_pose: expected position and wxyz, got shape {objects.shape}.")
     objects = np.broadcast_to(objects, (len(rows), 7))
-    return [_posture(k, row, place, names, str(path)) for k, (row, place) in enumerate(zip(rows, objects, strict=True))]
+    read = (_posture(k, *each, names, str(path)) for k, each in enumerate(zip(rows, objects, strict=True)))
+    return [replace(grasp, root=root) for grasp in read]
 
 
 def _posture(number: int, row: FloatArray, place: FloatArray, names: Any, source: str) -> GraspPosture:

@@ -50,7 +50,10 @@ class Joint:
         reference: the angle [rad] at which `Link.T_parent_link` holds.
         velocity: limit [rad/s], or None when the model gives none.
         effort: limit [Nm], or None when the model gives none.
-        stiffness: gain of its position servo [Nm/rad], or None when the model has none.
+        stiffness: gain of its position servo [Nm/rad], or None when the model has none. A servo of a fixed tendon
+            with gain k_p and coefficients c_i counts as k_p times the sum of c_i² for every joint of the tendon.
+        servo_share: `stiffness` beside the servo's own gain [-]: the sum of c_i² for a tendon's servo, 1 without one.
+        friction_loss: torque that dry friction in the joint takes [Nm].
         role, role_reason: what it does in a grasp, and why that was concluded.
         direction: +1 when its angle grows while the finger closes, else -1.
         direction_reason: why.
@@ -66,6 +69,8 @@ class Joint:
     velocity: float | None = None
     effort: float | None = None
     stiffness: float | None = None
+    servo_share: float = 1.0
+    friction_loss: float = 0.0
     role: JointRole = JointRole.POSTURE
     role_reason: str = ""
     direction: int = 1
