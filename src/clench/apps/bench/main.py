@@ -225,6 +225,7 @@ def steadiness(
 
     _at_least(2, contacts=contacts)
     _at_least(1, grasps=grasps, passes=passes)
+    _writable(plot)
     return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 

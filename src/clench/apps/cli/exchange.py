@@ -21,10 +21,12 @@ def export(solutions: tuple[Path, ...], /, *, out: Path, format: Format | None =
         json: print one JSON document on standard output.
     """
     import clench
+    from clench.base.json_files import check_writable
 
     from .printing import print_files
     from .results import print_json
 
+    check_writable(out)
     read = [clench.GraspSolution.load(path) for path in solutions]
     clench.export_grasps(out, read, format)
     if json:
@@ -59,12 +61,13 @@ def import_(
         json: print one JSON document on standard output.
     """
     import clench
-    from clench.base.json_files import write_json
+    from clench.base.json_files import check_folder, write_json
     from clench.models.command_file import command_to_dict
 
     from .printing import print_files
     from .results import make_folder, print_json
 
+    check_folder(out)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
     found = clench.import_grasps(grasps, format)
     if grasp is not None and grasp not in [g.name for g in found]:
