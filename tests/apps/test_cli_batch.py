@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +66,34 @@ def test_bad_files(content: object, sentence: str, tmp_path: Path, capsys: pytes
 
 def test_bad_options(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*BASE, "--out", "grasps.txt"]) == 2
-    assert "--out: expected a file that ends in .npz, got 'grasps.txt'." in capsys.readouterr().err
+    assert "grasps.txt: expected a file that ends in .npz." in capsys.readouterr().err
     assert main([*BASE, "--count", "0"]) == 2
     assert "--count: expected at least 1, got 0." in capsys.readouterr().err
+
+
+def test_a_killed_batch_goes_on(tmp_path: Path) -> None:
+    hand, obj = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
+    poses = [pose.wxyz_xyz for pose in clench.approach_poses(hand, obj, 20, 0)]
+    np.save(tmp_path / "poses.npy", np.tile(poses, (20, 1)))
+    program = "import sys; from clench.apps.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    call = [sys.executable, "-c", program, *BASE, "--poses", str(tmp_path / "poses.npy"), "--chunk", "1"]
+    whole, killed = tmp_path / "whole.npz", tmp_path / "killed.npz"
+    assert main([*call[3:], "--out", str(whole)]) == 0
+    found = 0
+    for _ in range(2):
+        process = subprocess.Popen([*call, "--out", str(killed)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        parts = found
+        while parts < found + 10 and process.poll() is None:
+            parts = len(list(tmp_path.glob("killed.npz.parts/0*.npz")))
+        process.kill()
+        assert process.wait() == -signal.SIGKILL
+        assert not killed.exists()
+        readable = list(tmp_path.glob("killed.npz.parts/0*.npz"))
+        for part in readable:
+            with np.load(part) as data:
+                assert data["joint_angles"].shape == (1, len(hand.joints))
+        assert len(readable) > found
+        found = len(readable)
+    assert main([*call[3:], "--out", str(killed)]) == 0
+    assert killed.read_bytes() == whole.read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["killed.npz", "poses.npy", "whole.npz"]
