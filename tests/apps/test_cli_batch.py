@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import clench
 from clench.apps.cli.main import main
+from clench.solve.batch_solver import BatchSolver
 
 BASE = ["batch", "--hand", "patent15", "--object", "ball", "--planes", "2"]
 
@@ -97,3 +99,21 @@ def test_a_killed_batch_goes_on(tmp_path: Path) -> None:
     assert main([*call[3:], "--out", str(killed)]) == 0
     assert killed.read_bytes() == whole.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["killed.npz", "poses.npy", "whole.npz"]
+
+
+def test_an_interrupted_batch_says_where_its_parts_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve, done = BatchSolver.solve, []
+
+    def ended(self: BatchSolver, *args: Any) -> Any:
+        if done:
+            raise KeyboardInterrupt
+        done.append(args)
+        return solve(self, *args)
+
+    monkeypatch.setattr(BatchSolver, "solve", ended)
+    out = tmp_path / "grasps.npz"
+    assert main([*BASE, "--count", "3", "--chunk", "2", "--out", str(out)]) == 130
+    assert f"what is solved is in '{out}.parts'; the same call goes on from there." in capsys.readouterr().err
+    assert len(list((tmp_path / "grasps.npz.parts").glob("*.npz"))) == 1

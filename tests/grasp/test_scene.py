@@ -198,7 +198,7 @@ def packed_once_solved(number):
 
 
 def test_objects_stay_packed_within_their_memory(cache):
-    """A program that goes through many objects holds as many as fit: a million triangles take half a gigabyte."""
+    """A program that goes through many objects holds as many as fit: a million triangles take 0.2 GB."""
     size = packed_size(pack_object(GraspObject.load("box:x=0.01,y=0.02,z=0.02")))
     cache(0)
     cache(5 * size)

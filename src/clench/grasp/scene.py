@@ -123,7 +123,7 @@ def set_object_cache(size: int) -> None:
     """Set how many bytes of packed objects stay in memory, 512 MB by default; those used last stay.
 
     The first solve with an object packs its triangles into trees, which takes some ten milliseconds. Later solves use
-    what is kept. An object takes about 400 bytes per triangle. The object used last stays, however large it is.
+    what is kept. A mesh takes about 200 bytes per triangle. The object used last stays, however large it is.
 
     Args:
         size: [bytes]; 0 keeps the last object alone.
