@@ -69,7 +69,7 @@ def load_hand(folder: Path) -> Hand:
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch) / "hand.toml"
         file.write_text(f'collision_source = "raw"\nallowed_pairs = [{pairs}]\n')
-        return clench.Hand.load(folder / "DLR.urdf", hand_file=file)
+        return clench.Hand.load(folder / f"{folder.name}.urdf", hand_file=file)
 
 
 def read_cases(name: str, limit: int | None = None) -> Iterator[dict[str, Any]]:

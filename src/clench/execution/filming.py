@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from clench.base.errors import ClenchError, FileError
-from clench.base.json_files import check_writable, write_atomically
+from clench.base.json_files import check_folder, check_writable, write_atomically
 from clench.base.opengl import import_mujoco, why_not_drawn
 
 from .scene import Scene
@@ -63,8 +63,8 @@ class Film:
             raise ClenchError("MP4 needs imageio-ffmpeg: pip install 'clench[video]', or choose a .gif file.")
         if self.video is not None:
             check_writable(self.video)
-        if self.stills is not None and self.stills.exists() and not self.stills.is_dir():
-            raise FileError(self.stills, "cannot be written: it is no folder.")
+        if self.stills is not None:
+            check_folder(self.stills)
         problem = why_not_drawn() if self.video or self.stills else None
         if problem is not None:
             raise ClenchError(_NO_OPENGL.format(problem))

@@ -34,11 +34,18 @@ class LinkDepth:
         link: index of the link in the hand.
         depth: [m], 0 when disjoint or just touching.
         place: the deepest point in the object's frame [m], shape (3,); None when the depth is 0.
+        at_least: the link lies inside with all of its size; how much deeper is not measured.
     """
 
     link: int
     depth: float
     place: FloatArray | None
+    at_least: bool = False
+
+    @property
+    def text(self) -> str:
+        """The depth in words, e.g. "by 1.25 mm"."""
+        return f"by {'at least ' if self.at_least else ''}{self.depth * 1e3:.2f} mm"
 
 
 def hand_depths(
@@ -53,6 +60,8 @@ def hand_depths(
     """Return the depth of penetration of every link that has a shape (METHOD.md section 5).
 
     Round shapes are inscribed polyhedra, so their depth is too small by at most `TESSELLATION_DEVIATION` for each side.
+    Depths up to the size of the link (the diameter of a ball around it) are exact. A link that is deeper gets that
+    depth, and the place of a point that is as deep: far inside an object of metres an exact depth takes seconds.
 
     Args:
         hand: the hand.
@@ -70,9 +79,12 @@ def hand_depths(
     deepest = np.empty((len(meshes.link), 4))
     measure_depths(meshes, wanted, placed_links(hand, q), object_mesh(packed), T, deepest)
     found = []
-    for link, (depth, *place) in zip(meshes.link[wanted != 0].tolist(), deepest[wanted != 0].tolist(), strict=True):
-        overlaps = depth > _TOUCHING * packed.radius
-        found.append(LinkDepth(link, depth if overlaps else 0.0, np.array(place) if overlaps else None))
+    for k in np.flatnonzero(wanted):
+        (depth, *place), link = deepest[k].tolist(), int(meshes.link[k])
+        if depth > _TOUCHING * packed.radius:
+            found.append(LinkDepth(link, depth, np.array(place), depth >= 2.0 * meshes.radius[k]))
+        else:
+            found.append(LinkDepth(link, 0.0, None))
     return tuple(found)
 
 

@@ -110,7 +110,7 @@ class BatchSolver:
         chosen = np.full(solved.chosen.shape, -1) if self.packed.wanted.whole else self.packed.items.low[solved.chosen]
         idle = np.full((len(hand_rows), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
         return {
-            **self._names,
+            **self.names,
             "hand_poses": hand_rows,
             "object_poses": object_rows,
             "status_codes": solved.status.astype(np.int8),
@@ -122,7 +122,8 @@ class BatchSolver:
         }
 
     @cached_property
-    def _names(self) -> dict[str, Any]:
+    def names(self) -> dict[str, Any]:
+        """The fields of a batch that are the same for all poses."""
         problem = self._start
         return {
             "question": self._question,
@@ -147,7 +148,7 @@ class BatchSolver:
         planes = [[-1 if f.best is None else _plane(f.best.plane) for f in row] for row in fingers]
         codes = [[FINGER_STATUSES.index(f.status) for f in row] for row in fingers]
         return GraspBatch(
-            **self._names,
+            **self.names,
             hand_poses=hand_rows,
             object_poses=object_rows,
             status_codes=np.array([STATUSES.index(s.status) for s in solutions], dtype=np.int8),

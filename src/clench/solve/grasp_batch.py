@@ -30,7 +30,8 @@ Whole = NDArray[np.int64]
 STATUSES: Final = tuple(SolutionStatus)
 FINGER_STATUSES: Final = tuple(FingerStatus)
 SCHEMA: Final = "clench.batch/1"
-_PER_POSE: Final = (
+#: Columns with one row per pose.
+PER_POSE: Final = (
     *("hand_poses", "object_poses", "status_codes", "certified", "joint_angles", "finger_codes", "planes"),
     "one_by_one",
 )
@@ -179,7 +180,7 @@ class GraspBatch(LateFields):
     @classmethod
     def joined(cls, parts: Sequence[GraspBatch]) -> GraspBatch:
         """Return several batches of the same question as one, in order."""
-        columns: dict[str, Any] = {n: np.concatenate([getattr(part, n) for part in parts]) for n in _PER_POSE}
+        columns: dict[str, Any] = {n: np.concatenate([getattr(part, n) for part in parts]) for n in PER_POSE}
         preshapes = [part.question.preshapes for part in parts]
         merged = {name: np.concatenate([each[name] for each in preshapes]) for name in preshapes[0]}
         return replace(
@@ -196,7 +197,7 @@ class GraspBatch(LateFields):
         rows = np.repeat(self.contacts.first[order] - first[:-1], counts) + np.arange(int(first[-1]))
         columns = {f.name: getattr(self.contacts, f.name)[rows] for f in fields(self.contacts) if f.name != "first"}
         asked = self.question
-        taken: dict[str, Any] = {n: getattr(self, n)[order] for n in _PER_POSE}
+        taken: dict[str, Any] = {n: getattr(self, n)[order] for n in PER_POSE}
         return replace(
             self,
             question=replace(asked, preshapes={name: a[order] for name, a in asked.preshapes.items()}),

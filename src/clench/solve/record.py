@@ -16,7 +16,7 @@ import msgspec
 
 from clench.base.errors import ClenchError, FileError, UnknownNameError
 from clench.base.file_limits import JSON_BYTES
-from clench.base.json_files import parse_json
+from clench.base.json_files import check_writable, parse_json
 
 from .documents import solution_from_dict, solution_to_json
 from .solution import FingerStatus, GraspSolution, SolutionStatus
@@ -114,6 +114,18 @@ class Record:
             except BaseException:
                 self._connection.close()
                 raise
+
+    @classmethod
+    def check(cls, path: str | Path) -> None:
+        """Refuse a record that nothing can be appended to, before the work is done; a missing one is not made yet.
+
+        Raises:
+            FileError: see `Record`, or it cannot be written.
+        """
+        check_writable(path)
+        if os.path.exists(path):
+            with cls(path) as record, record._clear_errors(), record._transaction():
+                pass
 
     def append(self, solution: GraspSolution) -> int:
         """Add one solution and return its id."""

@@ -46,6 +46,8 @@ def solve(
     hand: str = "patent15",
     object: str = "mug",
     scale: float = 1.0,
+    collision_source: Literal["engine", "raw", "visual"] | None = None,
+    order: Literal["proximal-first", "together", "fingertip"] = "proximal-first",
     planes: int = 5,
     poses: int = 100,
     passes: int = 5,
@@ -58,16 +60,28 @@ def solve(
         hand: built-in name, or path to a .urdf or .xml file.
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        collision_source: geometry of the hand; its default without it.
+        order: in which the joints close.
         planes: curl planes per finger.
         poses: how many approach poses are solved.
         passes: how often each is timed.
         seed: of the approach poses.
         json: print one JSON document on standard output.
     """
+    import clench
+
     from .solving import bench_solve
 
     _at_least(1, planes=planes, poses=poses, passes=passes)
-    return _print(bench_solve(hand, object, scale, planes, poses, passes, seed), json)
+    source = None if collision_source is None else clench.CollisionSource(collision_source)
+    asked = clench.GraspCommand(
+        hand_pose=clench.Pose.identity(),
+        order=clench.ClosingOrder(order),
+        planes=planes,
+        collision_source=source,
+        seed=seed,
+    )
+    return _print(bench_solve(hand, object, scale, asked, poses, passes), json)
 
 
 def batch(
@@ -227,6 +241,7 @@ def steadiness(
 
     _at_least(2, contacts=contacts)
     _at_least(1, grasps=grasps, passes=passes)
+    _writable(plot)
     return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 

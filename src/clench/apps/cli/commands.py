@@ -105,6 +105,8 @@ def solve(
     from math import radians
 
     import clench
+    from clench.base.json_files import check_folder
+    from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
     from clench.solve.orders import settled
     from clench.solve.pareto import hand_front
@@ -114,8 +116,13 @@ def solve(
 
     forces = forces or bool(mass or friction)
     carried, gripped = _checked_forces(mass, friction, criteria)
+    if out is not None:
+        check_folder(out)
+    if record is not None:
+        clench.Record.check(record)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
+    warn_of_size(the_hand, the_object)
     given = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
     asked: dict[str, Any] = {} if planes is None else {"planes": planes}
     asked |= {} if criteria is None else {"criteria": criteria}
@@ -192,11 +199,14 @@ def hand(
         json: print one JSON document on standard output.
     """
     import clench
+    from clench.base.json_files import check_writable
     from clench.models.hand.report import describe_hand
 
     from .printing import print_files, print_hand
     from .results import print_json
 
+    if figure is not None:
+        check_writable(figure)
     loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
     report = describe_hand(loaded, clench.check_hand(loaded))
     if figure is not None:

@@ -53,11 +53,13 @@ def export(
         json: print one JSON document on standard output.
     """
     import clench
+    from clench.base.json_files import check_writable
 
     from .export_sources import make_test, read_grasps
     from .printing import print_files, print_notes
     from .results import print_json
 
+    check_writable(out)
     planned = {"mass": as_range(mass, "--mass"), "friction": as_range(friction, "--friction")}
     tested = make_test(**planned) if hold else None
     read = read_grasps(solutions, hand, object, (hand_file, palm), scale)
@@ -121,12 +123,13 @@ def import_(
     from dataclasses import replace
 
     import clench
-    from clench.base.json_files import write_json
+    from clench.base.json_files import check_folder, write_json
     from clench.models.command_file import command_to_dict
 
     from .printing import print_files
     from .results import make_folder, print_json
 
+    check_folder(out)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
     found = [replace(g, root=root or g.root) for g in clench.import_grasps(grasps, format)]
     if root is not None and root != "world":

@@ -99,6 +99,8 @@ def execute(
     for file in (out, log):
         if file is not None:
             check_writable(file)
+    if record is not None:
+        clench.Record.check(record)
     film = make_film(video, stills)
     tested = make_hold(hold, lift, mass, friction)
     the_solution = clench.GraspSolution.load(solution)

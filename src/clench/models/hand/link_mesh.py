@@ -96,6 +96,7 @@ def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
         b.closed,
         np.ascontiguousarray(T_b_a[:3]),
         np.ascontiguousarray(invert(T_b_a)[:3]),
+        np.inf,
         np.empty(CROSSINGS),
         np.empty(STACK_SIZE, dtype=np.int32),
     )
