@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -195,7 +196,10 @@ def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> H
     places = row_places(bases, thumb, tips[thumb or 0])
     fingers = name_fingers(hand, thumb, places, overrides)
     called = _called_thumbs(fingers, told, overrides)
-    swinging = [f.is_thumb and (f.name in called or _unlike_others(hand, f)) for f in fingers]
+    swinging = [
+        f.is_thumb and (named or (_closes_before_it_turns(hand, f) and (f.name in called or _unlike_others(hand, f))))
+        for f, named in zip(fingers, told, strict=True)
+    ]
     if swinging != told:
         # The base of a thumb has another role than that of a finger, which was not known before.
         known = tuple(replace(f, is_thumb=swings) for f, swings in zip(fingers, swinging, strict=True))
@@ -215,6 +219,12 @@ def _called_thumbs(fingers: Sequence[Finger], told: Sequence[bool], overrides: H
     """Return the names of fingers that the model or the hand file calls thumbs; others only stand against the rest."""
     called = {finger.name for finger, named in zip(fingers, told, strict=True) if named}
     return called | {name for name, finger in overrides.fingers.items() if finger.thumb}
+
+
+def _closes_before_it_turns(hand: Hand, finger: Finger) -> bool:
+    """Return whether a posture joint comes after a closing one, so that a thumb's base may be parallel by chance."""
+    closing = [hand.joints[j].role is JointRole.CLOSING for j in finger.joints]
+    return any(a and not b for a, b in itertools.combinations(closing, 2))
 
 
 def _unlike_others(hand: Hand, finger: Finger) -> bool:
