@@ -51,7 +51,7 @@ def test_the_table_lists_every_command() -> None:
 
 
 def test_the_two_commands_are_there() -> None:
-    assert "pip install uv && uv run clench demo " in README
+    assert "pip install uv && uv run --no-dev clench demo " in README
     assert "pip install uv && uv run pytest " in README
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from clench.grasp.calibration import Calibration, load_calibration
     from clench.grasp.criteria import Criterion, HandCriterion
     from clench.grasp.criterion_registry import register_criterion
+    from clench.grasp.scene import set_object_cache
     from clench.grasp.self_check import check_hand
     from clench.models.command import ClosingOrder, GraspCommand
     from clench.models.command_file import load_command
@@ -134,6 +135,7 @@ _HOMES = {
     "pose_error": "clench.solve.pose_error",
     "register_criterion": "clench.grasp.criterion_registry",
     "sensitivity": "clench.solve.sensitivity",
+    "set_object_cache": "clench.grasp.scene",
     "solve_batch": "clench.solve.batch",
     "solve_stream": "clench.solve.batch",
     "write_log": "clench.execution.formats.mcap_log",
@@ -212,6 +214,7 @@ __all__ = [
     "pose_error",
     "register_criterion",
     "sensitivity",
+    "set_object_cache",
     "solve",
     "solve_batch",
     "solve_stream",

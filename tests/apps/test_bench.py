@@ -15,6 +15,7 @@ from clench.apps.bench.checking import Checked, Surface, check_answer, triangle_
 from clench.apps.bench.main import BENCHMARKS, main
 from clench.apps.bench.report import BenchReport, describe_place
 from clench.base.errors import CommandError, UnknownNameError
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.solve.alternatives import finger_sets
 from clench.solve.problem import make_problem, make_setting
 from clench.solve.solution import GraspSolution
@@ -227,3 +228,24 @@ def test_steadiness_refuses_to_time_wrong_bounds(monkeypatch, capsys: pytest.Cap
     captured = capsys.readouterr()
     assert "the lower bound 2.000000000 is above epsilon" in captured.err
     assert "epsilon_median_ms" not in captured.out
+
+
+def test_solve_says_which_geometry_and_order_it_times(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--object", "sphere:r=0.03", "--collision-source", "visual", "--order", "fingertip", "--json"]
+    assert main([*SMALL, *options]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["collision_source"], document["order"]) == ("visual", "fingertip")
+    assert 0.0 < document["solve_processor_least_median_ms"] <= document["solve_processor_least_max_ms"]
+
+
+def test_triangles_are_counted_as_they_are_closed() -> None:
+    """With `engine` meshes are convex hulls: their own triangles are not those that times belong to."""
+    hand, mug = clench.Hand.load("patent15"), clench.GraspObject.load("mug").bodies[0].shapes[0]
+    assert mug.mesh is not None
+    box = Shape(ShapeKind.BOX, (0.01, 0.01, 0.01))
+    shapes = {CollisionSource.ENGINE: (mug, box), CollisionSource.VISUAL: (mug, box)}
+    meshed = replace(hand, links=(replace(hand.links[0], shapes=shapes), *hand.links[1:]))
+    before = solving.link_triangles(hand, CollisionSource.VISUAL)
+    assert solving.link_triangles(meshed, CollisionSource.VISUAL) == before + len(mug.mesh.triangles)
+    hull = solving.link_triangles(meshed, CollisionSource.ENGINE)
+    assert 100 < hull < len(mug.mesh.triangles) / 4

@@ -18,7 +18,7 @@ from clench.apps.cli.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.base.errors import CommandError
 from clench.execution.report import ExecutionReport, JointReached
-from clench.grasp import approach
+from clench.grasp import approach, sizes
 from clench.kernels import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource
@@ -56,6 +56,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
     monkeypatch.setattr(approach, "drawn_poses", lambda *_: iter(poses))
     monkeypatch.setitem(vars(clench), "complete", lambda solution, *_, **__: solution)
+    monkeypatch.setattr(sizes, "warn_of_size", lambda *_: None)
     # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
     monkeypatch.setattr(warming, "announce", lambda: None)
     monkeypatch.setattr(warming, "warm_up", lambda: None)

@@ -7,16 +7,21 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import clench
+from clench.apps.cli import actuators
 from clench.apps.cli.exchange import Format
+from clench.apps.cli.interrupts import stopped_by_signals
 from clench.apps.cli.main import main
 from clench.execution.driven_hand import DrivenHand
+from clench.execution.driver_line import Call
 from clench.execution.drivers.ros2 import RosInterface
 from clench.execution.formats.exchange import GraspFormat
 from clench.grasp.scene import hash_bodies, hash_hand
@@ -213,7 +218,9 @@ def test_export_and_import(
 ) -> None:
     file, folder = tmp_path / f"g.{ending}", tmp_path / "commands"
     assert main(["export", str(tmp_path / "s.json"), "--out", str(file), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"schema": "clench.export/1", "file": str(file), "grasps": 1}
+    told = json.loads(capsys.readouterr().out)
+    assert (told["schema"], told["file"], told["grasps"]) == ("clench.export/1", str(file), 1)
+    assert told["files"] == [str(file)]
     assert main(["import", str(file), "--hand", "robonaut2", "--out", str(folder), "--json"]) == 0
     (command,) = json.loads(capsys.readouterr().out)["commands"]
     assert command["name"] == "grasp_0"
@@ -238,12 +245,112 @@ def test_names_that_lead_elsewhere_are_refused(
     assert not (tmp_path / "grasp_0.json").exists()
 
 
+class Servos:
+    """Go at once where they are told; a signal comes with the fifth command."""
+
+    name = "servos"
+    one_target = True
+    limits = clench.DriverLimits()
+
+    def __init__(self, joints: list[str], number: int) -> None:
+        self.joints, self.number = tuple(joints), number
+        self.angles = dict.fromkeys(joints, 0.0)
+        self.calls: list[str] = []
+
+    def connect(self, timeout: float) -> None:
+        pass
+
+    def read(self) -> clench.HandState:
+        return clench.HandState(dict(self.angles))
+
+    def command(self, path: clench.JointPath) -> None:
+        self.calls.append("command")
+        self.angles.update(path.at(path.period))
+        if len(self.calls) == 5:
+            signal.pthread_kill(threading.main_thread().ident or 0, self.number)
+            time.sleep(0.1)  # the main thread, which waits for this call, has the signal now
+
+    def stop(self) -> None:
+        self.calls.append("stop")
+
+    def disconnect(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("swallow", [False, True])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_stops_the_hand_and_what_was_sent_is_kept(
+    solution: GraspSolution,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    number: int,
+    swallow: bool,
+) -> None:
+    """Also when the code that happens to run takes the interrupt for an error of its own, and goes on."""
+    hand = clench.Hand.load("robonaut2")
+    servos = Servos([joint.name for joint in hand.joints], number)
+    monkeypatch.setattr(actuators, "_driver", lambda *_: servos)
+    if swallow:
+        wait = Call.wait
+
+        def swallowing(call: Call, limit: float | None) -> bool:
+            with suppress(KeyboardInterrupt):
+                return wait(call, limit)
+            return wait(call, limit)
+
+        monkeypatch.setattr(Call, "wait", swallowing)
+    options = ["--actuator", "ros2", "--speed", "0.2", "--out", str(tmp_path / "r.json"), "--json"]
+    code = main(["execute", str(tmp_path / "s.json"), *options])
+    report = json.loads((tmp_path / "r.json").read_text())
+    printed = capsys.readouterr()
+    assert json.loads(printed.out) == report
+    assert not report["success"]
+    assert report["sent"]["commands"] == 5
+    assert servos.calls == [*["command"] * 5, "stop"]
+    assert len(report["history"]["times"]) >= 5
+    seen = "The hand was told to stop: it was seen to stand still."
+    if swallow:
+        assert code == 1
+        assert report["reason"] == f"Stopped on request. {seen}"
+    else:
+        assert code == 130
+        assert report["reason"] == f"Interrupted (KeyboardInterrupt). {seen}"
+        assert printed.err == "clench: error: interrupted.\n"
+
+
+def test_an_interrupt_before_anything_moves_leaves_no_report(
+    solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(clench, "execute", interrupted)
+    monkeypatch.setattr(actuators, "_driver", lambda *_: Servos([], 0))
+    options = ["--actuator", "ros2", "--out", str(tmp_path / "r.json")]
+    assert main(["execute", str(tmp_path / "s.json"), *options]) == 130
+    assert capsys.readouterr().err == "clench: error: interrupted.\n"
+    assert not (tmp_path / "r.json").exists()
+
+
+@pytest.mark.parametrize(("number", "heeded"), [(signal.SIGINT, True), (signal.SIGHUP, False)])
+def test_of_signals_that_were_ignored_only_a_hangup_stays_so(number: signal.Signals, heeded: bool) -> None:
+    """A script ignores Ctrl-C for what it runs in the background; `nohup` ignores hangups."""
+    before = signal.signal(number, signal.SIG_IGN)
+    stops: list[bool] = []
+    try:
+        with suppress(KeyboardInterrupt), stopped_by_signals(lambda: stops.append(True)):
+            signal.raise_signal(number)
+        assert signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, before)
+    assert stops == [True] * heeded
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_being_told_to_end_stops_the_hand(tmp_path: Path, number: int) -> None:
     program = (
-        "import signal, time\n"
-        # A shell that runs the tests in the background has interrupts ignored.
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "import time\n"
         "from clench.apps.cli.interrupts import stopped_by_signals\n"
         "try:\n"
         "    with stopped_by_signals():\n"

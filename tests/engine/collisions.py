@@ -74,7 +74,7 @@ class Collisions:
         self.objects = [fcl.CollisionObject(tree_of(s)) for body in obj.bodies for s in body.shapes]
         self.links = trees_of_links(hand) if links is None else links
         self.followers = {c.follower for c in hand.couplings}
-        free = set(map(frozenset, hand.allowed_pairs))
+        free = set(map(frozenset, hand.allowed_pairs_for(hand.default_source)))
         solid = [i for i in hand.solid_links if self.links[i]]
         self.pairs = [(a, b) for a in solid for b in solid if a < b and frozenset((a, b)) not in free]
 

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from virtual_clock import VirtualClock
 
 from clench.base.errors import CommandError, UnknownNameError
-from clench.execution import driven_hand
+from clench.execution import driven_hand, executing
 from clench.execution.driven_hand import DrivenHand
 from clench.execution.driver import DriverError, DriverLimits, JointPath
 from clench.execution.executing import execute
-from clench.execution.following import HORIZON, PERIOD, Followed, TimedPlan
+from clench.execution.following import HORIZON, PERIOD, TimedPlan
 from clench.execution.joint_map import JointMap, MappedJoint
 from clench.models.hand.hand import Hand
 from clench.models.hand.tendons import TendonMap
@@ -174,11 +174,12 @@ def test_a_slower_controller_gets_a_slower_path(pincer: Hand, solution: GraspSol
             lambda t: {"age": t} if t > 0.2 else {},
             r"state of joint 'thumb' is stale: 0\.\d+ s old; at most 0\.15 s",
         ),
+        (lambda t: {"age": -0.01} if t > 0.2 else {}, r"state of joint 'thumb' is -0\.01 s old, from the future; are"),
         (lambda t: {"positions": {"index": np.nan}} if t > 0.2 else {}, r"Joint 'index' is said to be at nan rad\."),
         (lambda t: {"positions": {"index": None}} if t > 0.2 else {}, r"says nothing of joint 'index'\."),
         (lambda t: {"positions": {"thumb": 0.0}}, r"Joint 'thumb' does not follow: it is at 0 rad and was told to be"),
     ],
-    ids=["stale", "nan", "absent", "stuck"],
+    ids=["stale", "future", "nan", "absent", "stuck"],
 )
 def test_trouble_on_the_way_stops_the_hand(pincer: Hand, solution: GraspSolution, fault: object, reason: str) -> None:
     driver = FakeDriver(OPEN, fault=fault)  # type: ignore[arg-type]
@@ -193,6 +194,19 @@ def test_trouble_on_the_way_stops_the_hand(pincer: Hand, solution: GraspSolution
     assert driver.where()["thumb"] < 0.9 * solution.joint_angles["thumb"]
     time.sleep(2 * PERIOD)
     assert len(driver.commands) == sent
+
+
+def test_a_state_from_the_future_confirms_no_stop(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN, fault=lambda t: {"age": -0.01} if t > 0.2 else {})
+    report = run(driver, pincer, solution, speed=0.3)
+    assert "The hand was told to stop: that was not confirmed" in report.reason
+
+
+def test_nothing_is_sent_to_a_hand_whose_state_is_from_the_future(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN, fault=lambda _: {"age": -5.0})
+    report = run(driver, pincer, solution)
+    assert report.reason.startswith("Not carried out: The state of joint 'thumb' is -5 s old, from the future")
+    assert (driver.commands, driver.stops) == ([], 0)
 
 
 def test_a_controller_that_fails_stops_the_hand(pincer: Hand, solution: GraspSolution) -> None:
@@ -234,6 +248,23 @@ def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution, clock
     assert driver.stopped_after == pytest.approx(0.3, abs=PERIOD)
 
 
+def test_a_stop_while_the_trajectory_is_planned_is_heeded(
+    pincer: Hand, solution: GraspSolution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driver = FakeDriver(OPEN)
+    hand = DrivenHand(pincer, driver)
+    plan = executing.plan_trajectory
+    monkeypatch.setattr(executing, "plan_trajectory", lambda *a, **k: [hand.stop(), plan(*a, **k)][1])
+    report = execute(solution, hand)
+    assert report.reason == "Not carried out: A stop is in force (Stopped on request); release it with release_stop()."
+    assert report.sent is not None
+    assert report.sent.commands == 0
+    assert driver.commands == []
+    monkeypatch.undo()
+    hand.release_stop()
+    assert execute(solution, hand).success
+
+
 def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSolution) -> None:
     def fault(t: float) -> dict[str, object]:
         if t > 0.1:
@@ -241,10 +272,20 @@ def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSo
         return {}
 
     driver = FakeDriver(OPEN, fault=fault)
+    hand = DrivenHand(pincer, driver)
     with pytest.raises(KeyboardInterrupt):
-        run(driver, pincer, solution, speed=0.3)
+        execute(solution, hand, speed=0.3)
     assert driver.stops == 1
     assert not driver.connected
+    report = hand.last_report
+    assert report is not None
+    assert report.reason.startswith(
+        "Interrupted (KeyboardInterrupt). The hand was told to stop: that was not confirmed"
+    )
+    assert report.history is not None
+    assert len(report.history.times) > 1
+    count = len(driver.commands)
+    assert any(note.startswith(f"{count} commands were sent; the last one came 0.1") for note in report.notes)
 
 
 def test_nothing_moves_when_the_plan_breaks_a_limit(pincer: Hand, solution: GraspSolution) -> None:
@@ -327,7 +368,7 @@ def test_the_squeeze_of_a_tendon_driven_hand(pincer: Hand, solution: GraspSoluti
         report = run(driver, hand, replace(solution, squeeze={"tensions": wrong}))
         assert any(note.startswith("The tendons were not pulled: " + message) for note in report.notes), report.notes
         assert not hasattr(driver, "pulled")
-        assert driver.stops == 1
+        assert driver.stops == 0
     plain = FakeDriver(OPEN)
     assert len(run(plain, hand, planned).notes) == 2  # a driver without tendons is asked nothing
 
@@ -337,9 +378,10 @@ def test_after_a_stop_no_tendon_is_pulled(
 ) -> None:
     driver = Puller(OPEN)
     hand = DrivenHand(replace(pincer, tendons=TENDONS), driver)
-    monkeypatch.setattr(driven_hand, "squeeze_by_driver", lambda *_: [hand.stop(), Followed()][1])
+    monkeypatch.setattr(driven_hand, "squeeze_by_driver", lambda *_: hand.stop())
     report = execute(replace(solution, squeeze={"tensions": [12.0, 1.0]}), hand)
-    assert "The tendons were not pulled: stopped on request." in report.notes
+    assert report.reason.startswith("Stopped on request. The hand was told to stop")
+    assert "The tendons were not pulled." in report.notes
     assert not hasattr(driver, "pulled")
 
 

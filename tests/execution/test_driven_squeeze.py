@@ -54,6 +54,14 @@ def test_without_a_plan_or_a_share_nothing_is_squeezed(pincer: Hand, pinch: Gras
         assert not any("queeze" in note for note in report.notes)
 
 
+def test_joints_whose_servo_gain_is_not_known_are_named(pincer: Hand, pinch: GraspSolution) -> None:
+    torques = {"thumb": 0.1, "index": 0.2}
+    notes = run(FakeDriver(OPEN), pincer, squeezed(pinch, torques=torques, offsets={})).notes
+    assert any("There was no squeeze: the hand's model gives no servo gain of 'thumb', 'index'" in n for n in notes)
+    notes = run(FakeDriver(OPEN), pincer, squeezed(pinch, torques=torques, offsets={"thumb": 0.05})).notes
+    assert any("Not all of it was told: the hand's model gives no servo gain of 'index'" in n for n in notes)
+
+
 def test_a_squeeze_that_does_not_hold_is_not_told(pincer: Hand, pinch: GraspSolution) -> None:
     driver = FakeDriver(OPEN)
     report = run(driver, pincer, squeezed(pinch, feasible=False, text="No squeeze holds 0.1 kg."))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from clench.solve.solution import GraspSolution
 
 pytest.importorskip("orca_core", reason="needs orca-core")
 
+from clench.execution.drivers import orca
 from clench.execution.drivers.orca import OrcaDriver
 
 pytestmark = pytest.mark.usefixtures("clock")
@@ -69,6 +72,42 @@ def test_connecting_moves_nothing_and_stopping_holds() -> None:
     assert driver.read().positions["index_mcp"] == pytest.approx(20.0)
     driver.disconnect()
     driver.disconnect()
+
+
+def test_a_stop_without_an_answer_repeats_no_old_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    driver = OrcaDriver(mock=True)
+    driver.connect(1.0)
+    told: list[object] = []
+    monkeypatch.setattr(driver._hand, "set_joint_positions", told.append)
+    monkeypatch.setattr(type(driver._hand), "last_read_ok", False)
+    with pytest.raises(DriverError, match="do not answer; they hold the last target"):
+        driver.stop()
+    assert told == []
+    monkeypatch.undo()
+    driver.disconnect()
+
+
+def test_what_other_threads_print_is_kept(capsys: pytest.CaptureFixture[str]) -> None:
+    """One thread hangs in orca-core while another one stops the hand: neither takes standard output away."""
+    inside, goes_on = threading.Event(), threading.Event()
+
+    def hanging() -> None:
+        with orca._quiet():
+            print("not seen")
+            inside.set()
+            goes_on.wait(60.0)
+
+    before = sys.stdout
+    thread = threading.Thread(target=hanging)
+    thread.start()
+    inside.wait(60.0)
+    with orca._quiet():
+        print("not seen")
+    print("seen")
+    goes_on.set()
+    thread.join()
+    assert sys.stdout is before
+    assert capsys.readouterr().out == "seen\n"
 
 
 def test_stopped_on_the_way(pincer: Hand, pinch: GraspSolution, joint_map: JointMap, clock: VirtualClock) -> None:

@@ -13,11 +13,14 @@ import pytest
 from fake_driver import FakeDriver
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from virtual_clock import VirtualClock, VirtualEvent
+from virtual_clock import VirtualClock
 
 from clench.execution.command_check import CommandCheck, CommandLimits
-from clench.execution.driver import HandState, JointPath
+from clench.execution.driver import DriverError, HandState, JointPath
+from clench.execution.driver_session import DriverSession
 from clench.execution.following import HORIZON, LATE, PERIOD, Followed, Follower, TimedPlan
+from clench.execution.halting import halt
+from clench.execution.supervision import supervision_of
 
 #: What every look at the clock takes [s].
 LOOK = 2e-5
@@ -86,8 +89,8 @@ def followed(
     make: Callable[[VirtualClock], Traced],
     deviation: float = DEVIATION,
     settling: float = 4.0,
-) -> tuple[Traced, Followed]:
-    """Follow a plan with pauses, each so many looks at the clock after the one before."""
+) -> tuple[Traced, Followed, str]:
+    """Follow a plan with pauses, each so many looks at the clock after the one before; return the trouble, too."""
 
     def interrupted() -> Iterator[float]:
         for looks, seconds in pauses:
@@ -102,19 +105,25 @@ def followed(
     driver = make(clock)
     with pytest.MonkeyPatch.context() as patched:
         clock.use(patched, fake_driver)
-        check, stopping = CommandCheck(LIMITS, 0.5, deviation), VirtualEvent(clock)
-        arrived = dict.fromkeys(plan.joints, 1e-6)
-        found = Follower(driver, check, stopping, settling, arrived).follow(plan)  # type: ignore[arg-type]
+        check, found, trouble = CommandCheck(LIMITS, 0.5, deviation), Followed(), ""
+        session = DriverSession(driver)
+        session.begin()
+        try:
+            Follower(session, check, settling, dict.fromkeys(plan.joints, 1e-6)).follow(plan, found)
+        except DriverError as error:
+            trouble = str(error)
+            halt(session, check, found)
+        session.close(disconnect=False)
         driver.watch(clock.now)
-    return driver, found
+    return driver, found, trouble
 
 
 def motions(
     pauses: Pauses, make: Callable[[VirtualClock], Traced] = Traced, deviation: float = DEVIATION
 ) -> np.ndarray:
     """Return how fast the hand goes along the plan at any time, 1 as planned [-], shape (N,), and check the rest."""
-    driver, found = followed(PLAN, pauses, make, deviation)
-    assert found.trouble is None
+    driver, found, trouble = followed(PLAN, pauses, make, deviation)
+    assert trouble == ""
     for name, end in PLAN.at(PLAN.duration).items():
         assert found.measured[-1][name] == pytest.approx(end, abs=1e-6)
     assert (np.diff(found.times) > 0.0).all()
@@ -160,8 +169,8 @@ def test_a_pause_before_the_controller_has_its_path_hurries_little(
 def test_of_one_target_after_the_other_none_is_farther_than_planned(
     pauses: Pauses, before: dict[int, float], after: dict[int, float]
 ) -> None:
-    driver, found = followed(PLAN, pauses, lambda clock: Traced(clock, told(before), told(after), one_target=True))
-    assert found.trouble is None
+    driver, _, trouble = followed(PLAN, pauses, lambda clock: Traced(clock, told(before), told(after), one_target=True))
+    assert trouble == ""
     steps = np.diff([path.at(PERIOD)["a"] for path in driver.commands])
     assert steps.max() <= PERIOD * 1.0001
     assert steps.min() >= -LATE - 0.001
@@ -198,9 +207,8 @@ def test_a_hand_that_stands_still_is_noticed_in_spite_of_a_slow_line() -> None:
         driver.fault = lambda _: {"positions": {"a": 0.0}}
         return driver
 
-    driver, found = followed(PLAN, [], stuck)
-    assert found.trouble is not None
-    assert found.trouble.startswith("Joint 'a' does not follow: it is at 0 rad and was told to be at 0.1")
+    driver, _, trouble = followed(PLAN, [], stuck)
+    assert trouble.startswith("Joint 'a' does not follow: it is at 0 rad and was told to be at 0.1")
     assert driver.stopped_after is not None
     assert driver.stopped_after < 0.5
 
@@ -211,9 +219,8 @@ def test_a_hand_that_runs_ahead_is_noticed() -> None:
         driver.fault = lambda since: {"positions": {"a": 2.0 * since}}
         return driver
 
-    driver, found = followed(PLAN, [], running)
-    assert found.trouble is not None
-    assert found.trouble.startswith("Joint 'a' does not follow")
+    driver, _, trouble = followed(PLAN, [], running)
+    assert trouble.startswith("Joint 'a' does not follow")
     assert driver.stopped_after is not None
     assert driver.stopped_after < 0.3
 
@@ -222,7 +229,7 @@ class Aged(Traced):
     """Say where the joints were a while ago, every one by itself, and how long ago that was; one clock is ahead."""
 
     lags = (0.2, 0.03)
-    aheads = (0.0, -0.05)
+    aheads = (0.0, -0.03)
 
     def read(self) -> HandState:
         self.watch(self.clock.now)
@@ -244,16 +251,16 @@ def test_states_of_a_while_ago_are_compared_with_where_the_hand_was_to_be_then(
     def make(clock: VirtualClock) -> Traced:
         return Aged(clock, lambda _: jitter.choice([0.0, 0.001, 0.02, 0.045, 0.049]) if before else 0.0, told(after))
 
-    _, found = followed(PLAN, pauses if not before else [], make, deviation=0.025)
-    assert found.trouble is None
+    _, _, trouble = followed(PLAN, pauses if not before else [], make, deviation=0.025)
+    assert trouble == ""
 
 
 def test_a_hand_that_goes_to_a_target_at_once_is_not_ahead() -> None:
     class Servo(Aged):
         lags, aheads = (0.04, 0.04), (0.0, 0.0)
 
-    _, found = followed(PLAN, [], lambda clock: Servo(clock, one_target=True), deviation=0.02)
-    assert found.trouble is None
+    _, _, trouble = followed(PLAN, [], lambda clock: Servo(clock, one_target=True), deviation=0.02)
+    assert trouble == ""
 
 
 def test_where_a_joint_is_nearest_is_found_at_turns_too() -> None:
@@ -274,19 +281,15 @@ class Short(Traced):
 
 
 @pytest.mark.parametrize("stops", [False, True])
-def test_a_hand_that_does_not_arrive_is_read_once_more_and_a_stop_then_is_heeded(
-    stops: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stopped: list[bool] = []
-
+def test_a_hand_that_does_not_arrive_is_read_once_more_and_a_stop_then_is_heeded(stops: bool) -> None:
     def make(clock: VirtualClock) -> Traced:
+        driver = Short(clock, after=lambda number: 0.12 if number >= round(PLAN.duration / PERIOD) else 0.0)
         if stops:
-            clock.after(3.1, lambda: stopped.append(True))
-        return Short(clock, after=lambda number: 0.12 if number >= round(PLAN.duration / PERIOD) else 0.0)
+            clock.after(3.1, supervision_of(driver).stop)
+        return driver
 
-    monkeypatch.setattr(VirtualEvent, "is_set", lambda _: bool(stopped))
-    driver, found = followed(PLAN, [], make, settling=0.05)
-    assert found.trouble == ("Stopped on request." if stops else None)
+    driver, found, trouble = followed(PLAN, [], make, settling=0.05)
+    assert trouble == ("Stopped on request." if stops else "")
     assert found.measured[-1]["a"] == pytest.approx(driver.at(driver.clock.now)["a"], abs=1e-3)
 
 
@@ -303,16 +306,13 @@ def test_a_stop_is_heeded_before_anything_more_is_told(looks: int) -> None:
         def pause() -> float:
             left[0] -= 1
             if left[0] == 0:
-                stopping.append(True)
+                supervision_of(driver).stop()
                 commands.append(len(driver.commands))
             return before()
 
         clock.pause = pause
         return driver
 
-    stopping: list[bool] = []
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(VirtualEvent, "is_set", lambda _: bool(stopping))
-        driver, found = followed(PLAN, [], make)
-    assert found.trouble == "Stopped on request."
+    driver, _, trouble = followed(PLAN, [], make)
+    assert trouble == "Stopped on request."
     assert len(driver.commands) == commands[0]

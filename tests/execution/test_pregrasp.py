@@ -123,7 +123,7 @@ def test_the_document_of_the_command_line_is_complete(capsys) -> None:
 def test_forces_are_printed(capsys) -> None:
     _, out, _ = run(capsys, "--forces", "--friction", "0.8")
     assert "force closure: epsilon 0." in out
-    assert "Holds 0.2 kg under gravity" in out
+    assert "Holds 0.1 kg under gravity" in out
     assert "thumb_proximal" in out
 
 

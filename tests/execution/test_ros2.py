@@ -334,6 +334,9 @@ class Wire:
     def publish(self, _: object, times: list[float], positions: list[list[float]]) -> None:
         self.published.append((times, positions))
 
+    def flush(self, timeout: float) -> None:
+        pass
+
     def close(self) -> None:
         self.published.clear()
 
@@ -354,6 +357,61 @@ def test_a_path_begins_where_the_one_before_it_is(monkeypatch: pytest.MonkeyPatc
         *([pytest.approx(at)] for at in (0.1, 0.5, 0.8)),
     ]
     assert wire.published[0] == ([0.0, 0.1, 0.3], [[0.0], [0.2], [0.8]])
+
+
+def test_a_stop_is_told_while_the_first_path_is_on_its_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Slow(Wire):
+        def publish(self, joints: object, times: list[float], positions: list[list[float]]) -> None:
+            super().publish(joints, times, positions)
+            if len(self.published) == 1:
+                driver.stop()
+
+    wire = Slow()
+    monkeypatch.setattr(ros2, "open_link", lambda *_: wire)
+    driver = Ros2Driver()
+    driver.connect(1.0)
+    driver.command(JointPath(("thumb",), np.array([0.1, 0.3]), np.array([[0.2], [0.8]]), 0.05))
+    assert wire.published[1] == ([ros2.STOP_TIME], [[0.0]])
+
+
+def test_trouble_of_the_link_does_not_keep_the_hand_from_being_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = Wire()
+    monkeypatch.setattr(ros2, "open_link", lambda *_: wire)
+    driver = Ros2Driver()
+    driver.connect(1.0)
+    driver.command(JointPath(("thumb",), np.array([0.1, 0.3]), np.array([[0.2], [0.8]]), 0.05))
+
+    def refused() -> list[ros2.JointStates]:
+        raise ros2.DriverError("The goal was refused.")
+
+    monkeypatch.setattr(wire, "states", refused)
+    with pytest.raises(ros2.DriverError, match="refused"):
+        driver.read()
+    driver.stop()
+    assert wire.published[-1] == ([ros2.STOP_TIME], [[0.0]])
+
+
+def test_no_state_is_from_the_future(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another thread, which stops the hand, hears a state while this one reads."""
+    clock, wire = VirtualClock(), Wire()
+    monkeypatch.setattr(ros2, "time", clock)
+    monkeypatch.setattr(ros2, "open_link", lambda *_: wire)
+    driver = Ros2Driver()
+    driver.connect(1.0)
+
+    class Meanwhile:
+        """Let the other thread have the lock first."""
+
+        def __enter__(self) -> None:
+            clock.sleep(0.1)
+            driver._received["thumb"] = clock.now
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+    monkeypatch.setattr(driver, "_receive", lambda: None)
+    monkeypatch.setattr(driver, "_lock", Meanwhile())
+    assert driver.read().ages == {"thumb": 0.0}
 
 
 def test_names_and_domains(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
-from types import ModuleType, SimpleNamespace
+from itertools import takewhile
+from types import ModuleType
 
 import pytest
 
-from clench.execution import driven_hand, following
+from clench.execution import following, halting
+from clench.execution.driver_line import Call
+from clench.execution.supervision import Supervision
 
 
 class VirtualClock:
@@ -20,6 +24,8 @@ class VirtualClock:
     def __init__(self, pause: Callable[[], float] = lambda: 0.0) -> None:
         self.now, self.pause = 1000.0, pause
         self.due: list[tuple[float, Callable[[], object]]] = []
+        #: Set when a call of a driver hangs: then nobody waits for it any longer.
+        self.hanging = threading.Event()
 
     def monotonic(self) -> float:
         self.sleep(self.pause())
@@ -41,26 +47,15 @@ class VirtualClock:
 
     def use(self, monkeypatch: pytest.MonkeyPatch, *modules: ModuleType) -> None:
         """Let supervision, and other modules that import `time`, look at this clock."""
-        for module in (following, *modules):
+        for module in (following, halting, *modules):
             monkeypatch.setattr(module, "time", self)
-        monkeypatch.setattr(driven_hand, "threading", SimpleNamespace(Event=lambda: VirtualEvent(self)))
+        monkeypatch.setattr(Supervision, "wait", lambda supervision, seconds: self._wait(supervision, seconds))
+        wait = Call.wait
+        monkeypatch.setattr(Call, "wait", lambda call, _: self._patiently(lambda: wait(call, 0.05)))
 
+    def _wait(self, supervision: Supervision, seconds: float) -> None:
+        self.sleep(max(seconds, 0.0), lambda: bool(supervision.cause))
 
-class VirtualEvent:
-    """Stand in for `threading.Event`."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        self.clock, self.happened = clock, False
-
-    def set(self) -> None:
-        self.happened = True
-
-    def clear(self) -> None:
-        self.happened = False
-
-    def is_set(self) -> bool:
-        return self.happened
-
-    def wait(self, timeout: float) -> bool:
-        self.clock.sleep(timeout, self.is_set)
-        return self.happened
+    def _patiently(self, wait: Callable[[], bool]) -> bool:
+        """Wait for a call of a driver, however busy the machine is, or until the call is said to hang."""
+        return any(wait() for _ in takewhile(lambda _: not self.hanging.is_set(), range(1200))) or wait()

@@ -4,7 +4,7 @@ import pytest
 
 from .run import run
 
-SAMPLE = 200
+SAMPLE = 300
 
 
 def told(report):
@@ -17,7 +17,7 @@ def test_a_sample():
     answers = sum(count for (_, outcome), count in report.counts.items() if outcome == "answer")
     # Too many refusals would mean that nothing gets past the first look at an input.
     assert answers > SAMPLE / 8, report.table()
-    assert len({kind for kind, _ in report.counts}) >= 15
+    assert len({kind for kind, _ in report.counts}) >= 20
 
 
 @pytest.mark.long

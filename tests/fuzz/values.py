@@ -16,6 +16,16 @@ import clench
 from clench.base.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
+from .file_trials import (
+    array_of_poses,
+    grasps_in_yaml,
+    included_model,
+    joint_map_file,
+    pickled_grasps,
+    picture,
+    record_schema,
+    trajectory_file,
+)
 from .mutation import TEXTS, VALUES, Rng, pick, spoil_text
 from .originals import COMMAND, SHAPES, URDF
 from .outcomes import Trial, WrongAnswerError
@@ -263,4 +273,12 @@ KINDS: dict[Maker, int] = {
     shape_value: 5,
     posture_value: 3,
     command_line: 6,
+    pickled_grasps: 6,
+    grasps_in_yaml: 4,
+    array_of_poses: 4,
+    trajectory_file: 4,
+    joint_map_file: 3,
+    included_model: 3,
+    picture: 3,
+    record_schema: 3,
 }

@@ -114,7 +114,7 @@ def test_bad_input_is_named():
 def test_real_hands_are_free_of_a_real_object_by_an_independent_engine(shared_data, model):
     import fcl
 
-    from clench.grasp.depths import link_meshes
+    from clench.models.hand.link_mesh import link_meshes
 
     hand = Hand.load(shared_data / "hands" / model)
     obj = GraspObject.load(shared_data / "objects" / "ycb_mug" / "textured.obj")

@@ -8,10 +8,10 @@ from chain_hands import HandBuilder, along_x, mount
 from clench.base.pose import Pose
 from clench.grasp.containment import contained_link, link_within_link
 from clench.grasp.exact import hand_bodies
-from clench.grasp.parts import part_points
 from clench.grasp.scene import pack_object
 from clench.kernels.tree import build_tree
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.parts import part_points
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 SPHERE = (0.002, 0.0, 0.0)

@@ -5,9 +5,10 @@ import pytest
 from block_hands import block_hand
 
 from clench.base.pose import Pose
-from clench.grasp.depths import hand_depths, is_closed, link_meshes, retreat_distance, travel_to_touch
+from clench.grasp.depths import hand_depths, retreat_distance, travel_to_touch
 from clench.grasp.scene import pack_object
-from clench.models.mesh import TriangleMesh
+from clench.models.hand.link_mesh import link_meshes
+from clench.models.mesh import TriangleMesh, is_closed
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import Shape, ShapeKind
 
@@ -98,3 +99,18 @@ def test_closed_is_told_from_open_and_inward():
     one_flipped = np.vstack([box.triangles[1:], box.triangles[:1, ::-1]])
     assert not is_closed(TriangleMesh(box.vertices, one_flipped))
     assert not is_closed(TriangleMesh(np.empty((0, 3)), np.empty((0, 3))))
+
+
+@pytest.mark.parametrize("kind", [ShapeKind.BOX, ShapeKind.SPHERE])
+@pytest.mark.parametrize("size", [1.0, 30.0])
+def test_a_link_far_inside_is_as_deep_as_it_is_large(kind, size):
+    """An exact depth in a sphere of metres looked at each of its triangles for each point of the link."""
+    hand = block_hand()
+    inside = pack_object(GraspObject("big", (Body("big", (Shape(kind, (size, size, size)),)),)))
+    for found, mesh in zip(hand_depths(hand, OPEN, inside, at()), link_meshes(hand), strict=True):
+        assert found.depth == 2.0 * mesh.radius
+        assert found.at_least
+        assert np.linalg.norm(found.place) < size - found.depth
+    assert found.text == f"by at least {found.depth * 1e3:.2f} mm"
+    across = hand_depths(hand, OPEN, inside, at(z=size + 0.003))
+    assert not any(found.at_least for found in across)

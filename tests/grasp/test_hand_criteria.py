@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
+from clench.base.defaults import FRICTION
 from clench.base.pose import Pose
 from clench.grasp import criterion_registry
 from clench.grasp.calibration import Calibration
@@ -129,7 +130,7 @@ def test_the_least_torque_agrees_with_statics(chosen):
     sets, setting = held_ball(chosen, pincer())
     below, above = (next(t for t in c.holding) for c in sorted(sets, key=lambda c: c.holding[0].position[2]))
     found = score("actuation_force", sets, setting)
-    # Planar statics: forces (x, z) at both contacts inside cones of 0.5, and a fine grid over the one that is free.
+    # Planar statics: forces (x, z) at both contacts inside the cones, and a fine grid over the one that is free.
     points = np.array([below.position, above.position])[:, [0, 2]]
     normals = -np.array([below.normal, above.normal])[:, [0, 2]]
     tangents = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
@@ -139,7 +140,7 @@ def test_the_least_torque_agrees_with_statics(chosen):
     rows = np.column_stack([columns, moments[:, 1] * columns[:, 0] - moments[:, 0] * columns[:, 1]])
     base = np.linalg.lstsq(rows.T, np.array([0.0, 1.0, 0.0]), rcond=None)[0]
     f = base + np.linspace(-50.0, 50.0, 400001)[:, None] * np.linalg.svd(rows.T)[2][-1]
-    f = f[(np.abs(f[:, [1, 3]]) <= 0.5 * f[:, [0, 2]]).all(axis=1)]
+    f = f[(np.abs(f[:, [1, 3]]) <= FRICTION * f[:, [0, 2]]).all(axis=1)]
     forces = f[:, [0, 2], None] * normals + f[:, [1, 3], None] * tangents
     arms = points - anchors
     torques = arms[:, 1] * forces[:, :, 0] - arms[:, 0] * forces[:, :, 1]
@@ -171,7 +172,7 @@ def wrench_hull_torque(sets, setting, load, edges=64):
             side = np.cross(n, [0.3, 0.5, 0.8])
             side /= np.linalg.norm(side)
             for angle in np.linspace(0.0, 2.0 * np.pi, edges, endpoint=False):
-                f = n + 0.5 * (np.cos(angle) * side + np.sin(angle) * np.cross(n, side))
+                f = n + FRICTION * (np.cos(angle) * side + np.sin(angle) * np.cross(n, side))
                 arm = np.asarray(t.position) - center
                 wrenches.append(np.concatenate([f, np.cross(arm, f)]))
                 torques.append(moved @ f)

@@ -9,11 +9,13 @@ import pytest
 from block_hands import block_hand
 
 import clench
+from clench.base.errors import CommandError
 from clench.base.pose import Pose
-from clench.grasp.scene import KEPT_OBJECTS, ROUND_KINDS, hash_hand, pack_object, shape_mesh, tessellation_deviation
+from clench.grasp.scene import OBJECT_CACHE, ROUND_KINDS, hash_hand, pack_object, packed_size
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
+from clench.models.tessellation import shape_mesh, tessellation_deviation
 
 ROUND = {
     ShapeKind.SPHERE: (0.03, 0.0, 0.0),
@@ -165,14 +167,60 @@ def test_object_of_round_shapes_only_has_no_triangles_but_a_full_tree():
     np.testing.assert_allclose(packed.center, 0.0, atol=1e-12)
 
 
-def test_only_a_few_objects_stay_packed():
-    """A program that goes through many objects holds a few of them: one of a million triangles takes a gigabyte."""
+@pytest.fixture
+def cache():
+    """Give the memory of packed objects back its size."""
+    yield clench.set_object_cache
+    clench.set_object_cache(OBJECT_CACHE)
+
+
+def packed_once_solved(number):
+    """Solve with a few boxes in turn; return a function that tells which of them are still packed."""
     packed = []
-    for k in range(3 * KEPT_OBJECTS):
+    for k in range(number):
         obj = GraspObject.load(f"box:x=0.0{k + 1},y=0.02,z=0.02")
         command = clench.GraspCommand(hand_pose=Pose([0, 0, -0.3]), full_width=False, planes=1)
         clench.solve(block_hand(), obj, command)
         packed.append(weakref.ref(pack_object(obj)))
-    del obj
-    gc.collect()
-    assert sum(found() is not None for found in packed) <= KEPT_OBJECTS
+
+    def there():
+        gc.collect()
+        return [k for k, found in enumerate(packed) if found() is not None]
+
+    return there
+
+
+def test_objects_stay_packed_within_their_memory(cache):
+    """A program that goes through many objects holds as many as fit: a million triangles take 0.2 GB."""
+    size = packed_size(pack_object(GraspObject.load("box:x=0.01,y=0.02,z=0.02")))
+    cache(0)
+    cache(5 * size)
+    there = packed_once_solved(12)
+    assert there() == [7, 8, 9, 10, 11]
+    cache(2 * size)
+    assert there() == [10, 11]
+    cache(0)
+    assert there() == [11]
+
+
+def test_what_is_used_again_stays_packed(cache):
+    first = GraspObject.load("box:x=0.05,y=0.02,z=0.02")
+    cache(0)
+    cache(3 * packed_size(pack_object(first)))
+    kept = pack_object(first)
+    for k in range(6):
+        pack_object(GraspObject.load(f"box:x=0.0{k + 1},y=0.03,z=0.03"))
+        assert pack_object(first) is kept
+
+
+@pytest.mark.parametrize("size", [-1, 0.5, True, "1 GB", None])
+def test_a_cache_of_no_size_is_refused(size):
+    with pytest.raises(CommandError, match="set_object_cache: expected a whole number of bytes"):
+        clench.set_object_cache(size)
+
+
+def test_forty_objects_stay_packed():
+    objects = [GraspObject.load("mug", scale=1.0 + 0.01 * k) for k in range(40)]
+    packed = [pack_object(obj) for obj in objects]
+    assert [pack_object(obj) for obj in objects] == packed
+    assert sum(map(packed_size, packed)) < OBJECT_CACHE

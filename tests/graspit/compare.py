@@ -69,7 +69,7 @@ def load_hand(folder: Path) -> Hand:
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch) / "hand.toml"
         file.write_text(f'collision_source = "raw"\nallowed_pairs = [{pairs}]\n')
-        return clench.Hand.load(folder / "DLR.urdf", hand_file=file)
+        return clench.Hand.load(folder / f"{folder.name}.urdf", hand_file=file)
 
 
 def read_cases(name: str, limit: int | None = None) -> Iterator[dict[str, Any]]:
@@ -89,7 +89,7 @@ class Comparison:
         self.obj = clench.GraspObject.load(SHARED / "objects" / f"{name}.obj")
         self.object = [fcl.CollisionObject(_tree(s)) for body in self.obj.bodies for s in body.shapes]
         self.links = [[_tree(s) for s in link.shapes.get(hand.default_source, ())] for link in hand.links]
-        self.free = set(map(frozenset, hand.allowed_pairs))
+        self.free = set(map(frozenset, hand.allowed_pairs_for(hand.default_source)))
 
     def compare(self, case: dict[str, Any]) -> list[Compared]:
         """Close the hand as in a case and explain every finger."""

@@ -13,12 +13,12 @@ from clench.kernels.tree import STACK_SIZE, build_tree, feature_owners
 from clench.models.mesh import TriangleMesh
 
 
-def depth_of(link, obj, T, *, closed=True):
+def depth_of(link, obj, T, *, closed=True, limit=np.inf):
     one, two = build_tree(link.vertices, link.triangles), build_tree(obj.vertices, obj.triangles)
     forth, back = np.ascontiguousarray(T[:3]), np.ascontiguousarray(np.linalg.inv(T)[:3])
     scratch = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
     depth, *place = penetration(
-        one, feature_owners(one), closed, two, feature_owners(two), closed, forth, back, *scratch
+        one, feature_owners(one), closed, two, feature_owners(two), closed, forth, back, limit, *scratch
     )
     return depth, np.array(place)
 
@@ -139,3 +139,14 @@ def test_disjoint_and_empty_have_none():
     assert depth_of(box(1, 1, 1), box(1, 1, 1), shift(5.0))[0] == 0.0
     assert depth_of(nothing, box(1, 1, 1), shift(0.0))[0] == 0.0
     assert depth_of(box(1, 1, 1), nothing, shift(0.0))[0] == 0.0
+
+
+@pytest.mark.parametrize("side", [0.1, 3.0])
+def test_no_depth_is_larger_than_its_limit(side):
+    deep, _ = depth_of(box(side, side, side), box(8, 8, 8), shift(0.3))
+    for limit in (0.01, 0.5 * deep):
+        depth, place = depth_of(box(side, side, side), box(8, 8, 8), shift(0.3), limit=limit)
+        assert depth == limit
+        solid = build_tree(box(8, 8, 8).vertices, box(8, 8, 8).triangles)
+        assert signed_distance(solid, place, True) <= -limit
+    assert depth_of(box(side, side, side), box(8, 8, 8), shift(0.3), limit=1.01 * deep)[0] == deep

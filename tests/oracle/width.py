@@ -110,6 +110,7 @@ class Oracle:
         self.hand, self.place = case.hand, case.place.matrix
         self.objects = [core_of(s) for body in case.obj.bodies for s in body.shapes]
         self.links = [[core_of(s) for s in link.shapes.get(CollisionSource.ENGINE, ())] for link in case.hand.links]
+        self.allowed = case.hand.allowed_pairs_for(CollisionSource.ENGINE)
         self.looks = 0
 
     def gap(self, q: Floats, moving: set[int]) -> float:
@@ -121,7 +122,7 @@ class Oracle:
             for core in self.links[m]:
                 pairs += [(core, poses[m], o, self.place) for o in self.objects]
                 for r in range(len(self.hand.links)):
-                    if r != m and (min(m, r), max(m, r)) not in self.hand.allowed_pairs:
+                    if r != m and (min(m, r), max(m, r)) not in self.allowed:
                         pairs += [(core, poses[m], other, poses[r]) for other in self.links[r]]
         return least_gap(pairs)
 

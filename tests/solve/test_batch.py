@@ -242,3 +242,15 @@ def test_every_shipped_form_of_hand_is_packed_once(monkeypatch: pytest.MonkeyPat
     command = clench.GraspCommand(hand_pose=far[0], planes=1, full_width=False)
     clench.solve_batch(hand, obj, far, command, preshapes={yaw: [0.0, 0.01] * 3})
     assert len(made) == 2
+
+
+def test_vectors_are_turned_with_the_same_bits_alone_and_together() -> None:
+    from clench.solve.batch_solver import rotations, turned
+
+    rng = np.random.default_rng(0)
+    rows, vectors = rng.normal(size=(200, 7)), rng.normal(size=(200, 3))
+    rows[:, :4] /= np.linalg.norm(rows[:, :4], axis=1)[:, None]
+    together = turned(rotations(rows), vectors)
+    np.testing.assert_allclose(together, np.einsum("cij,cj->ci", rotations(rows), vectors), rtol=0.0, atol=1e-14)
+    alone = [turned(rotations(rows[k : k + 1]), vectors[k : k + 1])[0] for k in range(200)]
+    np.testing.assert_array_equal(together, alone)

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from clench.base.errors import ClenchError, FileError
 from clench.base.json_files import write_atomically
 from clench.base.pose import Pose
+from clench.models.hand.extremes import LARGEST_ANGLE
 from clench.solve.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
 from handmade import make_candidate, make_contact, make_solution
 
@@ -59,8 +60,9 @@ def test_round_trip_keeps_every_bit(number: float, vector: list[float], text: st
     norm = float(np.linalg.norm(quaternion))
     pose = Pose(vector, wxyz=np.array(quaternion) / norm if norm > 1e-3 else (1, 0, 0, 0))
     contact = make_contact(position=np.array(vector), gap=number, link=text)
+    angles = {text: float(np.clip(number, -LARGEST_ANGLE, LARGEST_ANGLE))}
     solution = make_solution(
-        hand_pose=pose, object_pose=pose.inverse(), joint_angles={text: number}, contacts=(contact,), hand=text
+        hand_pose=pose, object_pose=pose.inverse(), joint_angles=angles, contacts=(contact,), hand=text
     )
     again = GraspSolution.from_dict(json.loads(json.dumps(solution.to_dict())))
     assert again == solution

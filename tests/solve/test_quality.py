@@ -159,7 +159,7 @@ def test_no_contacts_are_an_answer_not_an_error(grip) -> None:
     assert (quality.epsilon.radius, quality.volume, quality.force_closure) == (0.0, 0.0, False)
     assert quality.effort.reason == "Nothing touches the object."
     plan = clench.plan_squeeze(nothing, hand, ball)
-    assert plan.text == "No squeeze holds 0.2 kg under gravity. Nothing touches the object."
+    assert plan.text == "No squeeze holds 0.1 kg under gravity. Nothing touches the object."
     assert json.loads(json.dumps(plan.to_dict()))["forces"] == []
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+import tempfile
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,7 +137,7 @@ def test_damaged_document(tmp_path: Path) -> None:
     raw.execute("UPDATE solves SET document = substr(document, 1, 100)")
     raw.commit()
     raw.close()
-    with Record(path) as record, pytest.raises(FileError, match=r"r\.db, solve 1: the document is damaged"):
+    with Record(path) as record, pytest.raises(FileError, match=r"r\.db, solve 1: not JSON"):
         record.read(entry_id)
 
 
@@ -188,3 +191,68 @@ def test_a_seed_that_the_file_cannot_hold_is_said(tmp_path):
 def test_a_path_that_is_none_is_said(tmp_path):
     with pytest.raises(FileError, match="the record cannot hold this"):
         Record(f"{tmp_path}/a\0b.sqlite")
+
+
+def as_another_user(work: Callable[[], str]) -> str:
+    """Return what work says in a process that may not write everywhere, as root may."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            if os.getuid() == 0:
+                os.setgid(65534)
+                os.setuid(65534)
+            os.write(writer, work().encode())
+        except BaseException as error:
+            os.write(writer, f"{type(error).__name__}: {error}".encode())
+        os._exit(0)
+    os.close(writer)
+    os.waitpid(child, 0)
+    with os.fdopen(reader) as said:
+        return said.read()
+
+
+def test_a_record_in_a_folder_that_is_read_only_is_listed() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with Record(folder / "r.db") as record:
+            record.extend([make_solution(), make_solution()])
+            record.note_outcome(1, held=True)
+        (folder / "r.db").chmod(0o444)
+        folder.chmod(0o555)
+
+        def work() -> str:
+            with Record(folder / "r.db") as record:
+                found = [len(record), len(record.find()), record.outcomes(), record.read(2) == make_solution()]
+                with pytest.raises(
+                    FileError, match="the record cannot be written: the file or its folder is read only"
+                ):
+                    record.append(make_solution())
+                return str(found)
+
+        assert as_another_user(work) == "[2, 2, [(1, True)], True]"
+        assert [p.name for p in folder.iterdir()] == ["r.db"]
+        folder.chmod(0o755)
+
+
+@pytest.mark.parametrize(
+    ("statement", "what"),
+    [
+        ("CREATE TRIGGER t BEFORE INSERT ON solves BEGIN SELECT RAISE(IGNORE); END", "trigger 't'"),
+        ("CREATE INDEX i ON outcomes (abs(held))", "index 'i'"),
+        ("ALTER TABLE solves ADD COLUMN x AS (1)", "table 'solves'"),
+    ],
+)
+def test_tables_that_only_look_like_ours(statement: str, what: str, tmp_path: Path) -> None:
+    with Record(tmp_path / "r.db") as record:
+        record.append(make_solution())
+    raw = sqlite3.connect(tmp_path / "r.db")
+    raw.execute("CREATE TABLE notes (text)")
+    raw.commit()
+    with Record(tmp_path / "r.db") as record:
+        assert len(record) == 1
+    raw.execute(statement)
+    raw.commit()
+    raw.close()
+    with pytest.raises(FileError, match=f"it has the {what}, which clench never makes"):
+        Record(tmp_path / "r.db")

@@ -8,6 +8,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from .visible_text import visible
+
 #: Longest message; what is longer has a name or a list in it that nobody reads.
 _LONGEST = 2000
 
@@ -24,7 +26,7 @@ class ClenchError(ValueError):
 
 
 def _printable(text: str) -> str:
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    line = visible(" ".join(text.split()))
     half = _LONGEST // 2
     return line if len(line) <= _LONGEST else f"{line[:half]} ... {line[-half:]}"
 

@@ -9,23 +9,31 @@ from pathlib import Path
 from .errors import FileError
 
 
-def read_file(path: str | Path, missing: str = "no such file.") -> bytes:
+def read_file(path: str | Path, most: int, missing: str = "no such file.") -> bytes:
     """Return what a file has.
 
     Args:
-        path: the file. missing: what to say where there is none.
+        path: the file. most: the largest size that is read [bytes], see `file_limits`.
+        missing: what to say where there is no file.
 
     Raises:
-        FileError: missing, a folder, a pipe or a device, or unreadable.
+        FileError: missing, a folder, a pipe or a device, too large, or unreadable.
     """
     try:
-        mode = os.stat(path).st_mode
+        state = os.stat(path)
+        mode = state.st_mode
         if stat.S_ISDIR(mode):
             raise FileError(path, "cannot be read: it is a folder, expected a file.")
         if not stat.S_ISREG(mode):
             # Reading a pipe or a device may never end.
             raise FileError(path, "cannot be read: it is a pipe or a device, expected a file.")
-        return Path(path).read_bytes()
+        if state.st_size > most:
+            raise FileError(path, _too_large(state.st_size, most))
+        with open(path, "rb") as file:
+            data = file.read(most + 1)  # a file may grow while it is read
+        if len(data) > most:
+            raise FileError(path, _too_large(len(data), most))
+        return data
     except FileNotFoundError:
         raise FileError(path, missing) from None
     except OSError as error:
@@ -44,13 +52,17 @@ def expanded(path: str | Path) -> Path:
         return Path(path)
 
 
-def read_text(path: str | Path, missing: str = "no such file.") -> str:
+def read_text(path: str | Path, most: int, missing: str = "no such file.") -> str:
     """Return the text of a file in UTF-8; see `read_file`.
 
     Raises:
         FileError: as `read_file`, or not UTF-8.
     """
     try:
-        return read_file(path, missing).decode("utf-8-sig")
+        return read_file(path, most, missing).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FileError(path, f"not text in UTF-8 ({error.reason} at byte {error.start}).") from None
+
+
+def _too_large(size: int, most: int) -> str:
+    return f"is too large: it has {size / 2**20:.4g} MB; expected up to {most / 2**20:.4g} MB (docs/security.md)."

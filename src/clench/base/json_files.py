@@ -5,27 +5,30 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
+import secrets
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from .errors import ClenchError, FileError
+from .file_limits import JSON_BYTES
 from .files import read_file
+from .nesting import TOO_DEEP, is_too_deep
 
 
-def non_finite_path(value: Any, key: str = "") -> str | None:
-    """Return the path of the first number that is NaN or infinite, or None."""
-    if isinstance(value, float):
-        return None if math.isfinite(value) else key
-    if isinstance(value, dict):
-        found = (non_finite_path(v, f"{key}.{k}" if key else str(k)) for k, v in value.items())
-    elif isinstance(value, list):
-        found = (non_finite_path(v, f"{key}[{i}]") for i, v in enumerate(value))
-    else:
-        return None
-    return next((f for f in found if f is not None), None)
+def non_finite_path(value: Any) -> str | None:
+    """Return the path of the first number that is NaN or infinite, or None; lists may be nested however deep."""
+    waiting: list[tuple[Any, str]] = [(value, "")]
+    while waiting:
+        part, key = waiting.pop()
+        if isinstance(part, float) and not math.isfinite(part):
+            return key
+        if isinstance(part, dict):
+            waiting.extend((v, f"{key}.{k}" if key else str(k)) for k, v in reversed(part.items()))
+        elif isinstance(part, list):
+            waiting.extend((v, f"{key}[{i}]") for i, v in reversed([*enumerate(part)]))
+    return None
 
 
 def encode_document(document: dict[str, Any], name: str) -> bytes:
@@ -45,12 +48,26 @@ def read_json(path: str | Path) -> Any:
     """Read a JSON file.
 
     Raises:
-        FileError: missing, unreadable or not JSON.
+        FileError: missing, unreadable, too large, or not JSON.
+    """
+    return parse_json(read_file(path, JSON_BYTES), path)
+
+
+def parse_json(data: bytes, source: str | Path) -> Any:
+    """Return what JSON says; `source` names it in messages.
+
+    Raises:
+        FileError: not JSON, or nested too deeply.
     """
     try:
-        return msgspec.json.decode(read_file(path))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileError(path, f"not JSON ({error}).") from None
+        value = msgspec.json.decode(data)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise FileError(source, f"not JSON ({error}).") from None
+    except RecursionError:
+        raise FileError(source, f"not JSON that can be read: {TOO_DEEP}.") from None
+    if is_too_deep(value):
+        raise FileError(source, f"not JSON that can be read: {TOO_DEEP}.")
+    return value
 
 
 def write_json(path: str | Path, document: dict[str, Any], name: str) -> None:
@@ -63,16 +80,48 @@ def write_json(path: str | Path, document: dict[str, Any], name: str) -> None:
 
 
 def check_writable(path: str | Path) -> None:
-    """Refuse, before work is done whose result it shall hold, a file that is a folder or whose folder is missing.
+    """Refuse a file that cannot be written, before the work is done whose result it shall hold; leave nothing behind.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: it is a folder, a pipe or a device, its folder is missing, or nothing can be written there.
     """
     target = Path(path)
-    if not target.parent.is_dir():
-        raise FileError(path, f"cannot be written (no folder '{target.parent}').")
-    if target.is_dir():
-        raise FileError(path, "cannot be written (it is a folder).")
+    try:
+        if target.is_dir():
+            raise FileError(path, "cannot be written (it is a folder).")
+        if target.exists() and not target.is_file():
+            raise FileError(path, "cannot be written (it is a pipe or a device, expected a file).")
+        if not target.parent.is_dir():
+            raise FileError(path, f"cannot be written (no folder '{target.parent}').")
+        descriptor, temporary = _temporary(target)
+        os.close(descriptor)
+        temporary.unlink()
+    except FileError:
+        raise
+    except ValueError as error:
+        raise FileError(path, f"is no path of a file ({error}).") from None
+    except OSError as error:
+        raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
+
+
+def check_folder(path: str | Path) -> None:
+    """Refuse a folder that files cannot be written to, before the work is done; a missing one is not made yet.
+
+    Raises:
+        FileError: it is a file, or nothing can be written in it, or in the folder that it would be made in.
+    """
+    folder = Path(path)
+    if "\0" in str(folder):
+        raise FileError(path, "is no path of a folder (embedded null byte).")
+    try:
+        there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+        if not there.is_dir():
+            raise FileError(path, f"cannot be made a folder ('{there}' is a file).")
+        descriptor, temporary = _temporary(there / "clench")
+        os.close(descriptor)
+        temporary.unlink()
+    except OSError as error:
+        raise FileError(path, f"cannot be written to ({error.strerror or error}).") from None
 
 
 def write_atomically(path: str | Path, content: bytes) -> None:
@@ -82,24 +131,27 @@ def write_atomically(path: str | Path, content: bytes) -> None:
         FileError: the file cannot be written.
     """
     target = Path(path)
-    temporary: str | None = None
+    temporary: Path | None = None
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-        with os.fdopen(handle, "wb") as file:
+        descriptor, temporary = _temporary(target)
+        with os.fdopen(descriptor, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
+        temporary.replace(target)
     except ValueError as error:
         raise FileError(path, f"is no path of a file ({error}).") from None
     except OSError as error:
         if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _temporary(target: Path) -> tuple[int, Path]:
+    """Make a new file beside a file to come; return its descriptor and path.
+
+    The system takes off the permissions that the umask names: to ask for the umask would change it for other threads.
+    """
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    return os.open(temporary, flags, 0o666), temporary

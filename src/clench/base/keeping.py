@@ -1,13 +1,16 @@
-"""Keep what a function found for arguments that are costly to compare or to hash: they are known by identity."""
+"""Keep what was found: by identity where arguments are costly to compare, and no more than a number of bytes."""
 
 from __future__ import annotations
 
+import weakref
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from threading import Lock
+from typing import Generic, ParamSpec, TypeVar
 
 Found = TypeVar("Found")
+Argument = TypeVar("Argument")
 Arguments = ParamSpec("Arguments")
 
 
@@ -41,3 +44,74 @@ def kept_by_identity(size: int) -> Callable[[Callable[Arguments, Found]], Callab
         return look_up
 
     return decorate
+
+
+def kept_while_alive(function: Callable[[Argument], Found]) -> Callable[[Argument], Found]:
+    """Return a function that computes once per argument, and forgets the result when the argument is freed.
+
+    The argument is known by identity and must not change. The result must not refer to it, or neither is ever freed.
+    """
+    kept: dict[int, tuple[weakref.ref[Argument], Found]] = {}
+
+    @wraps(function)
+    def look_up(argument: Argument) -> Found:
+        key = id(argument)
+        entry = kept.get(key)
+        if entry is not None and entry[0]() is argument:
+            return entry[1]
+
+        def forget(freed: weakref.ref[Argument]) -> None:
+            # Another object may have the same address by now.
+            if (entry := kept.get(key)) is not None and entry[0] is freed:
+                kept.pop(key, None)
+
+        found = function(argument)
+        kept[key] = (weakref.ref(argument, forget), found)
+        return found
+
+    return look_up
+
+
+class KeptBySize(Generic[Found]):
+    """Keep what was found for keys, as much of it as fits into a number of bytes; what was asked for last stays.
+
+    Threads may share it. The latest stays however large it is.
+
+    Args:
+        limit: [bytes]. measure: returns the size of what was found [bytes].
+    """
+
+    def __init__(self, limit: int, measure: Callable[[Found], int]) -> None:
+        self.limit = limit
+        self._measure = measure
+        self._kept: OrderedDict[Hashable, tuple[Found, int]] = OrderedDict()
+        self._lock = Lock()
+        self.size = 0
+
+    def get(self, key: Hashable, make: Callable[[], Found]) -> Found:
+        """Return what is kept for a key, or make and keep it."""
+        with self._lock:
+            entry = self._kept.get(key)
+            if entry is not None:
+                self._kept.move_to_end(key)
+                return entry[0]
+        made = make()
+        size = self._measure(made)
+        with self._lock:
+            # Another thread may have made it in the meantime.
+            found, size = self._kept.setdefault(key, (made, size))
+            if found is made:
+                self.size += size
+            self._shrink()
+        return found
+
+    def resize(self, limit: int) -> None:
+        """Set the limit [bytes], and forget what no longer fits."""
+        with self._lock:
+            self.limit = limit
+            self._shrink()
+
+    def _shrink(self) -> None:
+        while self.size > self.limit and len(self._kept) > 1:
+            _, (_, size) = self._kept.popitem(last=False)
+            self.size -= size

@@ -6,6 +6,9 @@ import math
 from numbers import Real
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 def is_finite_number(value: Any) -> bool:
     """Say whether a value is a number that a double holds; true and false are none, nor are whole numbers too large."""
@@ -13,3 +16,15 @@ def is_finite_number(value: Any) -> bool:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(float(value))
     except OverflowError:
         return False
+
+
+def real_array(values: Any) -> NDArray[np.float64] | None:
+    """Return values as an array of float64, the same one where they are that.
+
+    None: they are no real numbers, but text, true and false, or complex numbers.
+    """
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return array.astype(np.float64, copy=False) if array.dtype.kind in "iuf" else None

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import CommandError
+from .numbers import real_array
 from .tolerances import LARGEST_LENGTH, QUATERNION_NORM
 
 FloatArray = NDArray[np.float64]
@@ -188,12 +189,11 @@ def checked_vector(value: ArrayLike | Sequence[object], length: int, key: str, e
     Raises:
         CommandError: something else.
     """
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise CommandError(f"{key}: expected {expected}, got {value!r}.") from None
+    array = real_array(value)
+    if array is None:
+        raise CommandError(f"{key}: expected {expected}, got {value!r}.")
     if array.shape != (length,):
         raise CommandError(f"{key}: expected {length} numbers {expected}, got {value!r}.")
     if not np.isfinite(array).all():
         raise CommandError(f"{key}: expected finite numbers {expected}, got {array.tolist()}.")
-    return array
+    return array.copy()

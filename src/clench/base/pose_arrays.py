@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import CommandError
+from .numbers import real_array
 from .pose import FloatArray, Pose, quaternions_from_rotations
 from .tolerances import LARGEST_LENGTH, QUATERNION_NORM
 
@@ -32,18 +33,17 @@ def pose_rows(poses: Sequence[Pose] | ArrayLike, key: str) -> FloatArray:
     given = list(poses) if isinstance(poses, Sequence) else []
     if given and all(isinstance(pose, Pose) for pose in given):
         return np.array([pose.wxyz_xyz for pose in given])
-    try:
-        array = np.array(poses, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise CommandError(f"{key}: {_EXPECTED}.") from None
-    if array.size == 0 and array.ndim <= 1:
+    array = real_array(poses)
+    if array is None:
+        raise CommandError(f"{key}: {_EXPECTED}, of real numbers.")
+    if array.size == 0 and array.ndim == 1:
         return np.empty((0, 7))
     if array.shape[1:] not in ((7,), (4, 4)):
         raise CommandError(f"{key}: {_EXPECTED}, got shape {array.shape}.")
-    bad = ~np.isfinite(array).reshape(len(array), -1).all(axis=1)
+    bad = ~np.isfinite(array).all(axis=tuple(range(1, array.ndim)))
     if bad.any():
         raise CommandError(f"{key}[{int(bad.argmax())}]: expected finite numbers.")
-    return _checked_rows(array if array.ndim == 2 else _from_matrices(array, key), key)
+    return _checked_rows(array.copy() if array.ndim == 2 else _from_matrices(array, key), key)
 
 
 def _from_matrices(matrices: FloatArray, key: str) -> FloatArray:

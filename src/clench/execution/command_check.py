@@ -81,6 +81,10 @@ class CommandCheck:
         """
         for name, limits in self.limits.items():
             age = state.age([name])
+            if age < 0.0:
+                raise RefusedCommandError(
+                    f"The state of joint '{name}' is {age:.3g} s old, from the future; are its clock and ours the same?"
+                )
             if not age <= self.max_age:
                 raise RefusedCommandError(
                     f"The state of joint '{name}' is stale: {age:.2f} s old; at most {self.max_age:g} s is accepted."

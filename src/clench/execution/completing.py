@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from clench.base.defaults import MASS
 from clench.grasp.mechanics.contacts import ContactModel
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.quality import DEFAULT_MASS, grasp_quality
+from clench.solve.quality import grasp_quality
 from clench.solve.solution import GraspSolution
 from clench.solve.squeezing import plan_squeeze
 
@@ -20,8 +21,8 @@ def complete(
     hand: Hand,
     obj: GraspObject,
     *,
-    mass: float = DEFAULT_MASS,
-    friction: float | None = None,
+    mass: float | tuple[float, float] = MASS,
+    friction: float | tuple[float, float] | None = None,
     contact_model: ContactModel | str = ContactModel.POINT,
     clearance: float = CLEARANCE,
 ) -> GraspSolution:
@@ -32,7 +33,8 @@ def complete(
 
     Args:
         solution: the solution. hand, obj: what it was computed for.
-        mass: of the object [kg]. friction, contact_model: see `grasp_quality`. clearance: see `plan_pregrasp` [m].
+        mass: of the object [kg]; friction: of its contacts [-]: numbers or ranges, see `plan_squeeze`.
+        contact_model: see `grasp_quality`. clearance: see `plan_pregrasp` [m].
 
     Raises:
         CommandError: a value out of range; the solution is of another hand.

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
+import time
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -17,32 +16,26 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, check_tensions, command_limits, slowed_down
+from .driven_report import Done, report_on
 from .driven_squeeze import DrivenSqueeze, plan_driven_squeeze, squeeze_by_driver
 from .driven_steps import DrivenStep, go_to_steps, plan_driven_steps
-from .driver import DriverError, HandDriver, HandState, TendonDriver
-from .following import CLOSEST, Followed, Follower, TimedPlan
-from .history import ExecutionHistory
+from .driver import DriverError, HandDriver, HandState, RefusedCommandError, TendonDriver
+from .driver_line import CALL_LIMIT
+from .driver_session import STOP_TRIES, DriverSession
+from .following import CLOSEST, Follower, TimedPlan
+from .halting import halt
+from .history import CommandsSent
 from .joint_map import JointMap, MappedJoint
-from .report import ExecutionReport, JointReached, NextStepReached, judge_steps, notes_on_steps
+from .report import ExecutionReport
+from .supervision import Event, ExecutionRefusedError, State, Supervision, supervision_of
 from .trajectory import Trajectory
 
+#: How often a stop looks whether a command on its way has arrived [s].
+WAITING = 0.005
+#: How often the end of an execution is tried when it is interrupted.
+ENDINGS = 5
 #: Points of the way from where the hand is found to the trajectory's start.
 WAY_POINTS = 9
-
-
-@dataclass
-class _Done:
-    """Collect what a hand has done: the way to the start [rad], the path, the squeeze, the tendons, the next steps."""
-
-    way: float
-    squeeze: DrivenSqueeze
-    followed: Followed = field(default_factory=Followed)
-    squeezed: Followed = field(default_factory=Followed)
-    pulled: str = ""
-    stepped: list[tuple[NextStepReached, Followed]] = field(default_factory=list)
-
-    def untroubled(self) -> bool:
-        return self.followed.trouble is None and self.squeezed.trouble is None
 
 
 class DrivenHand:
@@ -50,7 +43,8 @@ class DrivenHand:
 
     The hand moves in a straight line from where it is found to the trajectory's start, then along the trajectory. The
     controller is told the next 0.3 s at a time, so that a cut connection stops the hand. On any trouble the hand
-    is stopped and the report says why. Without sensors of touch the report compares joint angles only.
+    is stopped and the report says why. A stop stays in force until `release_stop`, for everybody who uses this driver.
+    The driver is called from a thread of its own. Without sensors of touch the report compares joint angles only.
 
     Args:
         hand: the model. driver: talks to the controller. joint_map: the controller's names and units.
@@ -84,7 +78,7 @@ class DrivenHand:
         if not (np.isfinite(squeeze) and squeeze >= 0.0):
             raise CommandError(f"squeeze: expected a finite number of at least 0, got {squeeze!r}.")
         self._hand = hand
-        self.driver = driver
+        self._driver = driver
         self.joint_map = joint_map or JointMap()
         self.obj = obj
         self.angle_tolerance = angle_tolerance
@@ -94,7 +88,8 @@ class DrivenHand:
         self.settling = settling
         self.squeeze = squeeze
         self.stay_connected = stay_connected
-        self._stopping = threading.Event()
+        self._last_report: ExecutionReport | None = None
+        supervision_of(driver)
 
     @property
     def hand(self) -> Hand:
@@ -102,59 +97,178 @@ class DrivenHand:
         return self._hand
 
     @property
+    def driver(self) -> HandDriver:
+        """What talks to the controller."""
+        return self._driver
+
+    @property
     def name(self) -> str:
         """Name of the driver."""
         return self.driver.name
 
+    @property
+    def supervision(self) -> Supervision:
+        """State and stop of this hand, which all who use the same driver share."""
+        return supervision_of(self.driver)
+
+    @property
+    def state(self) -> State:
+        """What the hand is doing."""
+        return self.supervision.state
+
+    @property
+    def last_report(self) -> ExecutionReport | None:
+        """The report on the last execution, also when it ended with an exception such as Ctrl-C; None before."""
+        return self._last_report
+
     def stop(self) -> None:
-        """Stop the hand now, from any thread; an execution that is under way ends and says so."""
-        self._stopping.set()
-        self.driver.stop()
+        """Stop the hand now, from any thread or signal handler; no command is sent until `release_stop`.
+
+        An execution that is under way ends and says so.
+
+        Raises:
+            DriverError: the driver failed twice to tell the hand. The stop is in force all the same.
+        """
+        supervision = self.supervision
+        supervision.stop()
+        self._tell_stop()
+        until = time.monotonic() + CALL_LIMIT
+        if supervision.sender not in (None, threading.get_ident()):
+            # A command was on its way, and may have come after the stop.
+            while supervision.sender is not None and time.monotonic() < until:
+                time.sleep(WAITING)
+            self._tell_stop()
+
+    def release_stop(self) -> None:
+        """Release the stop, once it is safe to move, so that solutions are carried out again.
+
+        Raises:
+            DriverError: an execution is still ending, or the driver has not returned from a call.
+        """
+        self.supervision.release()
 
     def carry_out(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
         """Connect, move to the trajectory's start, follow it, and compare the angles reached with those computed.
 
+        Nothing is sent, and the report says why, when a stop is in force or the driver is in use.
+
         Raises:
             CommandError: the solution or the joint map does not fit the hand. UnknownNameError: the controller lacks
-                a joint.
+                a joint. KeyboardInterrupt: and whatever else is no error of the driver; the hand was stopped before,
+                and `last_report` says what was sent.
         """
-        mapped = self.joint_map.of(self.hand)
-        computed = posture(solution.joint_angles, self.hand, "joint_angles")
-        self._stopping.clear()
+        done = Done(self.joint_map.of(self.hand))
+        posture(solution.joint_angles, self.hand, "joint_angles")
+        session = DriverSession(self.driver)
+        raised: BaseException | None = None
         try:
-            self.driver.connect(self.connect_timeout)
-            self._check_joints(mapped)
-            check = CommandCheck(
-                command_limits(self.hand, mapped, self.driver.limits), self.max_age, self.max_deviation
-            )
-            state = self.driver.read()
-            check.state(state)
-            plan, way = self._plan(trajectory, mapped, check, state)
-            check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
-            squeeze = plan_driven_squeeze(solution, self.hand, mapped, check, self.squeeze)
-            steps = self._steps(solution, trajectory, squeeze, mapped, check)
-            done = _Done(way, squeeze)
-            arrived = {joint.name: 0.2 * self.angle_tolerance * abs(joint.scale) for joint in mapped.values()}
-            done.followed = Follower(self.driver, check, self._stopping, self.settling, arrived).follow(plan)
-            if done.followed.trouble is None:
-                done.squeezed = squeeze_by_driver(squeeze, self.driver, mapped, check, self._stopping)
-            if done.untroubled():
-                done.pulled = self._pull(solution)
-                done.stepped = go_to_steps(
-                    steps, self.driver, mapped, check, self._stopping, self.settling, self.angle_tolerance
+            try:
+                session.begin()
+                self._last_report = None
+                self._move(session, solution, trajectory, done)
+            except ExecutionRefusedError as error:
+                return ExecutionReport(
+                    self.name, success=False, reason=f"Not carried out: {error}", sent=CommandsSent()
                 )
-        except DriverError as error:
-            return ExecutionReport(self.name, success=False, reason=f"Not carried out: {error}")
-        except ClenchError:
-            raise
-        except Exception as error:  # drivers are others' code
-            reason = f"Not carried out: The driver failed ({type(error).__name__}: {error})."
-            return ExecutionReport(self.name, success=False, reason=reason)
-        finally:
-            if not self.stay_connected:
-                with suppress(Exception):  # what the hand did is known, however the line closes
-                    self.driver.disconnect()
-        return self._report(solution, done, mapped, computed)
+            except BaseException as error:
+                raised = error
+            raised = self._conclude(session, solution, done, raised)
+        except BaseException as error:  # an interrupt before the end was taken care of
+            raised = self._conclude(session, solution, done, error)
+        if raised is not None and not isinstance(raised, DriverError):
+            raise raised
+        assert self._last_report is not None
+        return self._last_report
+
+    def _move(self, session: DriverSession, solution: GraspSolution, trajectory: Trajectory, done: Done) -> None:
+        """Plan, check and carry out; whatever goes wrong is raised."""
+        mapped = done.mapped
+        session.connect(self.connect_timeout)
+        self._check_joints(mapped, session.joints())
+        limits = command_limits(self.hand, mapped, session.limits())
+        done.check = check = CommandCheck(limits, self.max_age, self.max_deviation)
+        state = session.read()
+        check.state(state)
+        plan, done.way = self._plan(trajectory, mapped, check, state)
+        check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
+        done.squeeze = squeeze = plan_driven_squeeze(solution, self.hand, mapped, check, self.squeeze)
+        steps = self._steps(solution, trajectory, squeeze, mapped, check)
+        tensions = self._tensions(solution, done)
+        session.enter(Event.MOVE)
+        arrived = {joint.name: 0.2 * self.angle_tolerance * abs(joint.scale) for joint in mapped.values()}
+        Follower(session, check, self.settling, arrived).follow(plan, done.followed, Event.SETTLE)
+        squeeze_by_driver(squeeze, session, mapped, check, done.squeezed)
+        if tensions is not None:
+            session.enter(Event.PULL)
+            done.pulled = ""
+            session.pull(tensions)
+            done.pulled = f"The tendons were told the tensions of the squeeze plan, up to {tensions.max():.3g} N."
+        go_to_steps(steps, session, mapped, check, (self.settling, self.angle_tolerance), done.stepped)
+
+    def _conclude(
+        self, session: DriverSession, solution: GraspSolution, done: Done, raised: BaseException | None
+    ) -> BaseException | None:
+        """Stop the hand where it must be, let the driver go, report, and return what is to be raised.
+
+        An interrupt that comes meanwhile begins it again: it must not keep the hand from being stopped.
+        """
+        for _ in range(ENDINGS):
+            try:
+                self._halt(session, done, raised)
+                session.close(disconnect=not self.stay_connected)
+                # A stop that came since then was told by whoever stopped the hand.
+                done.trouble = done.trouble or session.supervision.cause
+                self._last_report = report_on(done, session.sent, solution, self.hand, self.name, self.angle_tolerance)
+            except BaseException as error:
+                raised = error
+            else:
+                return session.interrupt or raised
+        session.close(disconnect=False)
+        return raised
+
+    def _halt(self, session: DriverSession, done: Done, raised: BaseException | None) -> None:
+        supervision = session.supervision
+        if raised is not None and not done.trouble:
+            done.trouble = _trouble(raised)
+        interrupted = raised is not None and not isinstance(raised, Exception)
+        if interrupted:
+            supervision.stop(_trouble(raised))
+        elif raised is not None and (session.failed or session.sent.anything):
+            supervision.fault(done.trouble)
+        if supervision.cause and done.halted is None:
+            done.trouble = done.trouble or supervision.cause
+            done.during = supervision.doing
+            done.halted = halt(session, done.check, done.latest)
+
+    def _tell_stop(self) -> None:
+        """Call the driver's `stop`, once more when it fails."""
+        first: BaseException | None = None
+        for _ in range(STOP_TRIES):
+            try:
+                self.driver.stop()
+            except BaseException as error:
+                first = first or error
+            else:
+                if first is not None and not isinstance(first, Exception):
+                    raise first  # an interrupt
+                return
+        raise DriverError(
+            f"The hand could not be told to stop ({type(first).__name__}: {first}); no further command is sent."
+        ) from first
+
+    def _tensions(self, solution: GraspSolution, done: Done) -> FloatArray | None:
+        """Return the tensions that the tendons are to be told, checked; None without any."""
+        planned = (solution.squeeze or {}).get("tensions")
+        if planned is None or self.hand.tendons is None or not isinstance(self.driver, TendonDriver):
+            return None
+        tensions = np.asarray(planned, dtype=np.float64)
+        try:
+            check_tensions(tensions, self.hand.tendons)
+        except RefusedCommandError as error:
+            done.pulled = f"The tendons were not pulled: {error}"
+            return None
+        done.pulled = "The tendons were not pulled."  # until they are
+        return tensions
 
     def _steps(
         self,
@@ -169,11 +283,11 @@ class DrivenHand:
             told[self.hand.joint_index(name)] += offset
         return plan_driven_steps(solution, self.hand, told, trajectory.pace, mapped, check)
 
-    def _check_joints(self, mapped: Mapping[str, MappedJoint]) -> None:
+    def _check_joints(self, mapped: Mapping[str, MappedJoint], known: tuple[str, ...]) -> None:
         for name, joint in mapped.items():
-            if joint.name not in self.driver.joints:
+            if joint.name not in known:
                 said = "" if joint.name == name else f" (joint '{name}' of the hand)"
-                raise UnknownNameError("joint", joint.name, f"controller '{self.name}'{said}", self.driver.joints)
+                raise UnknownNameError("joint", joint.name, f"controller '{self.name}'{said}", known)
 
     def _plan(
         self, trajectory: Trajectory, mapped: Mapping[str, MappedJoint], check: CommandCheck, state: HandState
@@ -200,87 +314,14 @@ class DrivenHand:
         )
         return plan.thinned(), float(np.abs(angles[0] - found).max(initial=0.0))
 
-    def _pull(self, solution: GraspSolution) -> str:
-        """Send the squeeze plan's tensions to a driver that pulls tendons; return a sentence about it, or none."""
-        planned = (solution.squeeze or {}).get("tensions")
-        if planned is None or self.hand.tendons is None or not isinstance(self.driver, TendonDriver):
-            return ""
-        if self._stopping.is_set():
-            return "The tendons were not pulled: stopped on request."
-        tensions = np.asarray(planned, dtype=np.float64)
-        try:
-            check_tensions(tensions, self.hand.tendons)
-            self.driver.pull(tensions)
-        except DriverError as error:
-            with suppress(Exception):  # the sentence says what went wrong first
-                self.driver.stop()
-            return f"The tendons were not pulled: {error}"
-        return f"The tendons were told the tensions of the squeeze plan, up to {tensions.max():.3g} N."
 
-    def _report(
-        self, solution: GraspSolution, done: _Done, mapped: Mapping[str, MappedJoint], computed: FloatArray
-    ) -> ExecutionReport:
-        followed = done.followed
-        at_touch = followed.measured[-1] if followed.measured else {}
-        joints = {
-            name: JointReached(float(computed[self.hand.joint_index(name)]), joint.to_angle(at_touch[joint.name]))
-            for name, joint in mapped.items()
-            if joint.name in at_touch
-        }
-        error = max((abs(joint.error) for joint in joints.values()), default=None)
-        success, reason = self._judge(followed, joints, error)
-        if success and done.squeezed.trouble is not None:
-            success, reason = False, f"While squeezing: {done.squeezed.ending()}"
-        steps = tuple(step for step, _ in done.stepped)
-        if success:
-            success, reason = judge_steps(success, reason, steps)
-        history = _history([followed, done.squeezed, *(way for _, way in done.stepped)], mapped)
-        return ExecutionReport(
-            actuator=self.name,
-            success=success,
-            reason=reason,
-            joints=joints,
-            duration=float(history.times[-1]) if len(history.times) else 0.0,
-            largest_angle_error=error,
-            angle_tolerance=self.angle_tolerance,
-            notes=(
-                *filter(None, (_way(done.way), done.squeeze.text, done.pulled)),
-                "Angles were compared; whether links touch was not measured.",
-                *notes_on_steps(solution, steps),
-            ),
-            history=history,
-            next_steps=steps,
-        )
-
-    def _judge(self, followed: Followed, joints: Mapping[str, JointReached], error: float | None) -> tuple[bool, str]:
-        if followed.trouble is not None:
-            return False, followed.ending()
-        if error is None or error > self.angle_tolerance:
-            worst = max(joints, key=lambda name: abs(joints[name].error))
-            far = f"joint '{worst}' is {abs(joints[worst].error):.3g} rad from its computed angle"
-            return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad."
-        return True, f"Every joint is within {error:.2g} rad of its computed angle."
-
-
-def _way(way: float) -> str:
-    return f"Before the trajectory the hand moved straight to its start, {way:.3g} rad at most."
-
-
-def _history(ways: Sequence[Followed], mapped: Mapping[str, MappedJoint]) -> ExecutionHistory:
-    """Return the samples of ways that followed each other."""
-
-    def angles(samples: list[Mapping[str, float]]) -> FloatArray:
-        rows = [[joint.to_angle(sample[joint.name]) for joint in mapped.values()] for sample in samples]
-        return np.array(rows, dtype=np.float64).reshape(len(rows), len(mapped))
-
-    times, commanded, measured = list[float](), list[Mapping[str, float]](), list[Mapping[str, float]]()
-    for way in ways:
-        # The first sample of a way is taken at the end of the one before.
-        first, begin = (1, times[-1]) if times else (0, 0.0)
-        times += [begin + time for time in way.times[first:]]
-        commanded += way.commanded[first:]
-        measured += way.measured[first:]
-    return ExecutionHistory(tuple(mapped), np.array(times), angles(commanded), angles(measured))
+def _trouble(error: BaseException | None) -> str:
+    """Say in a sentence what ended an execution."""
+    if isinstance(error, ClenchError):
+        return str(error)
+    if isinstance(error, Exception):
+        return f"It failed ({type(error).__name__}: {error})."
+    return f"Interrupted ({type(error).__name__})."
 
 
 def _largest_share(trajectory: Trajectory) -> float:

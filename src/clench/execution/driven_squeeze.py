@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -14,10 +13,12 @@ from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
-from .driver import HandDriver, RefusedCommandError
+from .driver import RefusedCommandError
+from .driver_session import DriverSession
 from .following import CLOSEST, Followed, Follower, TimedPlan
 from .joint_map import MappedJoint
 from .next_steps import BUILDING_UP
+from .supervision import Event
 
 #: Way-points of it.
 _POINTS: Final = 9
@@ -48,9 +49,13 @@ def plan_driven_squeeze(
         share: of the planned offsets [-].
     """
     plan = solution.squeeze or {}
+    told = plan.get("offsets", {})
+    silent = [
+        name for name, torque in plan.get("torques", {}).items() if torque and name in mapped and name not in told
+    ]
     offsets = {name: share * float(plan.get("offsets", {}).get(name, 0.0)) for name in mapped}
     if not any(offsets.values()):
-        return DrivenSqueeze()
+        return DrivenSqueeze(f"There was no squeeze: {_unknown(silent)}" if silent and share else "")
     if not plan.get("feasible"):
         return DrivenSqueeze(f"There was no squeeze: {plan.get('text', 'none is planned.')}")
     timed = _timed(solution, hand, mapped, offsets, check)
@@ -60,26 +65,39 @@ def plan_driven_squeeze(
         return DrivenSqueeze(f"There was no squeeze: {error}")
     largest = max(map(abs, offsets.values()))
     text = f"Joints were told up to {largest:.3g} rad beyond the touch, as the squeeze plan says."
+    if silent:
+        text += f" Not all of it was told: {_unknown(silent)}"
     return DrivenSqueeze(text, offsets, timed)
+
+
+def _unknown(joints: list[str]) -> str:
+    named = ", ".join(f"'{joint}'" for joint in joints)
+    return (
+        f"the hand's model gives no servo gain of {named}, so the angles that exert the planned torques are not known."
+    )
 
 
 def squeeze_by_driver(
     squeeze: DrivenSqueeze,
-    driver: HandDriver,
+    session: DriverSession,
     mapped: Mapping[str, MappedJoint],
     check: CommandCheck,
-    stopping: threading.Event,
-) -> Followed:
+    found: Followed,
+) -> None:
     """Squeeze as planned; nothing is done where nothing is told.
 
     Args:
-        squeeze: planned. driver: connected, at the touch. mapped: the joints as the controller says them.
-        check: what every command and state must pass. stopping: set to stop from elsewhere.
+        squeeze: planned. session: with the driver, at the touch. mapped: the joints as the controller says them.
+        check: what every command and state must pass. found: collects the samples.
+
+    Raises:
+        DriverError: see `Follower.follow`.
     """
     if squeeze.plan is None:
-        return Followed()
+        return
+    session.enter(Event.SQUEEZE)
     anywhere = {joint.name: np.inf for joint in mapped.values()}  # held by the object, joints stay behind
-    return Follower(driver, check, stopping, settling=BUILDING_UP, arrived=anywhere).follow(squeeze.plan)
+    Follower(session, check, settling=BUILDING_UP, arrived=anywhere).follow(squeeze.plan, found)
 
 
 def _timed(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,11 +12,13 @@ from clench.models.hand.hand import Hand
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
-from .driver import HandDriver, JointPath, RefusedCommandError
+from .driver import JointPath, RefusedCommandError
+from .driver_session import DriverSession
 from .following import CLOSEST, PERIOD, Followed, Follower, TimedPlan
 from .joint_map import MappedJoint
 from .next_steps import Phase, moved_joints, plan_next_steps
 from .report import JointReached, NextStepReached, step_sentence
+from .supervision import Event
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,45 +71,54 @@ def plan_driven_steps(
 
 def go_to_steps(
     steps: Sequence[DrivenStep],
-    driver: HandDriver,
+    session: DriverSession,
     mapped: Mapping[str, MappedJoint],
     check: CommandCheck,
-    stopping: threading.Event,
-    settling: float,
-    tolerance: float,
-) -> list[tuple[NextStepReached, Followed]]:
+    arriving: tuple[float, float],
+    found: list[tuple[DrivenStep, Followed]],
+) -> None:
     """Follow the steps one after another, up to the first that is not reached.
 
     Args:
-        steps: planned. driver: connected. mapped: the joints as the controller says them.
-        check: what every command and state must pass. stopping: set to stop from elsewhere.
-        settling: how long the hand may take to arrive [s]. tolerance: what counts as reached [rad].
+        steps: planned. session: with the driver. mapped: the joints as the controller says them.
+        check: what every command and state must pass.
+        arriving: how long the hand may take to arrive [s], and what counts as reached [rad].
+        found: collects the steps that were begun, and the samples of each.
+
+    Raises:
+        DriverError: see `Follower.follow`.
     """
-    found: list[tuple[NextStepReached, Followed]] = []
+    settling, tolerance = arriving
     for step in steps:
         # Joints that go on pressing on the object stay behind.
         arrived = {
             joint.name: 0.2 * tolerance * abs(joint.scale) if name in step.targets else np.inf
             for name, joint in mapped.items()
         }
-        followed = Follower(driver, check, stopping, settling, arrived).follow(step.plan)
-        found.append((_reached(step, followed, mapped, tolerance), followed))
-        if not found[-1][0].reached:
+        session.enter(Event.STEP)
+        found.append((step, Followed()))
+        Follower(session, check, settling, arrived).follow(step.plan, found[-1][1])
+        if not step_reached(step, found[-1][1], mapped, tolerance).reached:
             break
-    return found
 
 
-def _reached(
-    step: DrivenStep, followed: Followed, mapped: Mapping[str, MappedJoint], tolerance: float
+def step_reached(
+    step: DrivenStep, followed: Followed, mapped: Mapping[str, MappedJoint], tolerance: float, trouble: str = ""
 ) -> NextStepReached:
+    """Compare where the hand is after a step with where the step leads.
+
+    Args:
+        step: the step. followed: samples of the way there. mapped: the joints as the controller says them.
+        tolerance: what counts as reached [rad]. trouble: what ended the way, in words; empty when nothing did.
+    """
     last = followed.measured[-1] if followed.measured else {}
     joints = {
         name: JointReached(target, mapped[name].to_angle(last[mapped[name].name]))
         for name, target in step.targets.items()
         if mapped[name].name in last
     }
-    if followed.trouble is not None:
-        return NextStepReached(joints, False, f"On the way to next step {step.number + 1}: {followed.ending()}")
+    if trouble:
+        return NextStepReached(joints, False, f"On the way to next step {step.number + 1}: {trouble}")
     return NextStepReached(joints, *step_sentence(step.number, joints, tolerance))
 
 

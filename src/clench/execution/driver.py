@@ -95,7 +95,9 @@ class HandDriver(Protocol):
     """Talk to the controller of a hand, in the controller's own joint names and units.
 
     Every method returns within its timeout or a fraction of a second, and raises `DriverError` when the controller
-    fails. A driver need not check commands: `DrivenHand` does, before it calls `command`.
+    fails. A call that takes longer than 1 s is a fault. The calls of one execution come from one thread, which is not
+    the caller's; only `stop` may come meanwhile from another one. A driver need not check commands: `DrivenHand` does,
+    before it calls `command`.
     """
 
     @property

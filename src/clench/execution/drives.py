@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clench.base.errors import CommandError, HandError
+from clench.base.opengl import import_mujoco
 from clench.base.pose import FloatArray
 from clench.grasp.mechanics.jacobian import degrees_of_freedom
 from clench.models.hand.hand import Hand
@@ -94,8 +95,7 @@ def driving_spec(hand: Hand, drive: Drive, still: tuple[int, ...]) -> tuple[Any,
 
 
 def _spec(hand: Hand, without: tuple[str, ...]) -> Any:
-    import mujoco
-
+    mujoco = import_mujoco()
     root = ET.fromstring(hand.spec_xml)
     for tag in without:
         for element in root.findall(tag):

@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from clench.base.errors import ClenchError, FileError
-from clench.base.json_files import check_writable, write_atomically
+from clench.base.json_files import check_folder, check_writable, write_atomically
+from clench.base.opengl import import_mujoco, why_not_drawn
 
 from .scene import Scene
 
@@ -54,7 +55,7 @@ class Film:
 
         Raises:
             FileError: another kind of file than GIF or MP4, one that is a folder, or in none.
-            ClenchError: MP4 without the library that writes it.
+            ClenchError: MP4 without the library that writes it; an OpenGL that cannot be loaded.
         """
         if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
             raise FileError(self.video, "cannot be written: expected a file name that ends with .gif or .mp4.")
@@ -62,8 +63,11 @@ class Film:
             raise ClenchError("MP4 needs imageio-ffmpeg: pip install 'clench[video]', or choose a .gif file.")
         if self.video is not None:
             check_writable(self.video)
-        if self.stills is not None and self.stills.exists() and not self.stills.is_dir():
-            raise FileError(self.stills, "cannot be written: it is no folder.")
+        if self.stills is not None:
+            check_folder(self.stills)
+        problem = why_not_drawn() if self.video or self.stills else None
+        if problem is not None:
+            raise ClenchError(_NO_OPENGL.format(problem))
 
     def begin(self, scene: Scene, data: Any) -> None:
         """Point the camera at the hand and the object.
@@ -71,10 +75,9 @@ class Film:
         Raises:
             ClenchError: there is no OpenGL to draw with.
         """
-        import mujoco
-
+        mujoco = import_mujoco()
         headless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-        if headless and getattr(mujoco, "GLContext", None).__module__ == "mujoco.glfw":
+        if headless and mujoco.GLContext.__module__ == "mujoco.glfw":
             # The engine's default, unless told otherwise when it was imported: it needs a screen, and ends the program
             # where there is none.
             raise ClenchError(_NO_OPENGL.format("there is no screen"))

@@ -1,4 +1,4 @@
-"""Follow a timed plan on a controller, never further ahead than a short horizon, and stop on any trouble.
+"""Follow a timed plan on a controller, never further ahead than a short horizon.
 
 A controller is only ever told the next fraction of a second. When this program, its machine or the connection fails,
 no more arrives, and the hand stands still at the end of what it was told.
@@ -7,7 +7,6 @@ no more arrives, and the hand stands still at the end of what it was told.
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,23 +16,20 @@ import numpy as np
 from clench.base.pose import FloatArray
 
 from .command_check import CommandCheck
-from .driver import DriverError, HandDriver, HandState, JointPath, OneTargetDriver
+from .driver import HandState, JointPath, OneTargetDriver
+from .driver_session import DriverSession
+from .supervision import Event
 
 #: How often the controller is read and told more [s].
 PERIOD = 0.05
 #: How far ahead it is told [s]: how long a hand moves on after its connection was cut.
 HORIZON = 0.3
-_TOLD_NOTHING = f"it was told nothing beyond {HORIZON:g} s"
 #: How long after its moment a path may be told [s]; what takes longer is a pause of this program.
 LATE = 0.2 * PERIOD
 #: How often a path is computed again that a pause made late.
 _TRIES = 3
 #: Points of a path that are closer than this are one [s].
 CLOSEST = 1e-4
-#: How long is waited for a hand to stand still after a stop [s].
-STOP_WAIT = 1.0
-#: A joint stands still when it is slower than this fraction of its largest speed [-].
-STILL = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,26 +87,15 @@ class TimedPlan:
 
 @dataclass
 class Followed:
-    """Collect what happened: samples of commanded and measured positions, and why it ended early.
+    """Collect samples of commanded and measured positions.
 
     Args:
         times: of the samples [s]. commanded, measured: by the controller's names and units.
-        trouble: one sentence, None when the plan was followed to its end. stopped: whether the hand was seen to stand
-            still after a stop; None when none was sent.
     """
 
     times: list[float] = field(default_factory=list)
     commanded: list[Mapping[str, float]] = field(default_factory=list)
     measured: list[Mapping[str, float]] = field(default_factory=list)
-    trouble: str | None = None
-    stopped: bool | None = None
-
-    def ending(self) -> str:
-        """Say why it ended early, and whether the hand was seen to stand still; empty when it did not."""
-        if self.trouble is None:
-            return ""
-        told = "it was seen to stand still" if self.stopped else f"that was not confirmed; {_TOLD_NOTHING}"
-        return f"{self.trouble} The hand was told to stop: {told}."
 
     def sample(self, moment: float, commanded: Mapping[str, float], state: HandState) -> None:
         """Keep one sample."""
@@ -158,64 +143,57 @@ class _Progress:
 
 @dataclass(frozen=True)
 class Follower:
-    """Make a controller follow plans.
+    """Make a controller follow plans; whatever goes wrong is raised, and the caller stops the hand.
 
     Args:
-        driver: connected. check: what every command and state must pass. stopping: set to stop it from elsewhere.
+        session: with the driver, connected. check: what every command and state must pass.
         settling: how long the hand may take to arrive after the plan's end [s].
         arrived: how near to its target every joint shall be, by the controller's names and in its units.
     """
 
-    driver: HandDriver
+    session: DriverSession
     check: CommandCheck
-    stopping: threading.Event
     settling: float
     arrived: Mapping[str, float]
 
-    def follow(self, plan: TimedPlan) -> Followed:
-        """Follow a plan to its end, or stop the hand and say why; a stop is sent whatever is raised here."""
-        found = Followed()
-        try:
-            one_target = isinstance(self.driver, OneTargetDriver) and self.driver.one_target
-            progress = _Progress(PERIOD if one_target else HORIZON)
-            self._move(plan, found, progress)
-            self._settle(plan, found, progress)
-        except DriverError as error:
-            found.trouble = str(error)
-            found.stopped = self._stop(found)
-        except Exception as error:  # drivers are others' code: whatever they raise, the hand is stopped
-            found.trouble = f"The driver failed ({type(error).__name__}: {error})."
-            found.stopped = self._stop(found)
-        except BaseException:
-            self._stop(found, wait=0.0)
-            raise
-        return found
+    def follow(self, plan: TimedPlan, found: Followed, end: Event | None = None) -> None:
+        """Follow a plan to its end.
+
+        Args:
+            plan: what to follow. found: collects the samples. end: event of the supervision at the plan's end, if any.
+
+        Raises:
+            DriverError: the driver failed, a command or a state was refused, or a stop is in force.
+        """
+        driver = self.session.driver
+        one_target = isinstance(driver, OneTargetDriver) and driver.one_target
+        progress = _Progress(PERIOD if one_target else HORIZON)
+        self._move(plan, found, progress)
+        if end is not None:
+            self.session.enter(end)
+        self._settle(plan, found, progress)
 
     def _move(self, plan: TimedPlan, found: Followed, progress: _Progress) -> None:
         begun = time.monotonic()
         while self._look(plan, found, progress, begun) < plan.duration:
             self._tell(plan, progress)
-            self.stopping.wait(max(0.0, progress.due - time.monotonic()))
+            self.session.wait(progress.due - time.monotonic())
 
     def _look(self, plan: TimedPlan, found: Followed, progress: _Progress, begun: float) -> float:
         """Read where the hand is, and check that it is on its way; return the moment of the plan."""
         asked = time.monotonic()
-        state = self.driver.read()
+        state = self.session.read()
         now = time.monotonic()
         expected = {}
         for name in plan.joints:
-            age = max(0.0, state.age([name]))
+            age = state.age([name])
             span = progress.span(asked - age, now - age)
             expected[name] = plan.nearest(name, state.positions.get(name, math.nan), *span)
         self.check.state(state, expected)
         moment = progress.moment(now)
         found.sample(now - begun, plan.at(moment), state)
-        self._go_on()
+        self.session.supervision.check()
         return moment
-
-    def _go_on(self) -> None:
-        if self.stopping.is_set():
-            raise DriverError("Stopped on request.")
 
     def _tell(self, plan: TimedPlan, progress: _Progress) -> None:
         """Tell what comes next, computed anew where a pause made it late: it would pull the hand back."""
@@ -227,15 +205,14 @@ class Follower:
             before = time.monotonic()
             if before - seen <= LATE:
                 break
-        self._go_on()
-        self.driver.command(path)
+        self.session.command(path, before)
         progress.begin, progress.before, progress.after = moment, before, time.monotonic()
 
     def _settle(self, plan: TimedPlan, found: Followed, progress: _Progress) -> None:
         begun, before, told = time.monotonic(), found.times[-1], False
         end = plan.at(plan.duration)
         while True:
-            self.stopping.wait(PERIOD)
+            self.session.wait(PERIOD)
             self._look(plan, found, progress, begun - before)
             here = found.measured[-1]
             if all(abs(here[name] - end[name]) <= near for name, near in self.arrived.items()):
@@ -245,29 +222,3 @@ class Follower:
             if not told:  # a driver that passes on one target without saying so may not have been told the end
                 self._tell(plan, progress)
                 told = True
-
-    def _stop(self, found: Followed, wait: float = STOP_WAIT) -> bool:
-        """Stop the hand; return whether it was seen to stand still, and keep where it stands."""
-        try:
-            self.driver.stop()
-            until, before = time.monotonic() + wait, None
-            while time.monotonic() < until:
-                time.sleep(2.0 * PERIOD)
-                state = self.driver.read()
-                fresh = state.age(self.check.limits) <= 2.0 * PERIOD
-                if fresh and before is not None and self._still(before, state):
-                    if found.times:
-                        found.sample(found.times[-1] + wait - (until - time.monotonic()), found.commanded[-1], state)
-                    return True
-                before = state if fresh else None
-        except Exception:  # as above
-            return False
-        return False
-
-    def _still(self, before: HandState, state: HandState) -> bool:
-        nowhere = float("nan")  # is never still
-        return all(
-            abs(state.positions.get(name, nowhere) - before.positions.get(name, nowhere))
-            <= STILL * limits.velocity * 2.0 * PERIOD
-            for name, limits in self.check.limits.items()
-        )

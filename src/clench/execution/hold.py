@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from clench.base.defaults import FRICTION, MASS
 from clench.base.errors import CommandError
-from clench.grasp.mechanics.contacts import ContactModel, check_friction
+from clench.grasp.mechanics.contacts import ContactModel, check_friction, friction_range
+from clench.grasp.mechanics.loads import mass_range
 
 #: The lightest object that the simulation carries [kg].
 LIGHTEST = 1e-3
@@ -40,13 +42,15 @@ class Hold:
         max_distance: of the centre of mass from where the object stood before the hand closed [m], and
         max_angle: of the object [rad]: from there on it is dropped.
         test: see `HoldTest`. height: of the lift [m].
+        planned_mass, planned_friction: what the squeeze is planned for, numbers or ranges (least, largest) [kg], [-];
+            None: the mass and the friction of the test.
 
     Raises:
         CommandError: a value that is not finite or out of range.
     """
 
-    mass: float = 0.1
-    friction: float = 0.6
+    mass: float = MASS
+    friction: float = FRICTION
     torsion: float = 0.02
     contact_model: ContactModel | str = ContactModel.POINT
     squeeze: float = 1.0
@@ -56,12 +60,16 @@ class Hold:
     max_angle: float = float(np.deg2rad(15.0))
     test: HoldTest | str = HoldTest.PULLS
     height: float = 0.1
+    planned_mass: float | tuple[float, float] | None = None
+    planned_friction: float | tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
         if not (np.isfinite(self.mass) and self.mass >= LIGHTEST):
             raise CommandError(f"hold: mass: expected a finite number of at least {LIGHTEST:g} kg, got {self.mass!r}.")
         check_friction(self.friction, "hold: friction")
+        mass_range(self.planned_for[0], "hold: planned_mass")
+        friction_range(self.planned_for[1], "hold: planned_friction")
         if self.contact_model not in list(ContactModel):
             raise CommandError(
                 f"hold: contact_model: expected one of {', '.join(ContactModel)}, got {self.contact_model!r}."
@@ -76,6 +84,12 @@ class Hold:
             value = getattr(self, key)
             if not (np.isfinite(value) and value > 0.0):
                 raise CommandError(f"hold: {key}: expected a finite number above 0, got {value!r}.")
+
+    @property
+    def planned_for(self) -> tuple[float | tuple[float, float], float | tuple[float, float]]:
+        """The mass [kg] and the friction [-] that the squeeze is planned for, numbers or ranges."""
+        mass = self.mass if self.planned_mass is None else self.planned_mass
+        return mass, self.friction if self.planned_friction is None else self.planned_friction
 
 
 @dataclass(frozen=True)
@@ -127,6 +141,8 @@ class HoldReport:
         closed: motion from the pregrasp to the touch. squeezed: motion from there by the squeeze.
         forces: of every finger, squeezed, before the first pull.
         pulls: by direction in the world, "+x" to "-z", or "lift"; motions count from before the hand closed.
+        as_given: where the grasp was solved again on the convex pieces that the simulation collides: what came of the
+            grasp as it was given. All else is then of the grasp on the pieces.
 
     Where nothing was tested, because the hand would be in the table or the simulation did not stay finite, there are no
     motions, forces and pulls, and the reason says so.
@@ -144,6 +160,7 @@ class HoldReport:
     squeezed: ObjectMotion | None = None
     forces: Mapping[str, FingerForce] = field(default_factory=dict)
     pulls: Mapping[str, Pulled] = field(default_factory=dict)
+    as_given: HoldReport | None = None
 
     @property
     def touch_spread(self) -> float | None:
@@ -171,4 +188,5 @@ class HoldReport:
             "squeezed": None if self.squeezed is None else asdict(self.squeezed),
             "forces": {finger: asdict(force) for finger, force in self.forces.items()},
             "pulls": {direction: asdict(pulled) for direction, pulled in self.pulls.items()},
+            "as_given": None if self.as_given is None else self.as_given.to_dict(),
         }

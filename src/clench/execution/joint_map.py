@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
-from clench.base.files import read_text
 from clench.base.numbers import is_finite_number
+from clench.base.toml_files import read_toml
 from clench.models.hand.hand import Hand
 
 #: Units of a controller by name: how many of them one radian is.
@@ -65,11 +64,7 @@ class JointMap:
         Raises:
             FileError: missing, not TOML, or a malformed key, which the message names.
         """
-        try:
-            data = tomllib.loads(read_text(path))
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
-            raise FileError(path, f"not TOML ({error}).") from None
-        return joint_map_from_dict(data, str(path))
+        return joint_map_from_dict(read_toml(path), str(path))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "joint map") -> JointMap:

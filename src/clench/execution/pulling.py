@@ -151,14 +151,15 @@ def hold_and_pull(
 
 
 def _plan(solution: GraspSolution, hand: Hand, obj: GraspObject, hold: Hold) -> SqueezePlan:
+    mass, friction = hold.planned_for
     return plan_squeeze(
         solution,
         hand,
         obj,
-        mass=hold.mass,
+        mass=mass,
         gravity=DOWN if hold.test == HoldTest.LIFT else None,
         contact_model=hold.contact_model,
-        friction=hold.friction,
+        friction=friction,
         torsion=hold.torsion,
     )
 

@@ -11,7 +11,7 @@ from clench.base.json_files import write_json
 from clench.base.pose import FloatArray
 from clench.solve.solution import GraspSolution
 
-from .history import ExecutionHistory
+from .history import CommandsSent, ExecutionHistory
 from .hold import HoldReport, ObjectMotion, Pulled
 
 SCHEMA = "clench.execution/1"
@@ -138,6 +138,7 @@ class ExecutionReport:
         hold: what came of a hold test, None without one.
         driven_by: what moved every joint of a simulated hand: an actuator of the model, "servo" or "coupled".
         next_steps: what came of the solution's next steps; those after one that was not reached are left out.
+        sent: what was sent to a controller, None when the actuator is none.
     """
 
     actuator: str
@@ -156,6 +157,7 @@ class ExecutionReport:
     hold: HoldReport | None = None
     driven_by: Mapping[str, str] = field(default_factory=dict)
     next_steps: tuple[NextStepReached, ...] = ()
+    sent: CommandsSent | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, schema `clench.execution/1`."""
@@ -188,6 +190,7 @@ class ExecutionReport:
             "hold": None if self.hold is None else self.hold.to_dict(),
             "driven_by": dict(self.driven_by),
             "next_steps": [step.to_dict() for step in self.next_steps],
+            "sent": None if self.sent is None else self.sent.to_dict(),
         }
 
     def save(self, path: str | Path) -> None:

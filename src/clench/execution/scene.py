@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from clench.base.errors import HandError
+from clench.base.opengl import import_mujoco
 from clench.base.pose import FloatArray, Pose, invert
 from clench.grasp.mechanics.loads import GRAVITY
 from clench.models.hand.hand import Hand
@@ -91,8 +93,7 @@ def build_scene(
     Raises:
         HandError: the hand cannot be simulated. ObjectError: the object has a flat body.
     """
-    import mujoco
-
+    mujoco = import_mujoco()
     spec = mujoco.MjSpec()
     lifted = free is not None and free.test == HoldTest.LIFT
     spec.option.gravity = np.array([0.0, 0.0, -GRAVITY if lifted else 0.0])
@@ -100,7 +101,7 @@ def build_scene(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     _light(spec)
-    driven = _add_hand(spec, hand, lifted, drive)
+    driven = _add_hand(spec, hand, lifted, drive, hand.allowed_pairs_from(CollisionSource.ENGINE, q))
     if free is not None:
         # Without these, friction of the engine creeps: a held object slides out slowly.
         spec.option.impratio = 10.0
@@ -130,7 +131,7 @@ def _light(spec: Any) -> None:
     spec.add_texture(name="sky", width=16, height=96, rgb1=[1.0] * 3, rgb2=[1.0] * 3, **sky)
 
 
-def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive) -> Driven:
+def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive, allowed: Iterable[tuple[int, int]]) -> Driven:
     import mujoco
 
     child, driven = driving_spec(hand, drive, _joints_before_palm(hand))
@@ -145,7 +146,7 @@ def _add_hand(spec: Any, hand: Hand, lifted: bool, drive: Drive) -> Driven:
     base = root.add_body(name=BASE)
     spec.attach(child, frame=base.add_frame(), prefix=PREFIX)
     bodies = {body.name for body in spec.bodies}
-    for a, b in hand.allowed_pairs:
+    for a, b in allowed:
         names = PREFIX + hand.links[a].name, PREFIX + hand.links[b].name
         if a != b and bodies.issuperset(names):
             spec.add_exclude(bodyname1=names[0], bodyname2=names[1])

@@ -18,7 +18,7 @@ from .drives import Drive, check_drive, sentences
 from .filming import Film
 from .history import ExecutionHistory
 from .hold import Hold, HoldReport
-from .pulling import hold_and_pull
+from .piece_hold import hold_as_collided
 from .report import ContactReached, ExecutionReport, JointReached, NextStepReached, judge_steps, notes_on_steps
 from .scene import TIMESTEP, Scene, body_pose, build_scene
 from .stepping import Stepper
@@ -152,7 +152,7 @@ class SimulatedHand:
     ) -> tuple[HoldReport, tuple[NextStepReached, ...]]:
         steps: list[NextStepReached] = []
         stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
-        report = hold_and_pull(
+        report = hold_as_collided(
             solution,
             self.hand,
             obj,

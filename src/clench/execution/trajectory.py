@@ -20,6 +20,7 @@ from .landing import CLEARANCE
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
 from .step_check import refuse_after
 from .timing import ACCELERATION
+from .trajectory_checks import check_points, check_rates
 from .way_to_touch import WayFinder, refuse_way
 
 SCHEMA = "clench.trajectory/1"
@@ -237,6 +238,8 @@ def _read(data: Any, source: str) -> Trajectory:
         form = msgspec.convert(data, _Form)
     except msgspec.ValidationError as error:
         raise FileError(source, f"{str(error).replace('`', chr(39))}.") from None
+    check_rates(source, form.speed, form.acceleration, form.velocity_limits)
+    check_points(source, [(p.time, p.positions) for p in form.points])
     count = len(form.joints)
     if not form.points:
         raise FileError(source, "points: expected at least one.")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -14,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.errors import ClenchError, CommandError, FileError, UnknownNameError
-from clench.base.files import read_text
 from clench.base.pose import FloatArray
+from clench.base.toml_files import read_toml
 
 from .criterion_registry import check_numbers, find_criterion
 
@@ -117,11 +116,8 @@ def load_calibration(path: Path, name: str | None = None) -> Calibration:
     Raises:
         FileError: missing, not TOML, with other keys, or with neither a weight above 0 nor a limit.
     """
-    try:
-        presets = ", ".join(preset_names())
-        data = tomllib.loads(read_text(path, f"no such calibration file; presets, by name alone: {presets}."))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise FileError(path, f"not a calibration file in TOML: {error}.") from None
+    missing = f"no such calibration file; presets, by name alone: {', '.join(preset_names())}."
+    data = read_toml(path, missing, "a calibration file in TOML")
     unknown = sorted(set(data) - set(_TABLES))
     if unknown:
         listed = ", ".join(f"[{table}]" for table in _TABLES)

@@ -12,15 +12,16 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from clench.base.keeping import kept_by_identity
+from clench.base.keeping import kept_while_alive
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 
 from .linkage import plan_frames
 from .packing import pack_plans
 from .plan import FingerPlan
-from .scene import KEPT_OBJECTS, PackedObject
+from .scene import PackedObject
 from .surface import round_arrays
 
 if TYPE_CHECKING:
@@ -185,9 +186,13 @@ class Arena:
         self.capacity = max(self.capacity, 2 * wanted)
 
 
-@kept_by_identity(KEPT_OBJECTS)
 def arena_of(tree: MeshTree) -> Arena:
     """Return the arena's size for the triangles of an object; no answer depends on it."""
+    return _arena(tree.triangles)
+
+
+@kept_while_alive
+def _arena(triangles: NDArray[np.int32]) -> Arena:
     return Arena(CAPACITY)
 
 

@@ -13,9 +13,10 @@ import numpy as np
 from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.hand.link_mesh import link_meshes
 from clench.models.shapes import CollisionSource
 
-from .depths import link_mesh_arrays, link_meshes, mesh_mask, object_mesh
+from .depths import link_mesh_arrays, mesh_mask, object_mesh
 from .linkage import placed_links
 from .scene import PackedObject
 

@@ -12,16 +12,14 @@ from numpy.typing import NDArray
 from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
-from clench.models.mesh import TriangleMesh
-from clench.models.shapes import CollisionSource, Shape, ShapeKind
+from clench.models.hand.link_mesh import LinkMesh, link_meshes
+from clench.models.shapes import CollisionSource
 
 from .linkage import placed_links
-from .parts import part_points
-from .scene import PackedObject, shape_mesh
+from .scene import PackedObject
 
 if TYPE_CHECKING:
     from clench.kernels.link_meshes import LinkMeshArrays, ObjectMesh
-    from clench.kernels.tree import MeshTree
 
 #: Depths below this fraction of the object's size are rounding of a touch [-].
 _TOUCHING: Final = 1e-12
@@ -36,32 +34,18 @@ class LinkDepth:
         link: index of the link in the hand.
         depth: [m], 0 when disjoint or just touching.
         place: the deepest point in the object's frame [m], shape (3,); None when the depth is 0.
+        at_least: the link lies inside with all of its size; how much deeper is not measured.
     """
 
     link: int
     depth: float
     place: FloatArray | None
+    at_least: bool = False
 
-
-@dataclass(frozen=True, eq=False)
-class LinkMesh:
-    """Hold the triangles of one link in its frame.
-
-    Args:
-        link: index of the link in the hand.
-        tree: all its shapes as triangles, round ones inscribed.
-        owners: `feature_owners` of the tree.
-        closed: every shape is watertight with outward normals.
-        center, radius: of a ball around it [m], in the link's frame. points: one of every connected part, (N, 3).
-    """
-
-    link: int
-    tree: MeshTree
-    owners: NDArray[np.uint8]
-    closed: bool
-    center: FloatArray
-    radius: float
-    points: FloatArray
+    @property
+    def text(self) -> str:
+        """The depth in words, e.g. "by 1.25 mm"."""
+        return f"by {'at least ' if self.at_least else ''}{self.depth * 1e3:.2f} mm"
 
 
 def hand_depths(
@@ -76,6 +60,8 @@ def hand_depths(
     """Return the depth of penetration of every link that has a shape (METHOD.md section 5).
 
     Round shapes are inscribed polyhedra, so their depth is too small by at most `TESSELLATION_DEVIATION` for each side.
+    Depths up to the size of the link (the diameter of a ball around it) are exact. A link that is deeper gets that
+    depth, and the place of a point that is as deep: far inside an object of metres an exact depth takes seconds.
 
     Args:
         hand: the hand.
@@ -93,9 +79,12 @@ def hand_depths(
     deepest = np.empty((len(meshes.link), 4))
     measure_depths(meshes, wanted, placed_links(hand, q), object_mesh(packed), T, deepest)
     found = []
-    for link, (depth, *place) in zip(meshes.link[wanted != 0].tolist(), deepest[wanted != 0].tolist(), strict=True):
-        overlaps = depth > _TOUCHING * packed.radius
-        found.append(LinkDepth(link, depth if overlaps else 0.0, np.array(place) if overlaps else None))
+    for k in np.flatnonzero(wanted):
+        (depth, *place), link = deepest[k].tolist(), int(meshes.link[k])
+        if depth > _TOUCHING * packed.radius:
+            found.append(LinkDepth(link, depth, np.array(place), depth >= 2.0 * meshes.radius[k]))
+        else:
+            found.append(LinkDepth(link, 0.0, None))
     return tuple(found)
 
 
@@ -114,7 +103,7 @@ def object_mesh(packed: PackedObject) -> ObjectMesh:
 
 def link_mesh_arrays(hand: Hand, source: CollisionSource | None = None) -> LinkMeshArrays:
     """Return the meshes of all links of the hand that have a shape in one piece; made once per hand and source."""
-    return _meshes(hand, hand.default_source if source is None else CollisionSource(source))[1]
+    return _joined_meshes(hand, hand.default_source if source is None else CollisionSource(source))
 
 
 def travel_to_touch(
@@ -191,16 +180,9 @@ def clear_distance(
     return max(ahead - (float(normal @ center) - packed.radius), 0.0)
 
 
-def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[LinkMesh, ...]:
-    """Return the meshes of all links of the hand that have a shape; made once per hand and source."""
-    return _meshes(hand, hand.default_source if source is None else CollisionSource(source))[0]
-
-
 @kept_by_identity(_KEPT_HANDS)
-def _meshes(hand: Hand, source: CollisionSource) -> tuple[tuple[LinkMesh, ...], LinkMeshArrays]:
-    made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
-    meshes = tuple(mesh for mesh in made if len(mesh.tree.triangles))
-    return meshes, _joined(meshes)
+def _joined_meshes(hand: Hand, source: CollisionSource) -> LinkMeshArrays:
+    return _joined(link_meshes(hand, source))
 
 
 def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:
@@ -225,39 +207,6 @@ def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:
         tree=type(none)(*(np.concatenate(columns) for columns in zip(*trees, strict=True))),
         owners=np.concatenate([np.empty(0, dtype=np.uint8), *(mesh.owners for mesh in meshes)]),
     )
-
-
-def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:
-    from clench.kernels.tree import build_tree, feature_owners
-
-    meshes = [shape_mesh(shape, source) for shape in shapes]
-    mesh = TriangleMesh.joined(meshes)
-    tree = build_tree(mesh.vertices, mesh.triangles)
-    corners = tree.vertices[tree.triangles].reshape(-1, 3)
-    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) if len(corners) else np.zeros(3)
-    return LinkMesh(
-        link,
-        tree,
-        feature_owners(tree),
-        all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True)),
-        center,
-        float(np.linalg.norm(corners - center, axis=1).max(initial=0.0)),
-        part_points(tree),
-    )
-
-
-def is_closed(mesh: TriangleMesh) -> bool:
-    """Say whether every edge has as many triangles on either side, places merged, and the volume is positive."""
-    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    triangles = place.reshape(-1)[mesh.triangles]
-    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    size = len(mesh.vertices) + 1
-    forward = np.sort((starts * size + ends)[starts != ends])
-    backward = np.sort((ends * size + starts)[starts != ends])
-    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
-    middle = mesh.vertices.mean(axis=0) if len(mesh.vertices) else np.zeros(3)
-    volume = float(np.einsum("ij,ij->", a - middle, np.cross(b - middle, c - middle)))
-    return bool(np.array_equal(forward, backward)) and volume > 0.0
 
 
 def _placed(hand: Hand, q: FloatArray, source: CollisionSource | None) -> list[tuple[LinkMesh, FloatArray]]:

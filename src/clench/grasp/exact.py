@@ -36,9 +36,26 @@ class HandBodies(NamedTuple):
     across: np.ndarray
 
 
+def hand_bodies(hand: Hand, source: CollisionSource, start: FloatArray | None = None) -> HandBodies:
+    """Return a hand's links as bodies, and which of them may not overlap in a motion from a posture.
+
+    Args:
+        hand: the hand. source: geometry of its links. start: angles of all joints [rad], shape (J,);
+            None is the open posture.
+    """
+    q = hand.open_angles() if start is None else start
+    return _bodies(hand, source, hand.allowed_pairs_from(source, q))
+
+
 @kept_by_identity(_KEPT_HANDS)
-def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
-    """Return a hand's links as bodies, and which of them may not overlap; made once per hand and source."""
+def _bodies(hand: Hand, source: CollisionSource, allowed: tuple[tuple[int, int], ...]) -> HandBodies:
+    across = _across(hand, allowed)
+    return HandBodies(link_bodies(hand, source), _within(hand, across), across)
+
+
+@kept_by_identity(_KEPT_HANDS)
+def link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
+    """Return every link of a hand that can touch as a body, in its own frame; made once per hand and source."""
     from clench.kernels.bodies import join_elements, pack_bodies
 
     solid = set(hand.solid_links)
@@ -46,14 +63,13 @@ def hand_bodies(hand: Hand, source: CollisionSource) -> HandBodies:
         join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
         for i, link in enumerate(hand.links)
     ]
-    across = _across(hand)
-    return HandBodies(pack_bodies(parts), _within(hand, across), across)
+    return pack_bodies(parts)
 
 
-def _across(hand: Hand) -> np.ndarray:
+def _across(hand: Hand, allowed: tuple[tuple[int, int], ...]) -> np.ndarray:
     checked = np.ones((len(hand.links),) * 2, dtype=np.int64)
     np.fill_diagonal(checked, 0)
-    for a, b in hand.allowed_pairs:
+    for a, b in allowed:
         checked[a, b] = checked[b, a] = 0
     return checked
 
@@ -67,16 +83,15 @@ def _within(hand: Hand, across: np.ndarray) -> np.ndarray:
     return checked
 
 
-def pack_exact(hand: Hand, plans: Sequence[FingerPlan], wanted: Sequence[bool], source: CollisionSource) -> ExactArrays:
+def pack_exact(hand: Hand, plans: Sequence[FingerPlan], wanted: Sequence[bool], bodies: HandBodies) -> ExactArrays:
     """Pack the links of the plans' fingers and how their joints move them; the object is left out.
 
     Args:
-        hand: the hand. plans: one per entry. wanted: per item. source: geometry of the links.
+        hand: the hand. plans: one per entry. wanted: per item. bodies: see `hand_bodies`.
     """
     from clench.kernels.bodies import no_body
     from clench.kernels.exact import ExactArrays
 
-    bodies = hand_bodies(hand, source)
     first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
     movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
     axes = [_axis(plan, k) for plan in plans for k in range(len(plan.joints))]

@@ -15,12 +15,13 @@ from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
 from .depths import hand_depths, link_mesh_arrays, object_mesh
-from .exact import HandBodies, hand_bodies
+from .exact import link_bodies
 from .linkage import hand_frames
 from .scene import PackedObject
 from .surface import nearest_body
 
 if TYPE_CHECKING:
+    from clench.kernels.bodies import BodyArrays
     from clench.kernels.pair_motion import PathProblem
 
 _KEPT_HANDS: Final = 16
@@ -78,7 +79,7 @@ def find_path_overlap(
 
     Every link is checked against every other link and against the object with its obstacles, over the whole path. The
     exact sweep goes on until two bodies touch. From there, steps are so short that the bodies cannot overlap by more
-    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs`) are left out. A
+    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs_for`) are left out. A
     pair that overlaps where the path begins may stay as deep as it was since, until it is apart. A soft pad may be
     indented by the object as far as the hand file says.
 
@@ -146,7 +147,7 @@ def _problem(
     from clench.kernels.pair_motion import PathProblem
     from clench.kernels.tree import build_tree
 
-    bodies, meshes = hand_bodies(hand, source), link_mesh_arrays(hand, source)
+    links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
     tables = _tables(hand, source)
     if around is None:
         pairs, body, T = tables.between, no_body(), np.eye(4)
@@ -160,7 +161,7 @@ def _problem(
     pads = np.array([hand.links[m].pad_indentation if r < 0 else 0.0 for m, r in pairs.tolist()], dtype=np.float64)
     return PathProblem(
         frames=hand_frames(hand),
-        links=bodies.links,
+        links=links,
         meshes=meshes,
         mesh=tables.mesh,
         lineage=tables.lineage,
@@ -187,7 +188,8 @@ class _Tables:
 
 @kept_by_identity(_KEPT_HANDS)
 def _tables(hand: Hand, source: CollisionSource) -> _Tables:
-    bodies, meshes = hand_bodies(hand, source), link_mesh_arrays(hand, source)
+    links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
+    allowed = set(hand.allowed_pairs_for(source))
     count = len(hand.links)
     mesh = np.full(count, -1, dtype=np.int64)
     mesh[meshes.link] = np.arange(len(meshes.link))
@@ -195,19 +197,19 @@ def _tables(hand: Hand, source: CollisionSource) -> _Tables:
     for i, link in enumerate(hand.links):
         if link.parent >= 0:
             lineage[i] |= lineage[link.parent]
-    solid = [i for i in hand.solid_links if bodies.links.root[i] >= 0]
-    between = [(m, r) for m in solid for r in solid if r < m and bodies.across[m, r]]
+    solid = [i for i in hand.solid_links if links.root[i] >= 0]
+    between = [(m, r) for m in solid for r in solid if r < m and (r, m) not in allowed]
     all_pairs = [*between, *((m, -1) for m in solid)]
     return _Tables(
         mesh,
         lineage,
-        _reach(hand, bodies, lineage),
+        _reach(hand, links, lineage),
         np.array(all_pairs, dtype=np.int64).reshape(-1, 2),
         np.array(between, dtype=np.int64).reshape(-1, 2),
     )
 
 
-def _reach(hand: Hand, bodies: HandBodies, lineage: NDArray[np.int64]) -> FloatArray:
+def _reach(hand: Hand, bodies: BodyArrays, lineage: NDArray[np.int64]) -> FloatArray:
     """Return bounds on the distance of every link's points from every joint's axis, shape (L, J).
 
     A point of a link is never farther from a joint's anchor than along the links between them. The way from a link's
@@ -220,9 +222,9 @@ def _reach(hand: Hand, bodies: HandBodies, lineage: NDArray[np.int64]) -> FloatA
         up[i] = np.linalg.norm(anchor), np.linalg.norm((link.T_parent_link @ np.append(anchor, 1.0))[:3])
     reach = np.zeros((len(links), len(joints)))
     for m in range(len(links)):
-        if bodies.links.root[m] < 0:
+        if bodies.root[m] < 0:
             continue
-        ball = bodies.links.node[bodies.links.root[m]]
+        ball = bodies.node[bodies.root[m]]
         own = float(np.linalg.norm(ball[:3]) + ball[3])
         for i, link in enumerate(links):
             if link.joint < 0:

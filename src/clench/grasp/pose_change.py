@@ -57,7 +57,7 @@ class PoseChange:
         self.axes = np.array([j.axis for j in hand.joints]).reshape(-1, 3)
         self.anchors = np.array([j.anchor for j in hand.joints]).reshape(-1, 3)
         self.touches: dict[int, list[StageTouch]] = {}
-        bodies = hand_bodies(hand, source)
+        bodies = hand_bodies(hand, source, stages[0].posture if stages else None)
         T_palm_object = invert(T_world_palm.matrix) @ T_world_object.matrix
         moves = np.array(
             [moved @ (s.rates != 0.0) & ~at_limit(hand, s.leader, s.posture) for s in stages], dtype=np.bool_

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -11,14 +10,15 @@ import numpy as np
 from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.hand.link_mesh import link_meshes
+from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
+from clench.models.tessellation import TESSELLATION_DEVIATION
 
-from .depths import link_meshes
-from .exact import hand_bodies
+from .exact import link_bodies
 from .linkage import placed_links
 from .plan import FingerPlan, last_closing_joint
-from .scene import TESSELLATION_DEVIATION, PackedObject, shape_elements
+from .scene import PackedObject, role_body
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays
@@ -30,20 +30,12 @@ def graspable_body(obj: GraspObject, packed: PackedObject) -> BodyArrays:
     """Return what is to be grasped of an object as one body, in the object's frame; obstacles are left out."""
     if all(role is BodyRole.GRASPABLE for role in packed.body_roles):
         return packed.bodies
-    return _of_role(obj.bodies, BodyRole.GRASPABLE, CollisionSource(obj.collision_source))
+    return role_body(obj, BodyRole.GRASPABLE)
 
 
 def obstacle_body(obj: GraspObject) -> BodyArrays:
     """Return the obstacles of an object as one body, in the object's frame."""
-    return _of_role(obj.bodies, BodyRole.OBSTACLE, CollisionSource(obj.collision_source))
-
-
-@lru_cache(maxsize=8)
-def _of_role(bodies: tuple[Body, ...], role: BodyRole, source: CollisionSource) -> BodyArrays:
-    from clench.kernels.bodies import join_elements, pack_bodies
-
-    shapes = [shape for body in bodies if body.role is role for shape in body.shapes]
-    return pack_bodies([join_elements([shape_elements(shape, source) for shape in shapes])])
+    return role_body(obj, BodyRole.OBSTACLE)
 
 
 def nearest_link(
@@ -66,9 +58,7 @@ def nearest_link(
 
     poses = placed_links(hand, q)
     wanted = np.array(links, dtype=np.int64)
-    gap, link = smallest_gap(
-        hand_bodies(hand, source).links, wanted, poses, target, np.ascontiguousarray(T_palm_target[:3])
-    )
+    gap, link = smallest_gap(link_bodies(hand, source), wanted, poses, target, np.ascontiguousarray(T_palm_target[:3]))
     return max(gap, 0.0), link
 
 

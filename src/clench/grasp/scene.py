@@ -4,35 +4,33 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from functools import partial
+from numbers import Integral
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.keeping import kept_by_identity
+from clench.base.errors import CommandError
+from clench.base.keeping import KeptBySize, kept_by_identity
 from clench.base.memory import expect
 from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.parts import part_points
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-
-from .parts import part_points
+from clench.models.tessellation import shape_mesh
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays, Elements
     from clench.kernels.tree import MeshTree
 
-#: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
-TESSELLATION_FRACTION: Final = 2e-3
-#: ... and in metres.
-TESSELLATION_DEVIATION: Final = 2e-5
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
 _KEPT_HANDS: Final = 16
-#: Objects that stay packed: one of a million triangles takes a fifth of a gigabyte.
-KEPT_OBJECTS: Final = 8
+#: Memory for objects that stay packed, unless `set_object_cache` says otherwise [bytes].
+OBJECT_CACHE: Final = 512_000_000
 ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
 #: Number of each kind of round shape in `RoundShapes.kind`.
 ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
@@ -69,7 +67,8 @@ class PackedObject:
         body_closed: the same for each body.
         body_names, body_roles: of the bodies that `tree.body` and `rounds.body` number.
         center: middle of the box around the graspable bodies [m], shape (3,).
-        radius: of the ball around `center` that holds everything [m]. points: one of every connected part, (N, 3).
+        radius: of the ball around `center` that holds everything [m]. size: the same for the graspable bodies [m].
+        points: one of every connected part, (N, 3).
         geometry_hash: SHA-256 over the arrays, hexadecimal.
     """
 
@@ -85,6 +84,7 @@ class PackedObject:
     body_roles: tuple[BodyRole, ...]
     center: FloatArray
     radius: float
+    size: float
     points: FloatArray
     geometry_hash: str
 
@@ -101,31 +101,49 @@ class PackedObject:
 
 
 def pack_object(obj: GraspObject) -> PackedObject:
-    """Pack an object's bodies for the kernels; the pose plays no part, and the same bodies are packed once."""
+    """Pack an object's bodies for the kernels; the pose plays no part, and the same bodies are packed once.
+
+    Objects stay packed as long as they fit into the memory that `set_object_cache` gives them.
+    """
     global _latest
     latest = _latest
     if latest[0] is obj.bodies and latest[1] == obj.collision_source and latest[2] is not None:
         return latest[2]
-    packed = _pack(obj.bodies, CollisionSource(obj.collision_source))
+    bodies, source = obj.bodies, CollisionSource(obj.collision_source)
+    packed: PackedObject = _packed.get((bodies, source), partial(_pack, bodies, source))
     _latest = (obj.bodies, obj.collision_source, packed)
     return packed
 
 
-def tessellation_deviation(shape: Shape) -> float:
-    """Return how far the triangles of a shape may be off [m]; 0 for meshes and boxes, which are exact."""
-    if shape.kind in (ShapeKind.MESH, ShapeKind.BOX):
-        return 0.0
-    return min(TESSELLATION_DEVIATION, TESSELLATION_FRACTION * max(shape.size))
+def set_object_cache(size: int) -> None:
+    """Set how many bytes of packed objects stay in memory, 512 MB by default; those used last stay.
+
+    The first solve with an object packs its triangles into trees, which takes some ten milliseconds. Later solves use
+    what is kept. A mesh takes about 200 bytes per triangle. The object used last stays, however large it is.
+
+    Args:
+        size: [bytes]; 0 keeps the last object alone.
+
+    Raises:
+        CommandError: not a whole number of at least 0.
+    """
+    if isinstance(size, bool) or not isinstance(size, Integral) or size < 0:
+        raise CommandError(f"set_object_cache: expected a whole number of bytes of at least 0, got {size!r}.")
+    _packed.resize(int(size))
 
 
-def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
-    """Return a shape's triangles in its body's or link's frame; with `engine`, a mesh is its convex hull."""
-    if shape.kind is ShapeKind.MESH and source is CollisionSource.ENGINE:
-        from clench.models.tessellation import convex_hull
+def role_body(obj: GraspObject, role: BodyRole) -> BodyArrays:
+    """Return the bodies of one role as one body, in the object's frame; kept like what `pack_object` returns."""
+    source = CollisionSource(obj.collision_source)
+    found: BodyArrays = _packed.get((obj.bodies, source, role), partial(_pack_role, obj.bodies, source, role))
+    return found
 
-        assert shape.mesh is not None
-        return convex_hull(shape.mesh).transformed(shape.pose)
-    return shape.to_mesh(tessellation_deviation(shape) or TESSELLATION_DEVIATION)
+
+def _pack_role(bodies: tuple[Body, ...], source: CollisionSource, role: BodyRole) -> BodyArrays:
+    from clench.kernels.bodies import join_elements, pack_bodies
+
+    shapes = [shape for body in bodies if body.role is role for shape in body.shapes]
+    return pack_bodies([join_elements([shape_elements(shape, source) for shape in shapes])])
 
 
 def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
@@ -168,7 +186,25 @@ def hash_hand(hand: Hand, source: CollisionSource) -> str:
 _latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", None)
 
 
-@lru_cache(maxsize=KEPT_OBJECTS)
+def packed_size(packed: PackedObject | BodyArrays) -> int:
+    """Return the memory of the arrays of something packed [bytes]; arrays that two trees share count once."""
+    found: dict[int, int] = {}
+
+    def count(value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            found[id(value)] = value.nbytes
+        elif isinstance(value, tuple):
+            for part in value:
+                count(part)
+
+    count(tuple(vars(packed).values()) if isinstance(packed, PackedObject) else packed)
+    return sum(found.values())
+
+
+#: What is packed, by bodies and collision source, and the bodies of one role.
+_packed: Final[KeptBySize[Any]] = KeptBySize(OBJECT_CACHE, packed_size)
+
+
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     from clench.kernels.bodies import pack_triangles
     from clench.kernels.tree import feature_owners
@@ -181,7 +217,8 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     full_tree = _tree(flat + curved) if curved else tree
     joined, element_body = _bodies(placed, source) if curved else (pack_triangles(tree), tree.body)
     graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
-    center = _middle(_corners(full_tree, np.isin(full_tree.body, graspable)))
+    held = _corners(full_tree, np.isin(full_tree.body, graspable))
+    center = _middle(held)
     away = np.linalg.norm(_corners(full_tree, slice(None)) - center, axis=1)
     # With `engine` every mesh became a convex hull, which is closed whatever the mesh was.
     closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
@@ -198,6 +235,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         body_roles=tuple(body.role for body in bodies),
         center=center,
         radius=float(away.max(initial=0.0)),
+        size=float(np.linalg.norm(held - center, axis=1).max(initial=0.0)),
         points=part_points(full_tree),
         geometry_hash=hash_bodies(bodies, source),
     )

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import itertools
 
-import numpy as np
-
-from clench.base.pose import FloatArray, invert
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.models.hand.allowed import adjacent_pairs
 from clench.models.hand.findings import Finding, FindingCode, Severity, in_hand_file
 from clench.models.hand.hand import Hand
+from clench.models.hand.hulls import check_hulls
+from clench.models.hand.link_mesh import link_meshes, overlap_depth
 from clench.models.hand.opposition import check_thumbs
 from clench.models.shapes import CollisionSource
-
-from .depths import LinkMesh, link_meshes
 
 
 def check_hand(hand: Hand, source: CollisionSource | str | None = None) -> tuple[Finding, ...]:
@@ -25,6 +22,8 @@ def check_hand(hand: Hand, source: CollisionSource | str | None = None) -> tuple
     """
     chosen = hand.default_source if source is None else CollisionSource(source)
     found = [*hand.findings, *_overlaps(hand, chosen), *check_thumbs(hand)]
+    if chosen is CollisionSource.ENGINE:
+        found += check_hulls(hand)
     return tuple(sorted(found, key=lambda finding: finding.severity is Severity.NOTE))
 
 
@@ -45,46 +44,22 @@ def open_overlaps(hand: Hand, source: CollisionSource) -> list[tuple[int, int, f
     return found
 
 
-def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
-    """Return how deep two links overlap [m], 0 when they do not.
-
-    Args:
-        a, b: the links. poses: of all links in the palm frame, shape (L, 4, 4).
-    """
-    from clench.kernels.depth import CROSSINGS, penetration
-    from clench.kernels.tree import STACK_SIZE
-
-    centers = [poses[m.link][:3, :3] @ m.center + poses[m.link][:3, 3] for m in (a, b)]
-    if np.linalg.norm(centers[0] - centers[1]) > a.radius + b.radius:
-        return 0.0
-    T_b_a = invert(poses[b.link]) @ poses[a.link]
-    depth, *_ = penetration(
-        a.tree,
-        a.owners,
-        a.closed,
-        b.tree,
-        b.owners,
-        b.closed,
-        np.ascontiguousarray(T_b_a[:3]),
-        np.ascontiguousarray(invert(T_b_a)[:3]),
-        np.empty(CROSSINGS),
-        np.empty(STACK_SIZE, dtype=np.int32),
-    )
-    return float(depth)
-
-
 def _overlaps(hand: Hand, source: CollisionSource) -> list[Finding]:
-    allowed = set(hand.allowed_pairs)
+    always = set(hand.allowed_pairs_for(source))
+    allowed = set(hand.allowed_pairs_from(source, hand.open_angles()))
     found = []
     for a, b, depth in open_overlaps(hand, source):
         names = (hand.links[a].name, hand.links[b].name)
         numbers = {"depth_m": depth}
         text = f"Links '{names[0]}' and '{names[1]}' overlap by {depth * 1e3:.3g} mm at the open posture"
         if (a, b) in allowed:
+            why = "they may, since the model excludes the pair or they overlap in every posture that was looked at"
+            if (a, b) not in always:
+                why = "a motion that starts so may go on so, and one that starts with them apart keeps them apart"
             found.append(
                 Finding(
                     FindingCode.OVERLAP_ALLOWED,
-                    f"{text}; they may, since the model excludes the pair or starts with it overlapping.",
+                    f"{text}; {why}.",
                     "Nothing to do, unless these links meet on the real hand while it closes: then slim their shapes.",
                     Severity.NOTE,
                     links=names,

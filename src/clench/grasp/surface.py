@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clench.base.keeping import kept_by_identity
+from clench.base.keeping import kept_while_alive
 from clench.base.pose import FloatArray
 from clench.models.objects.grasp_object import BodyRole
 
-from .scene import KEPT_OBJECTS, PackedObject
+from .scene import PackedObject
 
 if TYPE_CHECKING:
     from clench.kernels.layout import RoundArrays
     from clench.kernels.touches import SurfaceArrays
 
 
-@kept_by_identity(KEPT_OBJECTS)
+@kept_while_alive
 def round_arrays(packed: PackedObject) -> RoundArrays:
     """Return an object's round shapes as the kernels take them."""
     from clench.kernels.layout import RoundArrays
@@ -26,7 +26,7 @@ def round_arrays(packed: PackedObject) -> RoundArrays:
     return RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)
 
 
-@kept_by_identity(KEPT_OBJECTS)
+@kept_while_alive
 def object_surface(packed: PackedObject) -> SurfaceArrays:
     """Return what reading touches needs of an object."""
     from clench.kernels.touches import SurfaceArrays
@@ -44,6 +44,8 @@ def object_surface(packed: PackedObject) -> SurfaceArrays:
 
 def nearest_body(packed: PackedObject, place: FloatArray) -> int:
     """Return the body whose surface is nearest to a point of the object's frame, shape (3,) [m]."""
+    if len(packed.body_names) == 1:
+        return 0
     from clench.kernels.distance import closest_point
 
     _, triangle, _, _, _ = closest_point(packed.full_tree, np.asarray(place, dtype=np.float64), np.inf)

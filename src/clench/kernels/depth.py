@@ -26,6 +26,7 @@ def penetration(
     obj_closed: bool,
     T_obj_link: Floats,
     T_link_obj: Floats,
+    limit: float,
     crossings: Floats,
     stack: Ints,
 ) -> tuple[float, float, float, float]:
@@ -34,6 +35,9 @@ def penetration(
     Depth is the largest distance from a point of the link's surface inside the object to the object's surface, or the
     same the other way round. Points looked at: vertices, triangle centres, and the middle of every piece of an edge
     between two crossings of the other surface; so it is exact at vertices and never too large.
+
+    The search ends at the first point that is `limit` deep. Far inside a large object the triangles of its surface are
+    all about as far away, and to find the nearest of them takes as long as to look at each.
 
     Args:
         link: the link's mesh.
@@ -44,14 +48,15 @@ def penetration(
         obj_closed: it is watertight with outward normals.
         T_obj_link: maps the link's coordinates to the object's, shape (3, 4).
         T_link_obj: its inverse, shape (3, 4).
+        limit: the largest depth that is told apart [m].
         crossings: scratch, shape (CROSSINGS,).
         stack: scratch, shape (STACK_SIZE,).
 
     Returns:
-        depth [m], 0 when disjoint or just touching, and the place x, y, z in the object's frame [m].
+        depth [m], at most `limit`, 0 when disjoint or just touching, and the place x, y, z in the object's frame [m].
     """
-    depth, p = _deepest(link, link_owners, T_obj_link, obj, obj_closed, 0.0, crossings, stack)
-    other, q = _deepest(obj, obj_owners, T_link_obj, link, link_closed, depth, crossings, stack)
+    depth, p = _deepest(link, link_owners, T_obj_link, obj, obj_closed, 0.0, limit, crossings, stack)
+    other, q = _deepest(obj, obj_owners, T_link_obj, link, link_closed, depth, limit, crossings, stack)
     if other > depth:
         x, y, z = moved(T_obj_link, q)
         return other, x, y, z
@@ -76,15 +81,16 @@ def _deepest(
     b: MeshTree,
     closed: bool,
     best: float,
+    limit: float,
     crossings: Floats,
     stack: Ints,
 ) -> Deepest:
-    """Return the depth and place (in b's frame) of the point of a's surface deepest inside b, if deeper than `best`."""
+    """Return depth and place (in b's frame) of the point of a's surface deepest inside b, if deeper than `best`."""
     vertices, triangles, low, high = a.vertices, a.triangles, a.low, a.high
     first, count, skip = a.first, a.count, a.skip
     place = (0.0, 0.0, 0.0)
     node = 0
-    while node < low.shape[0]:
+    while node < low.shape[0] and best < limit:
         hx, hy = 0.5 * (high[node, 0] - low[node, 0]), 0.5 * (high[node, 1] - low[node, 1])
         hz = 0.5 * (high[node, 2] - low[node, 2])
         center = moved(T, (low[node, 0] + hx, low[node, 1] + hy, low[node, 2] + hz))
@@ -95,12 +101,12 @@ def _deepest(
             p, q, r = corners(vertices, triangles, t)
             p, q, r = moved(T, p), moved(T, q), moved(T, r)
             middle = ((p[0] + q[0] + r[0]) / 3.0, (p[1] + q[1] + r[1]) / 3.0, (p[2] + q[2] + r[2]) / 3.0)
-            best, place = _deeper(b, middle, closed, best, place, stack)
+            best, place = _deeper(b, middle, closed, best, limit, place, stack)
             for k in range(3):
                 if owners[t] & (1 << k):
-                    best, place = _deeper(b, p, closed, best, place, stack)
+                    best, place = _deeper(b, p, closed, best, limit, place, stack)
                 if owners[t] & (8 << k):
-                    best, place = _deeper_on_edge(b, p, q, closed, best, place, crossings, stack)
+                    best, place = _deeper_on_edge(b, p, q, closed, best, limit, place, crossings, stack)
                 p, q, r = q, r, p
         node += 1
     return best, place
@@ -126,13 +132,15 @@ def _is_shallow(b: MeshTree, center: Point, radius: float, closed: bool, best: f
 
 
 @inner_kernel
-def _deeper(b: MeshTree, p: Point, closed: bool, best: float, place: Point, stack: Ints) -> Deepest:
-    """Return the deeper of `best` and the depth of p inside b, with its place."""
+def _deeper(b: MeshTree, p: Point, closed: bool, best: float, limit: float, place: Point, stack: Ints) -> Deepest:
+    """Return the deeper of `best` and the depth of p inside b up to `limit`, with its place."""
+    if best >= limit:
+        return best, place
     if best > 0.0 and closest_within(b, p, best, stack)[1] >= 0:
         return best, place
     if not is_inside(b, p, closed):
         return best, place
-    depth = np.sqrt(closest_within(b, p, np.inf, stack)[0])
+    depth = min(np.sqrt(closest_within(b, p, limit, stack)[0]), limit)
     if depth > best:
         return depth, p
     return best, place
@@ -140,7 +148,15 @@ def _deeper(b: MeshTree, p: Point, closed: bool, best: float, place: Point, stac
 
 @inner_kernel
 def _deeper_on_edge(
-    b: MeshTree, p: Point, q: Point, closed: bool, best: float, place: Point, crossings: Floats, stack: Ints
+    b: MeshTree,
+    p: Point,
+    q: Point,
+    closed: bool,
+    best: float,
+    limit: float,
+    place: Point,
+    crossings: Floats,
+    stack: Ints,
 ) -> Deepest:
     """Look at the middle of every piece of the edge pq between crossings with b."""
     number = _cross_edge(b, p, q, crossings)
@@ -152,7 +168,7 @@ def _deeper_on_edge(
         s = 0.5 * (start + end)
         if end > start:
             middle = (p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1]), p[2] + s * (q[2] - p[2]))
-            best, place = _deeper(b, middle, closed, best, place, stack)
+            best, place = _deeper(b, middle, closed, best, limit, place, stack)
         start = end
     return best, place
 

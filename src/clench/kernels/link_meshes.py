@@ -121,6 +121,8 @@ def measure_depths(
 ) -> None:
     """Write depth and place of links, (M, 4), zeros where nothing overlaps; see `penetration`.
 
+    No depth is larger than the ball around its link: what is deeper lies inside with all of its size.
+
     Args:
         meshes: of the links. which: of them, (M,). poses: `T_palm_link` of every link, (L, 3, 4).
         solid: the object. T_palm_object: where it is, (3, 4).
@@ -130,7 +132,7 @@ def measure_depths(
         out[k] = 0.0
         if which[k]:
             out[k, 0], out[k, 1], out[k, 2], out[k, 3] = depth_of(
-                meshes, k, poses[meshes.link[k]], solid, T_palm_object, work
+                meshes, k, poses[meshes.link[k]], solid, T_palm_object, 2.0 * meshes.radius[k], work
             )
 
 
@@ -141,9 +143,10 @@ def depth_of(
     T_palm_link: Floats,
     solid: ObjectMesh,
     T_palm_object: Floats,
+    limit: float,
     work: DepthWork,
 ) -> tuple[float, float, float, float]:
-    """Return depth and place of one link."""
+    """Return depth, up to a limit [m], and place of one link."""
     T, T_link_object = work.poses[0], work.poses[1]
     compose_inverse(T_palm_object, T_palm_link, T)
     if not may_touch(meshes, k, T, solid.tree):
@@ -165,6 +168,7 @@ def depth_of(
         solid.closed,
         T,
         T_link_object,
+        limit,
         work.crossings,
         work.stack,
     )

@@ -52,8 +52,9 @@ def gap_between(problem: PathProblem, m: int, r: int, near: float, work: PathWor
 def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
     """Return how deep a pair overlaps in its present place [m]; 0 when it is apart."""
     meshes, k = problem.meshes, problem.mesh[m]
+    limit = 2.0 * meshes.radius[k]
     if r < 0:
-        return depth_of(meshes, k, work.sweep.moving, problem.solid, work.sweep.resting, work.depth)[0]
+        return depth_of(meshes, k, work.sweep.moving, problem.solid, work.sweep.resting, limit, work.depth)[0]
     other = problem.mesh[r]
     solid = ObjectMesh(
         mesh_of(meshes, other),
@@ -61,7 +62,7 @@ def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float
         meshes.closed[other] != 0,
         meshes.points[meshes.point_first[other] : meshes.point_first[other + 1]],
     )
-    return depth_of(meshes, k, work.sweep.moving, solid, work.sweep.resting, work.depth)[0]
+    return depth_of(meshes, k, work.sweep.moving, solid, work.sweep.resting, limit, work.depth)[0]
 
 
 @inner_kernel

@@ -19,7 +19,9 @@ def any_deep(
     """Say whether a link that is wanted overlaps the object by more than is allowed."""
     for k in range(meshes.link.shape[0]):
         if wanted[k]:
-            depth = depth_of(meshes, k, poses[meshes.link[k]], solid, T_palm_object, work)[0]
+            # How much deeper does not matter.
+            limit = 2.0 * ALLOWED_PENETRATION
+            depth = depth_of(meshes, k, poses[meshes.link[k]], solid, T_palm_object, limit, work)[0]
             if depth > ALLOWED_PENETRATION:
                 return True
     return False

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from numbers import Integral, Real
@@ -14,7 +15,9 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from clench.base.errors import CommandError, FileError
+from clench.base.file_limits import COMMAND_ITEMS, COMMAND_SETS, JSON_BYTES
 from clench.base.files import expanded, read_file
+from clench.base.nesting import TOO_DEEP, is_too_deep
 from clench.base.numbers import is_finite_number
 from clench.base.pose import Pose
 
@@ -42,13 +45,17 @@ def load_command(path: str | Path) -> GraspCommand:
     """
     file = expanded(path)
     try:
-        data = json.loads(read_file(file), object_pairs_hook=_without_repeats)
+        data = json.loads(read_file(file, JSON_BYTES), object_pairs_hook=_without_repeats)
     except FileError:
         raise
     except CommandError as error:
         raise CommandError(f"{path}: {error}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise FileError(path, f"not JSON ({error}).") from None
+    except RecursionError:
+        raise FileError(path, f"not JSON that can be read: {TOO_DEEP}.") from None
+    if is_too_deep(data):
+        raise FileError(path, f"not JSON that can be read: {TOO_DEEP}.")
     return command_from_dict(data, str(path), folder=file.parent)
 
 
@@ -111,8 +118,10 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
         )
     _check_speeds(hand, command)
     _count(command.planes, "planes")
-    for key in ("yaw_grid", "open_variants", "opposition_grid"):
-        _numbers(getattr(command, key), key, "offsets in rad")
+    grids = ("yaw_grid", "open_variants", "opposition_grid")
+    sets = math.prod(len(_numbers(getattr(command, key), key, "offsets in rad")) for key in grids)
+    if sets > COMMAND_SETS:
+        raise CommandError(f"{', '.join(grids)}: they make {sets} sets together; expected up to {COMMAND_SETS}.")
     if command.next_steps != ():
         check_steps(hand, command.next_steps)
     if command.task_wrenches:
@@ -245,6 +254,7 @@ def _weights(value: Any, key: str, what: str) -> dict[str, float]:
 def _numbers(value: Any, key: str, what: str) -> tuple[float, ...]:
     if not isinstance(value, (list, tuple)) or not value:
         raise CommandError(f"{key}: expected a list of at least one number, {what}, got {_shown(value)}.")
+    _few(value, key)
     return tuple(_number(v, f"{key}[{i}]", f"a number, {what}") for i, v in enumerate(value))
 
 
@@ -264,9 +274,15 @@ def _whole(value: Any, key: str) -> int:
 
 def _count(value: Any, key: str, least: int = 1) -> int:
     count = _whole(value, key)
-    if count < least:
-        raise CommandError(f"{key}: expected at least {least}, got {count}.")
+    if not least <= count <= COMMAND_ITEMS:
+        bound = f"at least {least}" if count < least else f"at most {COMMAND_ITEMS}"
+        raise CommandError(f"{key}: expected {bound}, got {_shown(count)}.")
     return count
+
+
+def _few(value: Sequence[Any], key: str) -> None:
+    if len(value) > COMMAND_ITEMS:
+        raise CommandError(f"{key}: expected up to {COMMAND_ITEMS} items, got {len(value)}.")
 
 
 def _flag(value: Any, key: str) -> bool:
@@ -300,12 +316,14 @@ def check_steps(hand: Hand, steps: Sequence[Mapping[str, float]]) -> None:
 def _steps(value: Any, key: str) -> tuple[dict[str, float], ...]:
     if not isinstance(value, (list, tuple)):
         raise CommandError(f"{key}: expected a list of postures, got {_shown(value)}.")
+    _few(value, key)
     return tuple(_weights(step, f"{key}[{i}]", "a number in rad") for i, step in enumerate(value))
 
 
 def _wrenches(value: Any, key: str) -> tuple[dict[str, tuple[float, ...]], ...]:
     if not isinstance(value, (list, tuple)) or not value:
         raise CommandError(f"{key}: expected a list of at least one wrench to hold, got {_shown(value)}.")
+    _few(value, key)
     return tuple(_wrench(wrench, f"{key}[{i}]") for i, wrench in enumerate(value))
 
 

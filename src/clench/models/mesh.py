@@ -41,3 +41,17 @@ class TriangleMesh:
             np.vstack([m.vertices for m in meshes]),
             np.vstack([m.triangles + start for m, start in zip(meshes, starts, strict=False)]),
         )
+
+
+def is_closed(mesh: TriangleMesh) -> bool:
+    """Say whether every edge has as many triangles on either side, places merged, and the volume is positive."""
+    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    triangles = place.reshape(-1)[mesh.triangles]
+    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    size = len(mesh.vertices) + 1
+    forward = np.sort((starts * size + ends)[starts != ends])
+    backward = np.sort((ends * size + starts)[starts != ends])
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    middle = mesh.vertices.mean(axis=0) if len(mesh.vertices) else np.zeros(3)
+    volume = float(np.einsum("ij,ij->", a - middle, np.cross(b - middle, c - middle)))
+    return bool(np.array_equal(forward, backward)) and volume > 0.0

@@ -12,8 +12,12 @@ from clench.base.errors import ObjectError
 from clench.base.pose import FloatArray
 
 from .mesh import IntArray, TriangleMesh
-from .shapes import Shape, ShapeKind
+from .shapes import CollisionSource, Shape, ShapeKind
 
+#: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
+TESSELLATION_FRACTION: Final = 2e-3
+#: ... and in metres.
+TESSELLATION_DEVIATION: Final = 2e-5
 #: Facets around a round shape, at least and at most; beyond the upper bound a smaller deviation changes nothing.
 MIN_SEGMENTS: Final = 12
 MAX_SEGMENTS: Final = 512
@@ -28,6 +32,21 @@ BOX_TRIANGLES: Final = np.array(
         *([0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
     ]
 )
+
+
+def tessellation_deviation(shape: Shape) -> float:
+    """Return how far the triangles of a shape may be off [m]; 0 for meshes and boxes, which are exact."""
+    if shape.kind in (ShapeKind.MESH, ShapeKind.BOX):
+        return 0.0
+    return min(TESSELLATION_DEVIATION, TESSELLATION_FRACTION * max(shape.size))
+
+
+def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
+    """Return a shape's triangles in its body's or link's frame; with `engine`, a mesh is its convex hull."""
+    if shape.kind is ShapeKind.MESH and source is CollisionSource.ENGINE:
+        assert shape.mesh is not None
+        return convex_hull(shape.mesh).transformed(shape.pose)
+    return shape.to_mesh(tessellation_deviation(shape) or TESSELLATION_DEVIATION)
 
 
 def tessellate(shape: Shape, deviation: float) -> TriangleMesh:

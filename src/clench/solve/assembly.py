@@ -91,6 +91,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         object=problem.obj.name,
         hand_model=str(hand.path) if hand.path else hand.name,
         object_model=str(problem.obj.path) if problem.obj.path else problem.obj.name,
+        object_scale=problem.obj.scale,
         geometry_hash=f"{hash_hand(hand, problem.source)}+{packed.geometry_hash}",
         seed=command.seed,
         status=status,
@@ -286,7 +287,7 @@ def _overlap_text(found: LinkDepth, problem: Problem) -> str:
         return f"{link} overlaps {what_is_there(problem)}"
     x, y, z = problem.T_world_object.apply(found.place)
     body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
-    return f"{link} overlaps {body} by {found.depth * 1e3:.2f} mm at [{x:.4f}, {y:.4f}, {z:.4f}] m"
+    return f"{link} overlaps {body} {found.text} at [{x:.4f}, {y:.4f}, {z:.4f}] m"
 
 
 def _retreat(problem: Problem) -> float:

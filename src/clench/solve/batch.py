@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import islice
 from numbers import Integral
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,10 +20,11 @@ from clench.base.pose_arrays import pose_rows
 from clench.grasp.closing import core_count
 from clench.models.command import GraspCommand
 
+from .batch_parts import BatchParts
 from .batch_progress import shown
 from .batch_solver import BatchSolver
 from .devices import CPU, why_not
-from .grasp_batch import GraspBatch
+from .grasp_batch import GraspBatch, Question
 
 if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
@@ -46,6 +48,7 @@ def solve_batch(
     chunk: int = CHUNK,
     progress: bool | None = None,
     device: str = CPU,
+    out: str | Path | None = None,
 ) -> GraspBatch:
     """Solve a command at many poses; every answer has the bits of `clench.solve` at that pose, for any threads.
 
@@ -61,9 +64,12 @@ def solve_batch(
             answers. progress: show a bar on standard error after a second; by default where that is a terminal.
         device: what closes the fingers, "cpu" or "cuda"; where there is no CUDA device, a warning says so, and the
             CPU does it. Answers of a device differ in their last bits.
+        out: NumPy file (.npz) to write, see `GraspBatch.save`. Every chunk is written when it is solved, to the folder
+            `OUT.parts`. The same call goes on where an ended one stopped, and the folder goes when the file is whole.
 
     Raises:
-        CommandError: malformed poses or numbers, an unknown device, or see `clench.solve`.
+        CommandError: malformed poses or numbers, an unknown device, or see `clench.solve`. FileError: `out` cannot be
+            written, or its parts are those of another batch; both are known before anything is solved.
     """
     asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
     rows = pose_rows(hand_poses, "hand_poses")
@@ -72,21 +78,27 @@ def solve_batch(
         raise CommandError(f"object_poses: expected {len(rows)} poses, one per hand pose, got {len(there)}.")
     count, size, device = _threads(threads), _whole(chunk, "chunk"), _usable(device)
     columns = _preshapes(preshapes, len(rows))
+    question = Question(hand, obj, asked, columns)
+    parts = None if out is None else BatchParts(out, question, size, len(rows), (rows, there, device))
+    size = size if parts is None else parts.chunk
     groups = _postures(columns, len(rows))
-    parts = []
+    solved: list[GraspBatch] = []
     with shown(len(rows), progress) as advance:
         for where in groups:
             shape = {name: float(values[where[0]]) for name, values in columns.items()} if len(where) else {}
             solver = BatchSolver(hand, obj, replace(asked, preshape={**asked.preshape, **shape}))
             for begin in range(0, max(len(where), 1), size):
-                part = where[begin : begin + size]
-                parts.append(solver.solve(rows[part], None if there is None else there[part], count, device))
-                advance(len(part))
-    batch = GraspBatch.joined(parts)
+                some = where[begin : begin + size]
+                solve = partial(solver.solve, rows[some], None if there is None else there[some], count, device)
+                solved.append(solve() if parts is None else parts.part(len(solved), solver.names, rows[some], solve))
+                advance(len(some))
+    batch = GraspBatch.joined(solved)
     if len(groups) > 1:
         batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
-    question = replace(batch.question, command=asked, preshapes=columns)
-    return replace(batch, question=question)
+    batch = replace(batch, question=question)
+    if parts is not None:
+        parts.finish(batch)
+    return batch
 
 
 def solve_stream(

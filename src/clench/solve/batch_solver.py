@@ -110,7 +110,7 @@ class BatchSolver:
         chosen = np.full(solved.chosen.shape, -1) if self.packed.wanted.whole else self.packed.items.low[solved.chosen]
         idle = np.full((len(hand_rows), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
         return {
-            **self._names,
+            **self.names,
             "hand_poses": hand_rows,
             "object_poses": object_rows,
             "status_codes": solved.status.astype(np.int8),
@@ -122,7 +122,8 @@ class BatchSolver:
         }
 
     @cached_property
-    def _names(self) -> dict[str, Any]:
+    def names(self) -> dict[str, Any]:
+        """The fields of a batch that are the same for all poses."""
         problem = self._start
         return {
             "question": self._question,
@@ -147,7 +148,7 @@ class BatchSolver:
         planes = [[-1 if f.best is None else _plane(f.best.plane) for f in row] for row in fingers]
         codes = [[FINGER_STATUSES.index(f.status) for f in row] for row in fingers]
         return GraspBatch(
-            **self._names,
+            **self.names,
             hand_poses=hand_rows,
             object_poses=object_rows,
             status_codes=np.array([STATUSES.index(s.status) for s in solutions], dtype=np.int8),
@@ -211,8 +212,8 @@ def _contacts_of(solved: Solved, palms: FloatArray) -> BatchContacts:
         joint=number[:, TOUCH_JOINT],
         plane=number[:, TOUCH_PLANE],
         passed=value[:, TOUCH_GAP] > PASSED_GAP,
-        position=np.einsum("cij,cj->ci", R, value[:, :3]) + palms[pose, 4:],
-        normal=np.einsum("cij,cj->ci", R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
+        position=turned(R, value[:, :3]) + palms[pose, 4:],
+        normal=turned(R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
         gap=value[:, TOUCH_GAP],
     )
 
@@ -226,6 +227,12 @@ def rotations(rows: FloatArray) -> FloatArray:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(entries), -1, 0)
+
+
+def turned(R: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return vectors (N, 3) turned by matrices (N, 3, 3), each with the same bits however many there are."""
+    x, y, z = (vectors[:, None, k] for k in range(3))
+    return R[:, :, 0] * x + R[:, :, 1] * y + R[:, :, 2] * z
 
 
 def _plane(plane: int | None) -> int:

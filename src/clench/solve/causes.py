@@ -96,7 +96,7 @@ def _blocked(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
     if found.place is not None:
         place = problem.T_world_object.apply(found.place).tolist()
         body = problem.packed.body_names[nearest_body(problem.packed, found.place)]
-        depth = f" by {found.depth * 1e3:.2f} mm"
+        depth = f" {found.text}"
     if c.late:
         text = f"On the plane, joints of {name} about another axis would bring {link} into {body}"
         text = f"{text}: close over the full width."

@@ -154,7 +154,7 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
     if inside is not None:
         link = hand.links[inside].name
         return _refused(CertificateCode.BLOCKED_AT_START, f"{link} overlaps the object before anything moves.", [link])
-    checked = hand_bodies(hand, problem.source).across
+    checked = hand_bodies(hand, problem.source, problem.start).across
     pair = link_within_link(hand, opened, problem.source, checked)
     if pair is not None:
         names = [hand.links[i].name for i in pair]
@@ -177,7 +177,7 @@ def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[st
 
     hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])
     poses = placed_links(hand, q)
-    across = hand_bodies(hand, problem.source).across
+    across = hand_bodies(hand, problem.source, problem.start).across
     everything = exact._replace(object=problem.packed.bodies, checked=across)
     pair = find_link_overlap(everything, poses, T, ALLOWED_PENETRATION)
     return [hand.links[i].name for i in pair if 0 <= i < len(hand.links)]

@@ -110,7 +110,7 @@ def _with_each_other(
 ) -> list[FingerCandidate]:
     """Return the chosen sets, closed again where fingers are in each other's way."""
     hand, packed, plan, exact = problem.hand, problem.packed, made.plan, made.exact
-    bodies = hand_bodies(hand, problem.source)
+    bodies = hand_bodies(hand, problem.source, problem.start)
     if plan.together:
         return close_together(hand, plan, exact, closed, packed, best, bodies)
     return close_in_sequence(hand, plan, exact, closed, packed, best, problem.start, problem.rounds, bodies)

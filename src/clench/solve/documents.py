@@ -5,6 +5,7 @@ Keys are only ever added to the schema, so reading ignores keys it does not know
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -15,6 +16,7 @@ import numpy as np
 from clench.base.errors import ClenchError, FileError
 from clench.base.json_files import encode_document, non_finite_path, read_json, write_json
 from clench.base.pose import Pose
+from clench.models.hand.extremes import LARGEST_ANGLE
 from clench.models.shapes import CollisionSource
 
 from .solution import (
@@ -28,6 +30,8 @@ from .solution import (
 )
 
 SCHEMA = "clench.solution/1"
+#: Relative speeds are up to so many times larger or smaller than the usual 1 [-].
+FASTEST = 1e6
 
 _T = TypeVar("_T")
 _Vector = tuple[float, float, float]
@@ -76,6 +80,11 @@ class _SqueezeForm(msgspec.Struct):
     feasible: bool = False
     text: str = ""
     offsets: _Map = {}
+    torques: _Map = {}
+    mass: float = 0.0
+    mass_range: tuple[float, float] | None = None
+    friction: list[float] | None = None
+    contact_model: str = ""
     tensions: list[float] | None = None
 
 
@@ -110,6 +119,7 @@ class _SolutionForm(msgspec.Struct):
     speeds: _Map = {}
     rounds: int = 1
     next_steps: list[_Map] = []
+    object_scale: float = 1.0
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -122,6 +132,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "object": s.object,
         "hand_model": s.hand_model,
         "object_model": s.object_model,
+        "object_scale": float(s.object_scale),
         "geometry_hash": s.geometry_hash,
         "seed": None if s.seed is None else int(s.seed),
         "status": s.status.value,
@@ -166,19 +177,23 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
     form = _convert(data, _SolutionForm, source, "")
 
     def angles(value: Mapping[str, Any], key: str) -> dict[str, float]:
-        return {name: _convert(v, float, source, f"{key}.{name}") for name, v in value.items()}
+        return _read_numbers(value, key, source, -LARGEST_ANGLE, LARGEST_ANGLE)
 
-    for key in ("code", "text"):
-        if key not in form.reason:
-            raise FileError(source, f"reason.{key}: missing.")
+    _check_said(form.reason, ("code", "text"), source, "reason")
+    _check_said(form.certificate, ("text",), source, "certificate")
+    if form.rounds < 0:
+        raise FileError(source, f"rounds: expected at least 0, got {form.rounds}.")
     if form.squeeze is not None:  # is kept as it is, but what hands are told of it has to be of the right form
-        angles(_convert(form.squeeze, _SqueezeForm, source, "squeeze").offsets, "squeeze.offsets")
+        squeeze = _convert(form.squeeze, _SqueezeForm, source, "squeeze")
+        angles(squeeze.offsets, "squeeze.offsets")
+        angles(squeeze.torques, "squeeze.torques")
     return GraspSolution(
         clench_version=form.clench_version,
         hand=form.hand,
         object=form.object,
         hand_model=form.hand_model,
         object_model=form.object_model,
+        object_scale=form.object_scale,
         geometry_hash=form.geometry_hash,
         seed=form.seed,
         status=form.status,
@@ -202,14 +217,11 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         squeeze=form.squeeze,
         pregrasp=None if form.pregrasp is None else angles(form.pregrasp, "pregrasp"),
         choice=form.choice,
-        timing=angles(form.timing, "timing"),
-        speeds=angles(form.speeds, "speeds"),
+        timing=_read_numbers(form.timing, "timing", source),
+        speeds=_read_numbers(form.speeds, "speeds", source, 1.0 / FASTEST, FASTEST),
         rounds=form.rounds,
         next_steps=tuple(angles(step, f"next_steps[{i}]") for i, step in enumerate(form.next_steps)),
-        joint_limits={
-            name: _convert(v, tuple[float, float], source, f"joint_limits.{name}")
-            for name, v in form.joint_limits.items()
-        },
+        joint_limits={name: _read_limits(v, source, f"joint_limits.{name}") for name, v in form.joint_limits.items()},
     )
 
 
@@ -305,12 +317,37 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def _read_numbers(
+    value: Mapping[str, Any], key: str, source: str, least: float = -math.inf, most: float = math.inf
+) -> dict[str, float]:
+    found = {name: _convert(v, float, source, f"{key}.{name}") for name, v in value.items()}
+    for name, number in found.items():
+        if not least <= number <= most:
+            raise FileError(source, f"{key}.{name}: expected a number from {least:g} to {most:g}, got {number:g}.")
+    return found
+
+
+def _read_limits(value: Any, source: str, key: str) -> tuple[float, float]:
+    low, high = _convert(value, tuple[float, float], source, key)
+    if low > high:
+        raise FileError(source, f"{key}: expected the lower limit first, got [{low:g}, {high:g}].")
+    return low, high
+
+
+def _check_said(value: dict[str, Any] | None, keys: tuple[str, ...], source: str, where: str) -> None:
+    """Refuse a free-form value that lacks the text by which people are told of it."""
+    for key in () if value is None else keys:
+        if value is not None and not isinstance(value.get(key), str):
+            raise FileError(source, f"{where}.{key}: {'expected text' if key in value else 'missing'}.")
+
+
 def _read_finger(name: str, data: Any, source: str) -> FingerResult:
     key = f"fingers.{name}"
     form = _convert(data, _FingerForm, source, key)
     if form.candidates and not 0 <= form.chosen < len(form.candidates):
         last = len(form.candidates) - 1
         raise FileError(source, f"{key}.chosen: expected the index of a candidate, 0 to {last}, got {form.chosen}.")
+    _check_said(form.cause, ("code", "text"), source, f"{key}.cause")
     candidates = [_read_candidate(c, source, f"{key}.candidates[{i}]") for i, c in enumerate(form.candidates)]
     return FingerResult(name, form.status, form.reason, form.chosen, tuple(candidates), form.cause)
 
@@ -319,7 +356,7 @@ def _read_candidate(data: Any, source: str, key: str) -> Candidate:
     form = _convert(data, _CandidateForm, source, key)
 
     def numbers(values: Mapping[str, Any], part: str) -> dict[str, float]:
-        return {name: _convert(v, float, source, f"{key}.{part}.{name}") for name, v in values.items()}
+        return _read_numbers(values, f"{key}.{part}", source)
 
     return Candidate(
         plane=form.plane,

@@ -16,6 +16,7 @@ from clench.base.errors import CommandError
 from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray, Pose
 
+from .saved_question import question_arrays
 from .solution import FingerStatus, GraspSolution, SolutionStatus
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ Whole = NDArray[np.int64]
 STATUSES: Final = tuple(SolutionStatus)
 FINGER_STATUSES: Final = tuple(FingerStatus)
 SCHEMA: Final = "clench.batch/1"
-_PER_POSE: Final = (
+#: Columns with one row per pose.
+PER_POSE: Final = (
     *("hand_poses", "object_poses", "status_codes", "certified", "joint_angles", "finger_codes", "planes"),
     "one_by_one",
 )
@@ -161,7 +163,7 @@ class GraspBatch(LateFields):
         return solve(self.question.hand, self.question.obj, self.command(i))
 
     def save(self, path: str | Path) -> None:
-        """Write all arrays to a NumPy file (.npz), atomically; the names are columns of text.
+        """Write all arrays, and what was asked, to a NumPy file (.npz), atomically; the names are columns of text.
 
         Raises:
             FileError: the file cannot be written.
@@ -169,6 +171,7 @@ class GraspBatch(LateFields):
         skipped = {"question", "contacts"}
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in skipped}
         arrays |= {f"contact_{f.name}": getattr(self.contacts, f.name) for f in fields(self.contacts)}
+        arrays |= question_arrays(self.question)
         arrays |= {"schema": np.array(SCHEMA), "status": self.status, "finger_status": self.finger_status}
         content = io.BytesIO()
         np.savez(content, **arrays)  # type: ignore[arg-type]
@@ -177,7 +180,7 @@ class GraspBatch(LateFields):
     @classmethod
     def joined(cls, parts: Sequence[GraspBatch]) -> GraspBatch:
         """Return several batches of the same question as one, in order."""
-        columns: dict[str, Any] = {n: np.concatenate([getattr(part, n) for part in parts]) for n in _PER_POSE}
+        columns: dict[str, Any] = {n: np.concatenate([getattr(part, n) for part in parts]) for n in PER_POSE}
         preshapes = [part.question.preshapes for part in parts]
         merged = {name: np.concatenate([each[name] for each in preshapes]) for name in preshapes[0]}
         return replace(
@@ -194,7 +197,7 @@ class GraspBatch(LateFields):
         rows = np.repeat(self.contacts.first[order] - first[:-1], counts) + np.arange(int(first[-1]))
         columns = {f.name: getattr(self.contacts, f.name)[rows] for f in fields(self.contacts) if f.name != "first"}
         asked = self.question
-        taken: dict[str, Any] = {n: getattr(self, n)[order] for n in _PER_POSE}
+        taken: dict[str, Any] = {n: getattr(self, n)[order] for n in PER_POSE}
         return replace(
             self,
             question=replace(asked, preshapes={name: a[order] for name, a in asked.preshapes.items()}),

@@ -13,6 +13,7 @@ from clench.grasp.mechanics.contacts import (
     DEFAULT_TORSION,
     ContactModel,
     check_friction,
+    friction_range,
     make_contacts,
     pair_friction,
     without_repeats,
@@ -69,7 +70,7 @@ def hold(
     obj: GraspObject,
     *,
     contact_model: ContactModel | str = ContactModel.POINT,
-    friction: float | None = None,
+    friction: float | tuple[float, float] | None = None,
     torsion: float = DEFAULT_TORSION,
     center_of_mass: ArrayLike | None = None,
 ) -> HeldSolution:
@@ -85,8 +86,9 @@ def hold(
         CommandError: the solution is of another hand, friction not above 0, a malformed centre of mass.
         UnknownNameError: a contact's link is not in the hand.
     """
-    if friction is not None:
-        check_friction(friction)
+    lowest = friction_range(friction)[0] if isinstance(friction, tuple) else friction
+    if lowest is not None:
+        check_friction(lowest)
     q = posture(solution.joint_angles, hand, "joint_angles")
     bodies = {body.name: body for body in obj.bodies if body.role is BodyRole.GRASPABLE}
     still = [c for c in solution.contacts if not c.passed and c.body in bodies]
@@ -98,7 +100,7 @@ def hold(
     made = make_contacts(
         [T_palm_world.apply(c.position) for c in contacts],
         [-T_palm_world.rotation @ c.normal for c in contacts],
-        pairs if friction is None else friction,
+        pairs if lowest is None else lowest,
         model=contact_model,
         torsion=torsion,
         links=links,

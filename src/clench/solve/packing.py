@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import OrderedDict
 
-from clench.base.keeping import kept_by_identity
+from clench.base.keeping import kept_while_alive
 from clench.grasp.batching import PackedProblem, choosing_terms, pack_problem, sums_alone
 from clench.grasp.calibration import Calibration
 from clench.grasp.exact import hand_bodies
-from clench.grasp.scene import KEPT_OBJECTS, PackedObject
+from clench.grasp.scene import PackedObject
 from clench.models.command import ClosingOrder
 
 from .planning import KEPT_PLANS, Planned
@@ -39,7 +39,7 @@ def packed_problem(problem: Problem, made: Planned, calibration: Calibration) ->
     return entry[1]
 
 
-@kept_by_identity(KEPT_OBJECTS)
+@kept_while_alive
 def _packed_with(packed: PackedObject) -> _Kept:
     """Return what is kept for an object."""
     return OrderedDict()
@@ -47,5 +47,5 @@ def _packed_with(packed: PackedObject) -> _Kept:
 
 def _pack(made: Planned, packed: PackedObject, terms: tuple[tuple[int, float], ...]) -> PackedProblem:
     hand, source = made.hand, made.source
-    bodies = hand_bodies(hand, source)
+    bodies = hand_bodies(hand, source, made.start)
     return pack_problem(hand, made.plan, made.exact, packed, made.start, source, bodies, terms, len(made.idle))

@@ -129,9 +129,10 @@ def _planned(asked: CheckedCommand) -> Planned:
     if not command.full_width:
         _check_planes(plans, command, asked.together)
     plan = make_hand_plan(plans, finger, posture, command.full_width, asked.together, command.rounds != 1)
-    exact = pack_exact(hand, plan.plans, plan.whole, asked.source)
+    bodies = hand_bodies(hand, asked.source, asked.start)
+    exact = pack_exact(hand, plan.plans, plan.whole, bodies)
     if asked.together:
-        exact = exact._replace(checked=_with_resting(hand, plan.plans, hand_bodies(hand, asked.source)))
+        exact = exact._replace(checked=_with_resting(hand, plan.plans, bodies))
     made = _plans[key] = Planned(hand, asked.start, asked.source, plan, exact, tuple(idle))
     while len(_plans) > KEPT_PLANS:
         _plans.popitem(last=False)

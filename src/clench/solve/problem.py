@@ -13,6 +13,7 @@ from clench.grasp.calibration import Calibration
 from clench.grasp.criteria import Setting
 from clench.grasp.motion import next_postures, palm_pose, task_wrenches
 from clench.grasp.scene import PackedObject, pack_object
+from clench.grasp.sizes import warn_of_size
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
@@ -83,6 +84,7 @@ def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem
         raise ObjectError(f"{obj.name}: no body to grasp; every body is an obstacle.")
     T_world_object = command.object_pose if command.object_pose is not None else obj.pose
     T_world_palm = palm_pose(hand, command, asked.start)
+    warn_of_size(hand, obj)
     own = asked.command.at(command.hand_pose, command.object_pose)
     return Problem(asked, obj, own, T_world_palm, T_world_object, pack_object(obj))
 

@@ -7,9 +7,10 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from clench.base.defaults import MASS
 from clench.grasp.mechanics.actuation import Actuation, Effort, actuation
 from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
-from clench.grasp.mechanics.loads import check_mass, gravity_any_direction
+from clench.grasp.mechanics.loads import gravity_any_direction, mass_range
 from clench.grasp.mechanics.steadiness import EDGES, epsilon, epsilon_within_torques
 from clench.grasp.mechanics.wrench_space import Ball, WrenchNorm, volume_l1
 from clench.models.hand.hand import Hand
@@ -17,9 +18,6 @@ from clench.models.objects.grasp_object import GraspObject
 
 from .holding import HeldSolution, hold
 from .solution import GraspSolution
-
-#: Mass that is held unless one is given [kg].
-DEFAULT_MASS = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +75,9 @@ def grasp_quality(
     hand: Hand,
     obj: GraspObject,
     *,
-    mass: float = DEFAULT_MASS,
+    mass: float | tuple[float, float] = MASS,
     contact_model: ContactModel | str = ContactModel.POINT,
-    friction: float | None = None,
+    friction: float | tuple[float, float] | None = None,
     torsion: float = DEFAULT_TORSION,
     center_of_mass: ArrayLike | None = None,
     norm: WrenchNorm | str = WrenchNorm.L1,
@@ -90,9 +88,10 @@ def grasp_quality(
 
     Args:
         solution: the solution. hand, obj: what it was computed for.
-        mass: of the object [kg].
+        mass: of the object [kg]; of a range (least, largest) the largest counts.
         contact_model: `point` (friction alone) or `soft` (also a torque about the normal).
-        friction: of all contacts [-]; None takes that of links and object, 0.5 where neither is known.
+        friction: of all contacts [-]; of a range (least, largest) the least counts; None takes that of links and
+            object, `clench.base.defaults.FRICTION` (0.6) where neither is known.
         torsion: torque about the normal per normal force of soft fingers [m].
         center_of_mass: in the object's frame [m]; None is that of a uniform density.
         norm: `L1` (normal forces sum to 1 N) or `Linf` (each is at most 1 N; takes up to a second).
@@ -101,7 +100,8 @@ def grasp_quality(
     Raises:
         CommandError: a value out of range; the solution is of another hand.
     """
-    loads = gravity_any_direction(check_mass(mass))
+    heaviest = mass_range(mass)[1]
+    loads = gravity_any_direction(heaviest)
     grasp = hold(
         solution,
         hand,
@@ -121,6 +121,6 @@ def grasp_quality(
         epsilon=ball,
         volume=volume_l1(held.edge_wrenches(edges)) if len(held.contacts) else 0.0,
         within_torques=epsilon_within_torques(held, edges) if within_torques else None,
-        mass=float(mass),
+        mass=heaviest,
         effort=actuation(held, loads, least),
     )

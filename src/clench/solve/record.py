@@ -15,6 +15,8 @@ from typing import Any, Self
 import msgspec
 
 from clench.base.errors import ClenchError, FileError, UnknownNameError
+from clench.base.file_limits import JSON_BYTES
+from clench.base.json_files import check_writable, parse_json
 
 from .documents import solution_from_dict, solution_to_json
 from .solution import FingerStatus, GraspSolution, SolutionStatus
@@ -52,6 +54,8 @@ _INSERT = """
 INSERT INTO solves (time, hand, object, status, seed, geometry_hash, touching_fingers, document)
 VALUES (?, ?, ?, ?, ?, ?, ?, ?)
 """
+#: The last bytes of a journal that names another file (sqlite.org/fileformat2.html, "The Rollback Journal").
+_NAMES_A_FILE = bytes.fromhex("d9d505f920a163d7")
 _COLUMNS = ("id", "time", "hand", "object", "status", "seed", "geometry_hash", "touching_fingers")
 _Row = tuple[str, str, str, str, int | None, str, int, bytes]
 
@@ -79,7 +83,8 @@ class RecordEntry:
 class Record:
     """Append solutions to a SQLite file and read them back; a context manager.
 
-    Writes are atomic, and readers in other processes never wait for a writer (write-ahead log).
+    Writes are atomic, and readers in other processes never wait for a writer (write-ahead log). A record in a folder
+    that cannot be written can be read.
 
     Args:
         path: the file; made when missing.
@@ -94,13 +99,33 @@ class Record:
             raise FileError(path, "cannot be opened (no regular file).")
         if not os.path.isdir(self.path.parent):
             raise FileError(path, f"cannot be opened (no folder '{self.path.parent}').")
+        _refuse_journal(self.path)
         with self._clear_errors():
-            self._connection = sqlite3.connect(self.path, timeout=30.0, isolation_level=None)
+            self._is_read_only = not _can_be_written(self.path)
+            self._connection = sqlite3.connect(
+                _address(self.path) if self._is_read_only else self.path,
+                timeout=30.0,
+                isolation_level=None,
+                uri=self._is_read_only,
+            )
             try:
+                self._connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, JSON_BYTES)
                 self._prepare()
             except BaseException:
                 self._connection.close()
                 raise
+
+    @classmethod
+    def check(cls, path: str | Path) -> None:
+        """Refuse a record that nothing can be appended to, before the work is done; a missing one is not made yet.
+
+        Raises:
+            FileError: see `Record`, or it cannot be written.
+        """
+        check_writable(path)
+        if os.path.exists(path):
+            with cls(path) as record, record._clear_errors(), record._transaction():
+                pass
 
     def append(self, solution: GraspSolution) -> int:
         """Add one solution and return its id."""
@@ -133,11 +158,9 @@ class Record:
                 listed = [] if known[0] is None else [f"{known[0]} to {known[1]}"]
                 raise UnknownNameError("solve", str(entry_id), f"record '{self.path}'", listed)
         source = f"{self.path}, solve {entry_id}"
-        try:
-            data = msgspec.json.decode(row[0])
-        except (msgspec.DecodeError, UnicodeDecodeError, TypeError) as error:
-            raise FileError(source, f"the document is damaged ({error}).") from None
-        return solution_from_dict(data, source)
+        if not isinstance(row[0], bytes):
+            raise FileError(source, "the document is damaged (expected bytes).")
+        return solution_from_dict(parse_json(row[0], source), source)
 
     def find(
         self,
@@ -179,6 +202,8 @@ class Record:
     def outcomes(self) -> list[tuple[int, bool]]:
         """Return what was noted, in order: id of the solve, and whether the object was held."""
         with self._clear_errors():
+            if not self._connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'outcomes'").fetchone():
+                return []  # version 1, which cannot be carried over where it is read only
             rows = self._connection.execute("SELECT solve, held FROM outcomes ORDER BY id").fetchall()
         return [(int(solve), bool(held)) for solve, held in rows]
 
@@ -208,6 +233,7 @@ class Record:
     def _prepare(self) -> None:
         """Make the tables in a new file; refuse a file that is not ours."""
         c = self._connection
+        c.execute("PRAGMA trusted_schema = OFF")
         (identity,) = c.execute("PRAGMA application_id").fetchone()
         (version,) = c.execute("PRAGMA user_version").fetchone()
         (objects,) = c.execute("SELECT count(*) FROM sqlite_master").fetchone()
@@ -224,6 +250,9 @@ class Record:
             raise FileError(self.path, "a SQLite file of another program, not a record of solves.")
         elif version > SCHEMA_VERSION:
             raise FileError(self.path, f"a record of version {version}; this program reads up to {SCHEMA_VERSION}.")
+        self._check_tables()
+        if self._is_read_only:
+            return
         c.execute("PRAGMA journal_mode = WAL")
         c.execute("PRAGMA synchronous = NORMAL")
         if identity == APPLICATION_ID and version < SCHEMA_VERSION:
@@ -232,6 +261,19 @@ class Record:
                 if cursor.execute("PRAGMA user_version").fetchone()[0] < SCHEMA_VERSION:
                     cursor.execute(_OUTCOMES)
                     cursor.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    def _check_tables(self) -> None:
+        """Refuse tables that only look like ours: views, triggers and computed columns run whatever their author likes.
+
+        Other tables in the file are left alone; nothing reads them.
+        """
+        ours = {" ".join(s.split()) for s in f"{_TABLES}{_OUTCOMES}".split(";")}
+        query = "SELECT type, name, sql FROM sqlite_master WHERE lower(name) IN (?, ?) OR lower(tbl_name) IN (?, ?)"
+        for kind, name, sql in self._connection.execute(query, ("solves", "outcomes") * 2):
+            if " ".join(str(sql).split()) not in ours:
+                raise FileError(
+                    self.path, f"no record of clench's: it has the {kind} '{name}', which clench never makes."
+                )
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Cursor]:
@@ -260,11 +302,43 @@ class Record:
                 problem = "not a record of solves: the file is no SQLite database."
             elif "malformed" in text or "corrupt" in text or "disk image" in text:
                 problem = "the record is damaged and cannot be read."
+            elif "readonly" in text:
+                problem = "the record cannot be written: the file or its folder is read only."
             elif "closed" in text:
                 problem = "the record is closed."
             else:
                 problem = f"the record cannot be used ({text})."
             raise FileError(self.path, problem) from None
+
+
+def _can_be_written(path: Path) -> bool:
+    """Return whether SQLite can write a file and its log beside it; a file that is missing is made."""
+    return os.access(path.parent, os.W_OK) and (not os.path.exists(path) or os.access(path, os.W_OK))
+
+
+def _refuse_journal(path: Path) -> None:
+    """Refuse a journal that names another file, which SQLite would read, and may delete.
+
+    SQLite writes such a name only where several databases are written together; clench never does that.
+
+    Raises:
+        FileError: with the journal.
+    """
+    journal = Path(f"{path}-journal")
+    try:
+        with open(journal, "rb") as file:
+            file.seek(-len(_NAMES_A_FILE), os.SEEK_END)
+            found = file.read() == _NAMES_A_FILE
+    except (OSError, ValueError):
+        return  # none, or one that is too short for a name
+    if found:
+        raise FileError(journal, "a journal that names another file, which clench never leaves; remove it.")
+
+
+def _address(path: Path) -> str:
+    """Return the address under which SQLite only reads a file; without a log beside it, it takes no lock either."""
+    still = "" if os.path.exists(f"{path}-wal") else "&immutable=1"
+    return f"{path.absolute().as_uri()}?mode=ro{still}"
 
 
 def _row(solution: GraspSolution, time: str) -> _Row:

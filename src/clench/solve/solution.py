@@ -170,6 +170,7 @@ class GraspSolution(LateFields):
 
     Args:
         hand, object: names. hand_model, object_model: what to load to execute it again (path or built-in name).
+        object_scale: what the lengths of the object's model were multiplied by [-].
         status, reason: the answer; `reason` has at least ``"code"`` and ``"text"``.
         hand_pose: `T_world_palm`; object_pose: `T_world_object`.
         decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
@@ -214,6 +215,7 @@ class GraspSolution(LateFields):
     speeds: Mapping[str, float] = field(default_factory=dict)
     rounds: int = 1
     next_steps: tuple[Mapping[str, float], ...] = ()
+    object_scale: float = field(default_factory=lambda: 1.0)
 
     @classmethod
     def deferred(cls, make: Callable[[], GraspSolution], **known: Any) -> GraspSolution:

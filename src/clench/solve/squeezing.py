@@ -9,22 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.base.defaults import (
+    FRICTION_RESERVE,
+    LOAD_RESERVE,
+    LOSS_RESERVE,
+    MASS,
+    MOST_FORCE_OF_LIGHT,
+    MOST_FORCE_PER_WEIGHT,
+)
 from clench.base.pose import FloatArray
 from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
 from clench.grasp.mechanics.loads import (
     GRAVITY,
     check_loads,
-    check_mass,
     gravity_any_direction,
+    mass_range,
     six_pulls_and_twists,
     weight,
 )
-from clench.grasp.mechanics.squeeze import ENOUGH, SqueezeForces, squeeze_forces
+from clench.grasp.mechanics.squeeze import SqueezeForces, squeeze_forces
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
 from .holding import HeldSolution, hold
-from .quality import DEFAULT_MASS
 from .solution import GraspSolution
 
 #: Where gravity points in the world unless told otherwise.
@@ -38,8 +45,9 @@ class SqueezePlan:
     """Hold a squeeze, or why there is none.
 
     Args:
-        feasible: whether the mass is held at all; text: a sentence that says so, or which limit binds.
-        mass: [kg]. margin: disturbances are resisted up to this multiple [-].
+        feasible: whether every mass is held at all; text: sentences that say so, or which limit binds.
+        mass: the heaviest that is planned for [kg]. margin: disturbances are resisted up to this multiple [-].
+        lightest: the lightest mass that is planned for [kg]. any_direction: gravity may point anywhere.
         forces: on the object, one per contact, in the world [N], shape (C, 3); twists: torques about the inward
             normals of soft fingers [Nm], shape (C,).
         torques: by degree of freedom [Nm].
@@ -61,6 +69,8 @@ class SqueezePlan:
     tensions: FloatArray | None
     grasp: HeldSolution
     found: SqueezeForces
+    lightest: float
+    any_direction: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, `squeeze` in schema `clench.solution/1`."""
@@ -69,7 +79,11 @@ class SqueezePlan:
             "feasible": self.feasible,
             "text": self.text,
             "mass": self.mass,
+            "mass_range": [self.lightest, self.mass],
+            "any_direction": self.any_direction,
             "margin": self.margin,
+            "friction_reserve": self.found.reserve,
+            "joint_friction_loss": self.found.loss,
             "forces": self.forces.tolist(),
             "twists": self.twists.tolist(),
             "torques": dict(self.torques),
@@ -83,16 +97,19 @@ def plan_squeeze(
     hand: Hand,
     obj: GraspObject,
     *,
-    mass: float = DEFAULT_MASS,
+    mass: float | tuple[float, float] = MASS,
     gravity: ArrayLike | None = DOWN,
     disturbances: ArrayLike | None = None,
-    margin: float = ENOUGH,
+    margin: float = LOAD_RESERVE,
     contact_model: ContactModel | str = ContactModel.POINT,
-    friction: float | None = None,
+    friction: float | tuple[float, float] | None = None,
     torsion: float = DEFAULT_TORSION,
     center_of_mass: ArrayLike | None = None,
+    reserve: float = FRICTION_RESERVE,
 ) -> SqueezePlan:
-    """Return the forces that hold a mass with the largest margin over a set of disturbances, inside all limits.
+    """Plan the forces that hold an object with the largest margin over a set of disturbances, inside all limits.
+
+    Mass and friction may be ranges (least, largest): the plan holds all of them. A number is a range of one value.
 
     Args:
         solution: the solution. hand, obj: what it was computed for.
@@ -100,15 +117,17 @@ def plan_squeeze(
         gravity: direction in the world; None: any direction, and the mass is held when the margin reaches 1 and no
             disturbance is left out of it.
         disturbances: rows (force [N], torque [Nm]) in the world about the centre of mass, shape (N, 6); None: the
-            weight as a pull along ±x, ±y, ±z of the palm, and as a torque at the length scale about the same axes
-            (with `gravity=None`: the weight in any direction).
+            largest weight as a pull along ±x, ±y, ±z of the palm, and as a torque at the length scale about the same
+            axes (with `gravity=None`: the weight in any direction).
         margin: the largest that is asked for; beyond it, torques are made small instead [-].
         contact_model, friction, torsion, center_of_mass: see `grasp_quality`.
+        reserve: part of the lowest friction that the plan counts on, where the mass can be held so [-].
 
     Raises:
         CommandError: a value out of range, an empty set of disturbances; the solution is of another hand.
     """
-    check_mass(mass)
+    masses = mass_range(mass)
+    any_direction = gravity is None
     grasp = hold(
         solution,
         hand,
@@ -118,37 +137,49 @@ def plan_squeeze(
         torsion=torsion,
         center_of_mass=center_of_mass,
     )
-    nominal = np.zeros((1, 6)) if gravity is None else weight(mass, grasp.palm_direction(gravity))
-    # Any direction is held where the margin over the weight is 1: no less than that is looked for.
-    enough = margin if gravity is not None or not margin > 0.0 else max(margin, 1.0)
-    found = squeeze_forces(grasp.held, nominal, _disturbances(grasp, mass, gravity, disturbances), enough=enough)
+    ends = np.zeros((2, 6))
+    if gravity is not None:
+        ends = np.vstack([weight(m, grasp.palm_direction(gravity)) for m in masses])
+    found = squeeze_forces(
+        grasp.held,
+        ends.mean(axis=0),
+        _disturbances(grasp, masses[1], gravity, disturbances),
+        # Any direction is held where the margin over the weight is 1: no less than that is looked for.
+        enough=margin if not any_direction or not margin > 0.0 else max(margin, 1.0),
+        needed=1.0 if any_direction else 0.0,
+        spread=None if (ends[0] == ends[1]).all() else 0.5 * (ends[1] - ends[0]),
+        reserve=reserve,
+        most_force=max(MOST_FORCE_PER_WEIGHT * masses[1] * GRAVITY, MOST_FORCE_OF_LIGHT),
+    )
     # The margin leaves out what no forces resist; without a direction of gravity that is the weight itself.
-    held_any_way = gravity is not None or (found.margin >= 1.0 and not found.unresisted)
+    held_any_way = not any_direction or (found.margin >= 1.0 and not found.unresisted)
     feasible = found.plan is not None and held_any_way
-    text = _sentence(found, mass, feasible, grasp, gravity is None)
     contacts, plan = grasp.held.contacts, found.plan
-    if plan is None:
-        nothing = np.zeros((0, 3))
-        return SqueezePlan(False, text, mass, 0.0, nothing, np.zeros(0), {}, {}, None, grasp, found)
-    local = np.einsum("cij,cj->ci", contacts.frames, plan.forces[:, :3])
-    torques = dict(zip(grasp.held.dofs.names, plan.torques.tolist(), strict=True))
+    nothing = plan is None
+    forces = np.zeros((0, 3)) if plan is None else np.einsum("cij,cj->ci", contacts.frames, plan.forces[:, :3])
+    twists = np.zeros(len(forces)) if plan is None or contacts.width == 3 else plan.forces[:, 3]
+    torques = np.zeros(0) if plan is None else plan.torques
     return SqueezePlan(
         feasible=feasible,
-        text=text,
-        mass=mass,
+        text=_sentence(found, masses, feasible, any_direction),
+        mass=masses[1],
         margin=found.margin,
-        forces=local @ grasp.T_world_palm.rotation.T,
-        twists=plan.forces[:, 3] if contacts.width == 4 else np.zeros(len(contacts)),
-        torques=torques,
-        offsets=angle_offsets(hand, grasp, plan.torques),
-        tensions=plan.tensions,
+        forces=forces @ grasp.T_world_palm.rotation.T,
+        twists=twists,
+        torques={} if nothing else dict(zip(grasp.held.dofs.names, torques.tolist(), strict=True)),
+        offsets={} if nothing else angle_offsets(hand, grasp, torques),
+        tensions=None if plan is None else plan.tensions,
         grasp=grasp,
         found=found,
+        lightest=masses[0],
+        any_direction=any_direction,
     )
 
 
 def angle_offsets(hand: Hand, grasp: HeldSolution, torques: FloatArray) -> dict[str, float]:
     """Return by how much position servos are to be told more than the touch, `tau / k_p`, by joint [rad].
+
+    Joints of a servo that pulls a fixed tendon have their share of what the tendon is told: see `Joint.stiffness`.
 
     Args:
         hand: the hand. grasp: its contacts. torques: of the degrees of freedom [Nm], shape (D,).
@@ -174,14 +205,18 @@ def _disturbances(grasp: HeldSolution, mass: float, gravity: ArrayLike | None, g
     return six_pulls_and_twists(max(mass * GRAVITY, _LEAST_DISTURBANCE))
 
 
-def _sentence(found: SqueezeForces, mass: float, feasible: bool, grasp: HeldSolution, any_way: bool) -> str:
-    how = "in every direction of gravity" if any_way else "under gravity"
+def _sentence(found: SqueezeForces, masses: tuple[float, float], feasible: bool, any_direction: bool) -> str:
+    which = f"{masses[1]:.3g} kg" if masses[0] == masses[1] else f"{masses[0]:.3g} to {masses[1]:.3g} kg"
+    held = f"{which} {'in every direction of gravity' if any_direction else 'under gravity'}"
     if found.plan is None:
-        return f"No squeeze holds {mass:.3g} kg {how}. {found.reason}"
+        return f"No squeeze holds {held}. {found.reason}"
     left_out = f"{len(found.unresisted)} of the disturbances cannot be resisted by any forces of these contacts."
     if not feasible and found.unresisted:
-        return f"No squeeze holds {mass:.3g} kg {how}: {left_out}"
+        return f"No squeeze holds {held}: {left_out}"
     if not feasible:
-        return f"No squeeze holds {mass:.3g} kg {how}: only {found.margin:.3g} times that mass."
-    text = f"Holds {mass:.3g} kg {how}, with disturbances up to {found.margin:.3g} times the weight."
+        return f"No squeeze holds {held}: only {found.margin:.3g} times that mass."
+    friction = f"{100 * found.reserve:.3g} % of the friction" if found.reserve < 1.0 else "all of the friction"
+    text = f"Holds {held}, with disturbances up to {found.margin:.3g} times the weight, and counts on {friction}."
+    if found.loss > (1.0 + 1e-6) / LOSS_RESERVE:
+        text += f" Friction in the joints takes up to {100 * found.loss:.2g} % of the torques of a finger."
     return f"{text} {left_out}" if found.unresisted else text

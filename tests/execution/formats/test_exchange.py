@@ -19,7 +19,7 @@ import clench
 from clench.base.errors import CommandError, FileError, UnknownNameError
 from clench.base.pose import Pose
 from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
-from clench.execution.formats.grasp_posture import GraspPosture, palm_in_object
+from clench.execution.formats.grasp_posture import GraspPosture
 from clench.models.hand.hand import Hand
 from clench.solve.solution import GraspSolution
 from handmade import make_solution
@@ -42,7 +42,6 @@ def test_there_and_back(placed: GraspSolution, tmp_path: Path, format: GraspForm
     assert read.name == "grasp_0"
     if format is GraspFormat.ISAAC_GRASP:
         assert read.object_pose == Pose.identity()
-        np.testing.assert_allclose(read.hand_pose.matrix, palm_in_object(placed).matrix, atol=1e-15)
         np.testing.assert_allclose(OBJECT.matrix @ read.hand_pose.matrix, placed.hand_pose.matrix, atol=1e-15)
     else:
         assert read.hand_pose == placed.hand_pose
@@ -64,7 +63,7 @@ def test_isaac_grasp_as_yaml_says_it(placed: GraspSolution, tmp_path: Path) -> N
         *("confidence", "position", "orientation", "cspace_position", "pregrasp_cspace_position"),
     ]
     assert grasp["pregrasp_cspace_position"] == placed.open_angles
-    assert grasp["confidence"] == float(placed.is_valid())
+    assert grasp["confidence"] == 0.0  # no squeeze is known
     assert np.linalg.norm([grasp["orientation"]["w"], *grasp["orientation"]["xyz"]]) == pytest.approx(1.0)
     assert len(import_grasps(tmp_path / "g.yaml")) == 2
 
@@ -285,7 +284,7 @@ def test_names_of_formats(placed: GraspSolution, tmp_path: Path) -> None:
         import_grasps(tmp_path / "g.txt", "isac")
     export_grasps(tmp_path / "g.txt", placed, "moveit_grasp")
     assert import_grasps(tmp_path / "g.txt", GraspFormat.MOVEIT_GRASP)[0].name == "grasp_0"
-    with pytest.raises(CommandError, match="one file holds one grasp; 2 solutions were given"):
+    with pytest.raises(CommandError, match=r"one file holds one grasp; 2 solutions were given .* Give a folder"):
         export_grasps(tmp_path / "g.npy", [placed, placed])
     with pytest.raises(CommandError, match="expected solutions of one hand and one object"):
         export_grasps(tmp_path / "g.yaml", [placed, replace(placed, hand="other")])

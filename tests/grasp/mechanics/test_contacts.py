@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import clench
+from clench.base.defaults import FRICTION
 from clench.base.errors import CommandError
 from clench.grasp.mechanics.contacts import contact_frames, make_contacts, pair_friction
 from clench.grasp.mechanics.grasp_map import grasp_map
@@ -55,7 +56,7 @@ def test_friction_of_a_pair_is_the_smaller_one() -> None:
     hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
     bare, slippery = ball.bodies[0], ball.with_friction(0.2).bodies[0]
     padded = replace(hand, links=tuple(replace(link, friction=0.9) for link in hand.links))
-    assert pair_friction(hand, 1, bare) == 0.5
+    assert pair_friction(hand, 1, bare) == FRICTION
     assert pair_friction(padded, 1, bare) == 0.9
     assert pair_friction(hand, 1, slippery) == 0.2
     assert pair_friction(padded, 1, slippery) == 0.2

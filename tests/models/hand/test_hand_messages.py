@@ -43,7 +43,7 @@ def test_malformed_files(tmp_path, name: str, text: str, message: str) -> None:
 
 def test_a_file_that_includes_itself(tmp_path) -> None:
     path = written(tmp_path, "<mujoco><include file='hand.xml'/></mujoco>")
-    with pytest.raises(FileError, match="include itself"):
+    with pytest.raises(FileError, match=r"file 'hand\.xml' is included twice"):
         Hand.load(path)
 
 
@@ -99,7 +99,7 @@ def test_no_joint_below_the_named_palm(tmp_path) -> None:
 
 def test_a_link_turned_by_nothing_is_named(tmp_path) -> None:
     turned = three_fingers().replace('<body name="index_link1"', '<body quat="1e200 0 0 0" name="index_link1"')
-    with pytest.raises(ClenchError, match=r"link 'index_link1'\.wxyz: expected a unit quaternion"):
+    with pytest.raises(ClenchError, match=r"<body> 'index_link1': quat '1e200 0 0 0'; expected finite numbers"):
         Hand.load(written(tmp_path, turned))
 
 

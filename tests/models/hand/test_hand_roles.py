@@ -25,8 +25,8 @@ def test_fingers_thumb_and_palm(tmp_path) -> None:
     assert [loaded.links[i].name for i in index.links] == ["index_link0", "index_link1"]
     assert loaded.links[index.tip_link].name == "index_link1"
     np.testing.assert_allclose(loaded.palm_center, [0.0, -0.04 / 3, 0.13 / 3], atol=1e-12)
-    # The thumb closes straight against the fingers: the palm faces along them.
-    np.testing.assert_allclose(loaded.palm_normal, [0.0, 0.0, 1.0], atol=1e-9)
+    # Closing about +x turns +z towards -y; the thumb, which closes straight against that, is left out.
+    np.testing.assert_allclose(loaded.palm_normal, [0.0, -1.0, 0.0], atol=1e-9)
 
 
 def test_palm_faces_the_side_where_the_fingers_close(tmp_path) -> None:
@@ -209,6 +209,16 @@ def test_a_hand_in_a_robot_is_picked_by_its_palm(tmp_path) -> None:
     assert not any("right" in link.name for link in loaded.links)
     assert "right" not in loaded.spec_xml
     assert any("eft out" in f.text for f in loaded.findings)
+
+
+def test_lights_and_cameras_that_look_at_another_limb_go_with_it(tmp_path) -> None:
+    looking = (
+        '<light name="spot" mode="targetbody" target="right_palm" pos="0 0 2"/>'
+        '<camera name="lost" mode="targetbodycom" target="right_a_link0" pos="0 0 2"/>'
+        '<camera name="kept" mode="targetbody" target="left_palm" pos="0 0 2"/>'
+    )
+    loaded = Hand.load(written(tmp_path, robot().replace("<worldbody>", f"<worldbody>{looking}")), palm="left_palm")
+    assert [name in loaded.spec_xml for name in ("spot", "lost", "kept")] == [False, False, True]
 
 
 def test_the_pruned_robot_still_moves_like_the_whole(tmp_path) -> None:

@@ -12,11 +12,12 @@ import numpy as np
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
 from clench.grasp.depths import hand_depths
-from clench.grasp.scene import PackedObject, shape_mesh
+from clench.grasp.scene import PackedObject
 from clench.models.hand.hand import Finger, Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
+from clench.models.tessellation import shape_mesh
 
 if TYPE_CHECKING:
     from clench.kernels.stepping import StepLog

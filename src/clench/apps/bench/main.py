@@ -9,8 +9,10 @@ from typing import Literal
 
 from clench.apps.cli.parsing import parse_call
 from clench.apps.cli.results import print_json
+from clench.base.defaults import FRICTION, MASS
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.json_files import check_writable
+from clench.base.visible_text import visible
 
 from .report import BenchReport
 
@@ -44,6 +46,8 @@ def solve(
     hand: str = "patent15",
     object: str = "mug",
     scale: float = 1.0,
+    collision_source: Literal["engine", "raw", "visual"] | None = None,
+    order: Literal["proximal-first", "together", "fingertip"] = "proximal-first",
     planes: int = 5,
     poses: int = 100,
     passes: int = 5,
@@ -56,16 +60,28 @@ def solve(
         hand: built-in name, or path to a .urdf or .xml file.
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        collision_source: geometry of the hand; its default without it.
+        order: in which the joints close.
         planes: curl planes per finger.
         poses: how many approach poses are solved.
         passes: how often each is timed.
         seed: of the approach poses.
         json: print one JSON document on standard output.
     """
+    import clench
+
     from .solving import bench_solve
 
     _at_least(1, planes=planes, poses=poses, passes=passes)
-    return _print(bench_solve(hand, object, scale, planes, poses, passes, seed), json)
+    source = None if collision_source is None else clench.CollisionSource(collision_source)
+    asked = clench.GraspCommand(
+        hand_pose=clench.Pose.identity(),
+        order=clench.ClosingOrder(order),
+        planes=planes,
+        collision_source=source,
+        seed=seed,
+    )
+    return _print(bench_solve(hand, object, scale, asked, poses, passes), json)
 
 
 def batch(
@@ -225,6 +241,7 @@ def steadiness(
 
     _at_least(2, contacts=contacts)
     _at_least(1, grasps=grasps, passes=passes)
+    _writable(plot)
     return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 
@@ -237,8 +254,8 @@ def hold(
     best: int = 5,
     others: int = 5,
     test: Literal["pulls", "lift"] = "pulls",
-    mass: float = 0.1,
-    friction: float = 0.6,
+    mass: float = MASS,
+    friction: float = FRICTION,
     seed: int = 0,
     table: Path | None = None,
     trials: Path | None = None,
@@ -300,7 +317,7 @@ def _print(report: BenchReport, json: bool) -> int:
     if json:
         print_json({"schema": SCHEMA, **report.values, "errors": list(report.errors)})
     else:
-        sys.stdout.write("".join(f"{line}\n" for line in report.lines()))
+        sys.stdout.write("".join(f"{visible(line)}\n" for line in report.lines()))
     for error in report.errors:
-        sys.stderr.write(f"clench: wrong answer: {error}\n")
+        sys.stderr.write(f"clench: wrong answer: {visible(str(error))}\n")
     return 1 if report.errors else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ from clench.grasp.calibration import calibration_of
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
+from clench.models.tessellation import shape_mesh
 from clench.solve.alternatives import close_sets, decided
 from clench.solve.planning import planned
 from clench.solve.problem import make_problem
@@ -34,13 +37,13 @@ _KERNELS = (
 
 
 def bench_solve(
-    hand_model: str, object_model: str, scale: float, planes: int, count: int, passes: int, seed: int
+    hand_model: str, object_model: str, scale: float, asked: GraspCommand, count: int, passes: int
 ) -> BenchReport:
     """Check the answers for many approach poses, then time them.
 
     Args:
-        hand_model, object_model, scale: what is loaded. planes: per finger.
-        count: number of poses. passes: how often each is timed. seed: of the poses.
+        hand_model, object_model, scale: what is loaded. asked: of every pose; its seed draws the poses.
+        count: number of poses. passes: how often each is timed.
 
     Returns:
         the report; with errors, and without times of solves, when an answer is wrong.
@@ -48,10 +51,11 @@ def bench_solve(
     report = BenchReport(values={"benchmark": "solve", **describe_place()})
     hand, load_hand = timed(lambda: clench.Hand.load(hand_model))
     obj, load_object = timed(lambda: clench.GraspObject.load(object_model, scale=scale))
-    poses, approach = timed(lambda: clench.approach_poses(hand, obj, count, seed))
-    commands = [GraspCommand(hand_pose=pose, planes=planes, seed=seed) for pose in poses]
+    poses, approach = timed(lambda: clench.approach_poses(hand, obj, count, asked.seed or 0))
+    commands = [replace(asked, hand_pose=pose) for pose in poses]
     _, first = timed(lambda: clench.solve(hand, obj, commands[0]))
-    _describe_problem(report, hand, obj, planes, count, passes, seed)
+    _describe_problem(report, hand, obj, asked)
+    report.values |= {"poses": count, "passes": passes}
     _check(report, hand, obj, commands)
     if report.errors:
         return report
@@ -69,22 +73,31 @@ def bench_solve(
     return report
 
 
-def _describe_problem(
-    report: BenchReport, hand: Hand, obj: GraspObject, planes: int, count: int, passes: int, seed: int
-) -> None:
+def _describe_problem(report: BenchReport, hand: Hand, obj: GraspObject, asked: GraspCommand) -> None:
     meshes = [shape.mesh for body in obj.bodies for shape in body.shapes if shape.mesh is not None]
+    source = asked.collision_source or hand.default_source
     report.values |= {
         "hand": hand.name,
         "fingers": len(hand.fingers),
         "joints": len(hand.joints),
         "degrees_of_freedom": len(hand.joints) - len(hand.couplings),
+        "collision_source": source.value,
+        "hand_triangles": link_triangles(hand, source),
         "object": obj.name,
         "object_triangles": sum(len(mesh.triangles) for mesh in meshes),
-        "planes": planes,
-        "poses": count,
-        "passes": passes,
-        "seed": seed,
+        "order": asked.order.value,
+        "planes": asked.planes,
+        "seed": asked.seed or 0,
     }
+
+
+def link_triangles(hand: Hand, source: CollisionSource) -> int:
+    """Return how many triangles the meshes of the links have that are closed, convex hulls for `engine`.
+
+    Boxes, spheres, capsules, cylinders and ellipsoids are no meshes, and count nothing.
+    """
+    shapes = [shape for link in hand.links for shape in link.shapes.get(source, ())]
+    return sum(len(shape_mesh(shape, source).triangles) for shape in shapes if shape.mesh is not None)
 
 
 def _check(report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand]) -> None:
@@ -136,11 +149,14 @@ def _time_solves(
     report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
 ) -> None:
     whole: list[float] = []
+    spent: list[float] = []
     contacts: list[float] = []
     everything: list[float] = []
     stages: dict[str, list[float]] = defaultdict(list)
     for command in [command for _ in range(passes) for command in commands]:
+        began = time.process_time()
         solution, seconds = timed(lambda command=command: clench.solve(hand, obj, command))  # type: ignore[misc]
+        spent.append(time.process_time() - began)
         whole.append(seconds)
         for stage, taken in solution.timing.items():
             stages[stage].append(taken)
@@ -148,6 +164,8 @@ def _time_solves(
         contacts.append(timed(lambda solution=solution: solution.contacts)[1])  # type: ignore[misc]
         everything.append(timed(solution.to_dict)[1])
     report.distribution("solve", whole)
+    # On a machine with other work the least of a few passes is what a pose takes, by the processor's time.
+    report.distribution("solve_processor_least", np.array(spent).reshape(passes, -1).min(axis=0).tolist())
     report.distribution("then_read_contacts", contacts)
     report.distribution("then_read_everything", everything)
     for stage, taken in stages.items():

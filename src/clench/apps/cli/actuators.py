@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from clench.execution.executing import Actuator
     from clench.execution.filming import Film
     from clench.execution.hold import Hold
+    from clench.execution.report import ExecutionReport
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
@@ -84,6 +86,29 @@ def make_actuator(
     return clench.DrivenHand(
         hand, driver, joint_map=joint_map, obj=obj, connect_timeout=options.timeout, squeeze=squeeze
     )
+
+
+def stop_of(actuator: Actuator) -> Callable[[], None]:
+    """Return what forbids further commands to a driven hand, at any moment and without waiting for its driver.
+
+    The interrupt that follows tells the hand to stop. Nothing is done for other actuators.
+    """
+    import clench
+
+    return actuator.supervision.stop if isinstance(actuator, clench.DrivenHand) else lambda: None
+
+
+def report_of(actuator: Actuator) -> ExecutionReport:
+    """Return what a driven hand reports of an execution that was interrupted.
+
+    Raises:
+        KeyboardInterrupt: there is no report, because the interrupt came before the execution, or to another actuator.
+    """
+    import clench
+
+    if not isinstance(actuator, clench.DrivenHand) or actuator.last_report is None:
+        raise KeyboardInterrupt
+    return actuator.last_report
 
 
 def make_film(video: Path | None, stills: Path | None) -> Film | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,28 +57,32 @@ def batch(
         threads: how many are used; all cores by default.
         device: what closes the fingers, cpu or cuda (an NVIDIA GPU; docs/batch.md).
         chunk: poses at a time; a GPU wants some ten thousand.
-        out: NumPy file (.npz) to write.
+        out: NumPy file (.npz) to write. Every chunk is written when it is solved, to a folder beside it; the same call
+            goes on where an ended one stopped.
         strict: exit with 1 unless a pose gives a grasp.
         json: print one JSON document on standard output.
     """
     from dataclasses import replace
 
     import clench
+    from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
     from clench.solve.batch import CHUNK
+    from clench.solve.batch_parts import check_batch_file
     from clench.solve.devices import CPU, why_not
 
     from .printing import print_batch, print_files
     from .results import print_json
 
-    if out is not None and out.suffix != ".npz":
-        raise CommandError(f"--out: expected a file that ends in .npz, got '{out}'.")
+    if out is not None:
+        check_batch_file(out)
     reason = why_not(device)
     if reason is not None:
         sys.stderr.write(f"clench: {reason} Solving on the CPU.\n")
         device = CPU
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(object, scale=scale)
+    warn_of_size(the_hand, the_object)
     asked = clench.GraspCommand(hand_pose=clench.Pose.identity())
     if command is not None:
         asked = read_command(command, the_hand)
@@ -92,12 +98,12 @@ def batch(
     warm_up()
     rows = clench.approach_poses(the_hand, the_object, count, seed) if read is None else read
     began = time.perf_counter()
-    answers = clench.solve_batch(
-        the_hand, the_object, rows, asked, threads=threads, chunk=CHUNK if chunk is None else chunk, device=device
-    )
+    size = CHUNK if chunk is None else chunk
+    with _going_on(out):
+        answers = clench.solve_batch(
+            the_hand, the_object, rows, asked, threads=threads, chunk=size, device=device, out=out
+        )
     seconds = time.perf_counter() - began
-    if out is not None:
-        answers.save(out)
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "hand": the_hand.name,
@@ -118,23 +124,29 @@ def batch(
     return 0 if counts["grasp"] or (counts["partial"] and not strict) else 1
 
 
+@contextmanager
+def _going_on(out: Path | None) -> Iterator[None]:
+    """Say where the parts are when a batch is interrupted."""
+    from clench.solve.batch_parts import parts_folder
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if out is not None and parts_folder(out).is_dir():
+            sys.stderr.write(f"clench: what is solved is in '{parts_folder(out)}'; the same call goes on from there.\n")
+        raise
+
+
 def _read(path: Path) -> np.ndarray:
     """Read an array of poses; which shapes there are is told by what solves them.
 
     Raises:
-        FileError: missing, or no array of numbers.
+        FileError: missing, no array of numbers, or empty.
     """
-    import numpy as np
-
+    from clench.base.array_files import read_array
     from clench.base.pose_arrays import pose_rows
 
-    if not path.is_file():
-        raise FileError(path, "no such file of poses.")
-    try:
-        array = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise FileError(path, f"not a NumPy file (.npy) of numbers ({error}).") from None
-    if not isinstance(array, np.ndarray):
-        array.close()
-        raise FileError(path, "expected one array (.npy), got an archive of several (.npz).")
-    return pose_rows(array, str(path))
+    rows = pose_rows(read_array(path), str(path))
+    if not len(rows):
+        raise FileError(path, "expected at least one pose, got none.")
+    return rows

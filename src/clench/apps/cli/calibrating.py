@@ -35,7 +35,7 @@ def calibrate(
 
     import numpy as np
 
-    from clench.base.json_files import write_atomically
+    from clench.base.json_files import check_writable, write_atomically
     from clench.grasp.calibration import calibration_of, calibration_to_toml
     from clench.grasp.fitting import fit_weights, told_right
     from clench.solve.examples import ScoredExamples, read_examples, recorded_outcomes
@@ -43,6 +43,8 @@ def calibrate(
     from .printing import print_files
     from .results import print_json
 
+    if out is not None:
+        check_writable(out)
     if examples is None and record is None:
         raise CommandError("calibrate: expected an examples file, or --record with noted outcomes.")
     scored = ScoredExamples([], [])

@@ -14,6 +14,7 @@ from .calibrating import calibrate
 from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
+from .parsing import as_range
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
@@ -69,8 +70,8 @@ def solve(
     pose_error: tuple[float, float] | None = None,
     explain: bool = False,
     forces: bool = False,
-    mass: float | None = None,
-    friction: float | None = None,
+    mass: tuple[float, ...] = (),
+    friction: tuple[float, ...] = (),
     strict: bool = False,
     json: bool = False,
 ) -> int:
@@ -94,9 +95,9 @@ def solve(
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
         explain: print the alternative sets with their scores, and why the chosen ones won.
         forces: print how steady the grasp is, and the forces that hold the object.
-        mass: of the object, for the forces, which it prints [kg]; 0.2 by default.
-        friction: of links on the object, for the forces, which it prints; by default what hand file and object say,
-            else 0.5. The choice takes those of hand file and object.
+        mass: of the object, for the forces, which it prints [kg]; 0.1 by default; two numbers are a range.
+        friction: of links on the object, for the forces, which it prints; two numbers are a range; by default what
+            hand file and object say, else 0.6. The choice takes those of hand file and object.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """
@@ -104,6 +105,8 @@ def solve(
     from math import radians
 
     import clench
+    from clench.base.json_files import check_folder
+    from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
     from clench.solve.orders import settled
     from clench.solve.pareto import hand_front
@@ -111,10 +114,15 @@ def solve(
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
-    forces = forces or mass is not None or friction is not None
-    mass = _checked_mass(mass, friction, criteria)
+    forces = forces or bool(mass or friction)
+    carried, gripped = _checked_forces(mass, friction, criteria)
+    if out is not None:
+        check_folder(out)
+    if record is not None:
+        clench.Record.check(record)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
+    warn_of_size(the_hand, the_object)
     given = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
     asked: dict[str, Any] = {} if planes is None else {"planes": planes}
     asked |= {} if criteria is None else {"criteria": criteria}
@@ -125,7 +133,7 @@ def solve(
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
     if json or forces or out is not None or record is not None:
-        solution = clench.complete(solution, the_hand, the_object, mass=mass, friction=friction)
+        solution = clench.complete(solution, the_hand, the_object, mass=carried, friction=gripped)
     files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)
     if record is not None:
         with clench.Record(record) as recorded:
@@ -151,17 +159,23 @@ def solve(
     return exit_code(solution, strict)
 
 
-def _checked_mass(mass: float | None, friction: float | None, criteria: str | None) -> float:
-    """Check options that need neither hand nor object, before anything is loaded or compiled; return the mass [kg]."""
-    from clench.grasp.calibration import calibration_of
-    from clench.grasp.mechanics.contacts import check_friction
-    from clench.grasp.mechanics.loads import check_mass
-    from clench.solve.quality import DEFAULT_MASS
+def _checked_forces(mass: tuple[float, ...], friction: tuple[float, ...], criteria: str | None) -> tuple[Any, Any]:
+    """Check options that need neither hand nor object, before anything is loaded or compiled.
 
-    if friction is not None:
-        check_friction(friction, "--friction")
+    Returns:
+        Mass [kg] and friction [-], numbers or ranges; the friction may be None.
+    """
+    from clench.base.defaults import MASS
+    from clench.grasp.calibration import calibration_of
+    from clench.grasp.mechanics.contacts import friction_range
+    from clench.grasp.mechanics.loads import mass_range
+
+    carried, gripped = as_range(mass, "--mass"), as_range(friction, "--friction")
+    if gripped is not None:
+        friction_range(gripped, "--friction")
+    mass_range(MASS if carried is None else carried, "--mass")
     calibration_of(criteria)
-    return DEFAULT_MASS if mass is None else check_mass(mass, "--mass")
+    return MASS if carried is None else carried, gripped
 
 
 def hand(
@@ -185,11 +199,14 @@ def hand(
         json: print one JSON document on standard output.
     """
     import clench
+    from clench.base.json_files import check_writable
     from clench.models.hand.report import describe_hand
 
     from .printing import print_files, print_hand
     from .results import print_json
 
+    if figure is not None:
+        check_writable(figure)
     loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
     report = describe_hand(loaded, clench.check_hand(loaded))
     if figure is not None:

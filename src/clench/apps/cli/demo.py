@@ -13,7 +13,7 @@ from clench.models.command import GraspCommand
 from clench.solve.solution import FingerStatus, GraspSolution, SolutionStatus
 
 from .commands import loadable
-from .results import exit_code, make_folder, print_json, write_results
+from .results import exit_code, print_json, write_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,11 +35,14 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         0 when the hand grasps and the simulated hand reaches the computed angles, else 1.
     """
     import clench
+    from clench.base.json_files import check_folder
     from clench.kernels.warming import warm_up
 
     from .printing import print_files, print_report, print_solution
 
-    make_folder(out)
+    check_folder(out)
+    if out.is_dir():
+        clench.Record.check(out / "record.sqlite")
     with _progress() as step:
         step(f"Loading hand '{hand_model}' and object '{object_model}'")
         hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)

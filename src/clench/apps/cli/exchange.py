@@ -7,30 +7,89 @@ from typing import Literal
 
 from clench.base.errors import FileError, UnknownNameError
 
+from .parsing import as_range
+
 # The values of `GraspFormat`, written out so that the command line loads without NumPy.
 Format = Literal["isaac_grasp", "dexgraspbench", "moveit_grasp"]
 
 
-def export(solutions: tuple[Path, ...], /, *, out: Path, format: Format | None = None, json: bool = False) -> int:
-    """Write solutions as isaac_grasp YAML, DexGraspBench npy or moveit_msgs/Grasp JSON.
+def export(
+    solutions: tuple[Path, ...],
+    /,
+    *,
+    out: Path,
+    format: Format | None = None,
+    hand: str | None = None,
+    object: str | None = None,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    scale: float | None = None,
+    root: str | None = None,
+    name: str | None = None,
+    hold: bool = False,
+    mass: tuple[float, ...] = (),
+    friction: tuple[float, ...] = (),
+    stiffness: float | None = None,
+    json: bool = False,
+) -> int:
+    """Write grasps as isaac_grasp YAML, DexGraspBench npy or moveit_msgs/Grasp JSON (docs/exporting.md).
 
     Args:
-        solutions: files written by `clench solve --out` or `GraspSolution.save`.
-        out: the file.
-        format: of the file; by its ending (.yaml, .npy, .json) by default.
+        solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, or batches
+            (.npz) written by `clench batch --out`, of which all poses that are grasps are taken.
+        out: the file; for several grasps in the format dexgraspbench, a folder.
+        format: of the file; by its ending (.yaml, .npy, .json) by default, a folder is dexgraspbench.
+        hand: model of the hand; the one that the solutions name by default.
+        object: model of the object; the one that the solutions name by default.
+        hand_file: TOML file that was used to load the hand.
+        palm: palm link that was used to load the hand.
+        scale: that was used to load the object; what the solutions say by default.
+        root: link whose pose is written, or world (of the hand's model file): dexgraspbench's default; else the palm.
+        name: of the object in the file; its own by default.
+        hold: test every grasp in simulation; what holds has confidence 1.
+        mass: of the object, for squeeze and test, kg; two numbers are a range.
+        friction: of its contacts, for squeeze and test; two numbers are a range.
+        stiffness: gain of the servos that will hold the postures, Nm/rad; that of the hand's model by default.
         json: print one JSON document on standard output.
     """
     import clench
+    from clench.base.json_files import check_writable
 
-    from .printing import print_files
+    from .export_sources import make_test, read_grasps
+    from .printing import print_files, print_notes
     from .results import print_json
 
-    read = [clench.GraspSolution.load(path) for path in solutions]
-    clench.export_grasps(out, read, format)
+    check_writable(out)
+    planned = {"mass": as_range(mass, "--mass"), "friction": as_range(friction, "--friction")}
+    tested = make_test(**planned) if hold else None
+    read = read_grasps(solutions, hand, object, (hand_file, palm), scale)
+    report = clench.export_grasps(
+        out,
+        read.solutions,
+        format,
+        hand=read.hand,
+        obj=read.obj,
+        root=root,
+        name=name,
+        hold=tested,
+        **planned,
+        stiffness=stiffness,
+    )
+    notes = [*read.notes, *report.notes]
     if json:
-        print_json({"schema": "clench.export/1", "file": str(out), "grasps": len(read)})
+        print_json(
+            {
+                "schema": "clench.export/1",
+                "file": str(out),
+                "files": [str(file) for file in report.files],
+                "grasps": len(report.confidences),
+                "confidences": list(report.confidences),
+                "notes": notes,
+            }
+        )
     else:
-        print_files([out])
+        print_files(list(report.files))
+        print_notes(notes)
     return 0
 
 
@@ -42,6 +101,7 @@ def import_(
     out: Path,
     grasp: str | None = None,
     format: Format | None = None,
+    root: str | None = None,
     hand_file: Path | None = None,
     palm: str | None = None,
     json: bool = False,
@@ -54,19 +114,26 @@ def import_(
         out: folder for the command files.
         grasp: only the grasp of this name.
         format: of the file; by its ending (.yaml, .npy, .json) by default.
+        root: link whose pose the file has, or world (of the hand's model file); by default what the file says, else
+            world for dexgraspbench and the palm for the others.
         hand_file: TOML file that overrides what was found in the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         json: print one JSON document on standard output.
     """
+    from dataclasses import replace
+
     import clench
-    from clench.base.json_files import write_json
+    from clench.base.json_files import check_folder, write_json
     from clench.models.command_file import command_to_dict
 
     from .printing import print_files
     from .results import make_folder, print_json
 
+    check_folder(out)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
-    found = clench.import_grasps(grasps, format)
+    found = [replace(g, root=root or g.root) for g in clench.import_grasps(grasps, format)]
+    if root is not None and root != "world":
+        the_hand.link_index(root)  # refuses a name that is no link's
     if grasp is not None and grasp not in [g.name for g in found]:
         raise UnknownNameError("grasp", grasp, f"'{grasps}'", [g.name for g in found])
     wanted = [g for g in found if grasp in (None, g.name)]

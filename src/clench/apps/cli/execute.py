@@ -7,7 +7,17 @@ from pathlib import Path
 from clench.base.errors import FileError
 from clench.base.json_files import check_writable
 
-from .actuators import ActuatorName, ActuatorOptions, DriveName, Interface, make_actuator, make_film, make_hold
+from .actuators import (
+    ActuatorName,
+    ActuatorOptions,
+    DriveName,
+    Interface,
+    make_actuator,
+    make_film,
+    make_hold,
+    report_of,
+    stop_of,
+)
 from .interrupts import stopped_by_signals
 
 
@@ -20,7 +30,7 @@ def execute(
     object: str | None = None,
     hand_file: Path | None = None,
     palm: str | None = None,
-    scale: float = 1.0,
+    scale: float | None = None,
     speed: float = 1.0,
     force: bool = False,
     skip_next_steps: bool = False,
@@ -54,7 +64,7 @@ def execute(
         object: model of the object; the one that the solution names by default.
         hand_file: TOML file that was used to load the hand.
         palm: palm link that was used to load the hand.
-        scale: that was used to load the object.
+        scale: that was used to load the object; what the solution says by default.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, or next steps that drive links into each other, too.
         skip_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
@@ -89,21 +99,27 @@ def execute(
     for file in (out, log):
         if file is not None:
             check_writable(file)
+    if record is not None:
+        clench.Record.check(record)
     film = make_film(video, stills)
     tested = make_hold(hold, lift, mass, friction)
     the_solution = clench.GraspSolution.load(solution)
     the_hand = clench.Hand.load(_named(hand, the_solution.hand_model, solution, "hand"), hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(
         _named(object, the_solution.object_model, solution, "object"),
-        scale=scale,
+        scale=the_solution.object_scale if scale is None else scale,
         collision_source=the_solution.object_collision_source,
     )
     options = ActuatorOptions(
         controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze, film, drive
     )
     moved = make_actuator(actuator, the_hand, the_object, options, show_progress=not json)
-    with stopped_by_signals():
-        report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not skip_next_steps)
+    interrupted = False
+    try:
+        with stopped_by_signals(stop_of(moved)):
+            report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not skip_next_steps)
+    except KeyboardInterrupt:
+        report, interrupted = report_of(moved), True
     if film is not None:
         film.finish()
     if log is not None and report.history is None:
@@ -116,6 +132,8 @@ def execute(
         print_json(report.to_dict())
     else:
         print_report(report)
+    if interrupted:
+        raise KeyboardInterrupt
     return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from clench import __version__
 from clench.base.errors import ClenchError, UnknownNameError
@@ -37,7 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     debug = "--debug" in arguments
     arguments = [a for a in arguments if a != "--debug"]
     try:
-        return _run(arguments)
+        with warnings.catch_warnings():
+            warnings.showwarning = _warn
+            return _run(arguments)
     except ClenchError as error:
         if debug:
             raise
@@ -79,6 +83,11 @@ def _overview(commands: Mapping[str, Callable[..., int]]) -> str:
     lines = [f"  {name:<10}{(command.__doc__ or '').splitlines()[0]}" for name, command in commands.items()]
     listed = "\n".join(lines)
     return f"usage: clench COMMAND ...\n\n{DESCRIPTION}\n\ncommands (clench COMMAND --help tells more):\n{listed}\n"
+
+
+def _warn(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """Show a warning as one sentence, without the line of code that it comes from."""
+    sys.stderr.write(f"clench: warning: {message}\n")
 
 
 def _say(sentence: str, code: int) -> int:

@@ -5,7 +5,20 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 
+from clench.base.errors import CommandError
+
 EXIT_BAD_INPUT = 2
+
+
+def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, float] | None:
+    """Return what an option of one or two numbers says: nothing, a number, or a range (least, largest).
+
+    Raises:
+        CommandError: more than two numbers.
+    """
+    if len(values) > 2:
+        raise CommandError(f"{option}: expected one number, or two for a range, got {len(values)}.")
+    return None if not values else values[0] if len(values) == 1 else (values[0], values[1])
 
 
 def parse_call(program: str, command: Callable[..., int], arguments: Sequence[str]) -> Callable[[], int]:

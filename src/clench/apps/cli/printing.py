@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clench.base.visible_text import visible
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -36,7 +38,9 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     console.print(table)
     for name, finger in solution.fingers.items():
         if finger.cause is not None:
-            console.print(f"{_plain(name)} ({finger.cause['code']}): {_plain(finger.cause['text'])}", soft_wrap=True)
+            console.print(
+                f"{_plain(name)} ({_plain(finger.cause['code'])}): {_plain(finger.cause['text'])}", soft_wrap=True
+            )
     if solution.max_penetration is not None:
         console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm")
     if solution.certificate is not None:
@@ -241,7 +245,7 @@ def print_batch(document: Mapping[str, Any]) -> None:
     count, seconds = document["poses"], document["seconds"]
     table = _table(f"{document['hand']} on {document['object']}: {count} poses", "status", "poses", "share")
     for name, number in {**document["status"], "certified": document["certified"]}.items():
-        table.add_row(name, str(number), f"{100.0 * number / max(count, 1):.1f} %")
+        table.add_row(_plain(name), str(number), f"{100.0 * number / max(count, 1):.1f} %")
     console.print(table)
     rate = f", {count / seconds:.0f} a second" if count and seconds > 0.0 else ""
     console.print(f"solved in {seconds:.2f} s{rate}")
@@ -258,6 +262,13 @@ def print_weights(weights: Mapping[str, float], sentence: str) -> None:
             table.add_row(_plain(name), f"{weight:.4g}")
         console.print(table)
     console.print(_plain(sentence))
+
+
+def print_notes(notes: Sequence[str]) -> None:
+    """Print sentences about what is missing."""
+    console = _console()
+    for note in notes:
+        console.print(f"note: {_plain(note)}", soft_wrap=True)
 
 
 def print_files(files: Sequence[Path]) -> None:
@@ -342,7 +353,7 @@ def _table(title: str, *columns: str) -> Table:
 
     table = Table(title=_plain(title), title_justify="left", show_header=any(columns))
     for column in columns:
-        table.add_column(column, overflow="fold")
+        table.add_column(_plain(column), overflow="fold")
     return table
 
 
@@ -352,10 +363,10 @@ def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:
 
 
 def _plain(text: Any) -> str:
-    """Return text in which square brackets are just that."""
+    """Return text in which square brackets and escape codes are just that: names come from files."""
     from rich.markup import escape
 
-    return escape(str(text))
+    return escape(visible(str(text)))
 
 
 def _millimetres(length: float) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from clench.base.errors import FileError
+from clench.base.visible_text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,8 +61,8 @@ def save_figure(figure: Figure, path: Path) -> Path:
 
 
 def write(target: Any, x: float, y: float, text: str, **options: Any) -> Any:
-    """Put text into a figure or axes; names with `$` stay as they are."""
-    label = target.text(x, y, text, **{"color": INK, "fontsize": 10, **options})
+    """Put text into a figure or axes; names with `$` stay as they are, and codes in them are written out."""
+    label = target.text(x, y, "\n".join(map(visible, text.split("\n"))), **{"color": INK, "fontsize": 10, **options})
     label.set_parse_math(False)
     return label
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
-import io
 import math
+import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from clench.base.errors import CommandError, FileError
 from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
@@ -89,10 +90,18 @@ class OrcaDriver:
             self._hand.set_joint_positions(path.at(path.period))
 
     def stop(self) -> None:
-        """Hold where the joints are."""
+        """Hold where the joints are.
+
+        Raises:
+            DriverError: the motors do not say where they are; they stand still at the last target.
+        """
         with _trouble():
             if self._hand.is_connected():
-                self._hand.set_joint_positions(self._hand.get_joint_position())
+                positions = self._hand.get_joint_position()
+                # What was read before may be far from where the joints are now.
+                if not self._hand.last_read_ok or None in positions.as_dict().values():
+                    raise DriverError("The motors of the ORCA hand do not answer; they hold the last target.")
+                self._hand.set_joint_positions(positions)
 
     def disconnect(self) -> None:
         """Switch the motors off and close the line."""
@@ -114,6 +123,37 @@ def _trouble() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep orca-core's own printing, of which standard output is full, to itself: failures are raised or returned."""
-    with contextlib.redirect_stdout(io.StringIO()):
+    """Drop what orca-core prints in this thread: its failures are raised or returned.
+
+    Other threads, one of which may stop the hand meanwhile, keep their standard output.
+    """
+    thread = threading.get_ident()
+    with _switching:
+        if not isinstance(sys.stdout, _Sieve):
+            sys.stdout = _Sieve(sys.stdout)
+        _quiet_threads.append(thread)
+    try:
         yield
+    finally:
+        with _switching:
+            _quiet_threads.remove(thread)
+            if not _quiet_threads and isinstance(sys.stdout, _Sieve):
+                sys.stdout = sys.stdout.out
+
+
+_switching = threading.RLock()
+#: Threads that are quiet now, as often as they asked for it.
+_quiet_threads: list[int] = []
+
+
+class _Sieve:
+    """Pass on what is written, except by quiet threads."""
+
+    def __init__(self, out: TextIO) -> None:
+        self.out = out
+
+    def write(self, text: str) -> int:
+        return len(text) if threading.get_ident() in _quiet_threads else self.out.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.out, name)

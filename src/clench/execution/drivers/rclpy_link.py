@@ -6,7 +6,7 @@ import os
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 from clench.base.errors import CommandError
@@ -52,8 +52,9 @@ class RclpyLink:
     def states(self) -> list[JointStates]:
         """Return the messages that have come since the last call, oldest first."""
         found = []
-        while self._waiting:
-            found.append(self._waiting.popleft())
+        with suppress(IndexError):  # when another thread, which stops the hand, takes the last one
+            while True:
+                found.append(self._waiting.popleft())
         return found
 
     def publish(self, joints: Sequence[str], times: Sequence[float], positions: Sequence[Sequence[float]]) -> None:

@@ -13,6 +13,7 @@ import re
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
@@ -150,8 +151,11 @@ class Ros2Driver:
     def read(self) -> HandState:
         """Return the newest position of every joint; a state that repeats its stamp counts as the old one."""
         self._receive()
-        now = time.monotonic()
+        return self._state()
+
+    def _state(self) -> HandState:
         with self._lock:
+            now = time.monotonic()  # after all that was received, by other threads too: no state has a negative age
             return HandState(dict(self._positions), {name: now - at for name, at in self._received.items()})
 
     def command(self, path: JointPath) -> None:
@@ -170,8 +174,8 @@ class Ros2Driver:
         at = self._positions if self._sent is None else self._sent[1].at(now - self._sent[0])
         times = np.concatenate([[0.0], path.times])
         positions = np.vstack([[at[name] for name in path.joints], path.positions])
+        self._sent = (now, JointPath(path.joints, times, positions, path.period))  # first: a stop may come meanwhile
         link.publish(path.joints, times.tolist(), positions.tolist())
-        self._sent = (now, JointPath(path.joints, times, positions, path.period))
 
     def stop(self) -> None:
         """Tell the controller to hold where the joints were measured last, or were told to be by now.
@@ -179,10 +183,13 @@ class Ros2Driver:
         Raises:
             DriverError: not connected.
         """
-        if self._sent is None:
+        sent = self._sent
+        if sent is None:
             return
-        link, (sent, path) = self._connected(), self._sent
-        state, told = self.read(), path.at(time.monotonic() - sent)
+        link, (at, path) = self._connected(), sent
+        with suppress(DriverError):  # what the link has to report must not keep the hand from being stopped
+            self._receive()
+        state, told = self._state(), path.at(time.monotonic() - at)
         fresh = state.age(path.joints) <= STOP_AGE
         link.publish(
             path.joints,

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from clench.base.errors import CommandError, FileError, UnknownNameError
-from clench.solve.solution import GraspSolution
+import numpy as np
 
-from .dexgraspbench import read_dexgraspbench, write_dexgraspbench
-from .grasp_posture import GraspPosture
+from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.execution.hold import Hold
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.grasp_batch import GraspBatch
+from clench.solve.solution import GraspSolution, SolutionStatus
+
+from .dexgraspbench import object_folder, read_dexgraspbench, write_dexgraspbench
+from .grasp_posture import BASE, GraspPosture
 from .isaac_grasp import read_isaac_grasp, write_isaac_grasp
 from .moveit_grasp import read_moveit_grasp, write_moveit_grasp
+from .outgoing import ExportSettings, outgoing
 
 
 class GraspFormat(StrEnum):
     """Name the files that are exchanged with other programs."""
 
     ISAAC_GRASP = "isaac_grasp"
-    """YAML, version 1.0: many grasps of one object, the palm in the object's frame"""
+    """YAML, version 1.0: many grasps of one object, the gripper's frame in the object's"""
     DEXGRASPBENCH = "dexgraspbench"
-    """npy with one pickled dictionary: one grasp; read with an unpickler that knows arrays only"""
+    """npy with one pickled dictionary: one grasp a file; read with an unpickler that knows arrays only"""
     MOVEIT_GRASP = "moveit_grasp"
     """JSON in the shape of moveit_msgs/Grasp: many grasps"""
 
@@ -34,28 +43,101 @@ _ENDINGS = {
 }
 
 
-def export_grasps(
-    path: str | Path, solutions: GraspSolution | Sequence[GraspSolution], format: GraspFormat | str | None = None
-) -> None:
-    """Write solutions in the format of another program.
+@dataclass(frozen=True)
+class ExportReport:
+    """Hold what was written.
 
     Args:
-        path: the file. solutions: one or more. format: see `GraspFormat`; None: by the file's ending.
+        files: in order. confidences: of the grasps, see `export_grasps`.
+        notes: sentences about what the files lack, each once, with the number of grasps.
+    """
+
+    files: tuple[Path, ...]
+    confidences: tuple[float, ...]
+    notes: tuple[str, ...]
+
+
+def export_grasps(
+    path: str | Path,
+    solutions: GraspSolution | GraspBatch | Sequence[GraspSolution],
+    format: GraspFormat | str | None = None,
+    *,
+    hand: Hand | None = None,
+    obj: GraspObject | None = None,
+    root: str | None = None,
+    name: str | None = None,
+    hold: Hold | None = None,
+    mass: float | tuple[float, float] | None = None,
+    friction: float | tuple[float, float] | None = None,
+    stiffness: float | None = None,
+) -> ExportReport:
+    """Write grasps in the format of another program (docs/exporting.md).
+
+    With hand and object, a pregrasp and a squeeze for every direction of gravity are planned where a solution has none.
+    The confidence of a grasp is 1 where the hold test held, 0.5 where a squeeze is feasible, and 0 where none is, where
+    the test did not hold, and for a solution that is not valid.
+
+    Args:
+        path: the file; for several grasps in the format dexgraspbench, a folder. Folders are made.
+        solutions: one, several, or a batch, of which the poses that are grasps are solved again.
+        format: see `GraspFormat`; None: by the file's ending. A path without an ending is a folder for dexgraspbench.
+        hand, obj: what the solutions were computed for; those of a batch unless given.
+        root: the link whose pose is written, or "world": the frame of the hand's model file. None: "world" for
+            dexgraspbench, which attaches the whole file there; else the palm.
+        name: of the object, instead of its own.
+        hold: a test that every grasp goes through; its squeeze is the one that is written.
+        mass, friction: what the squeeze is planned for, numbers or ranges (least, largest) [kg], [-]; None: as the
+            solution's squeeze, or as the test says.
+        stiffness: gain of the servos that will hold the postures, at every joint or tendon [Nm/rad]; None: the model's.
 
     Raises:
-        CommandError: more solutions than the format holds, or of several hands. UnknownNameError: no such format.
-        FileError: the file cannot be written, or its ending names no format.
+        CommandError: several grasps for one file, or of several hands, or of another hand or object; a root or a test
+            without the hand. UnknownNameError: no such format or link. FileError: a file cannot be written, or its
+            ending names no format.
     """
+    if isinstance(solutions, GraspBatch):
+        hand, obj = hand or solutions.question.hand, obj or solutions.question.obj
+        solutions = [solutions.solution(int(i)) for i in np.flatnonzero(solutions.status == SolutionStatus.GRASP)]
     several = [solutions] if isinstance(solutions, GraspSolution) else list(solutions)
     chosen = _format(path, format)
+    bench = chosen is GraspFormat.DEXGRASPBENCH
+    files = _files(Path(path), len(several)) if bench else (Path(path),)
+    if bench and name is not None:
+        raise CommandError(f"name: {chosen} names an object by its folder; it has no place for '{name}'.")
+    if not several:
+        raise CommandError(f"{chosen}: expected at least one grasp, got none.")
+    root = BASE if bench and root is None and hand is not None else root
+    settings = ExportSettings(hand, obj, root, name, hold, mass, friction, stiffness)
+    grasps = [outgoing(solution, settings) for solution in several]
+    notes = [note for grasp in grasps for note in grasp.notes]
     if chosen is GraspFormat.ISAAC_GRASP:
-        write_isaac_grasp(path, several)
+        write_isaac_grasp(path, grasps)
     elif chosen is GraspFormat.MOVEIT_GRASP:
-        write_moveit_grasp(path, several)
-    elif len(several) == 1:
-        write_dexgraspbench(path, several[0])
+        write_moveit_grasp(path, grasps)
     else:
-        raise CommandError(f"{chosen}: one file holds one grasp; {len(several)} solutions were given.")
+        folderless = [s.object for s in several if not object_folder(s)]
+        notes += [f"The object '{name}' was read from no file: obj_path is empty." for name in folderless]
+        for file, grasp in zip(files, grasps, strict=True):
+            write_dexgraspbench(file, grasp)
+    counted = Counter(notes)
+    told = (f"{note} ({count} of {len(grasps)} grasps)" if len(grasps) > 1 else note for note, count in counted.items())
+    return ExportReport(files, tuple(grasp.confidence for grasp in grasps), tuple(told))
+
+
+def _files(path: Path, count: int) -> tuple[Path, ...]:
+    """Return the files of so many grasps, one each; make their folder."""
+    if path.suffix and not path.is_dir():
+        if count > 1:
+            raise CommandError(
+                f"dexgraspbench: one file holds one grasp; {count} solutions were given for '{path}'. "
+                "Give a folder (a path without an ending)."
+            )
+        return (path,)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(path, f"cannot be made a folder ({error.strerror or error}).") from None
+    return tuple(path / f"grasp_{i}.npy" for i in range(count))
 
 
 def import_grasps(path: str | Path, format: GraspFormat | str | None = None) -> list[GraspPosture]:
@@ -80,6 +162,8 @@ def _format(path: str | Path, given: GraspFormat | str | None) -> GraspFormat:
         if given not in list(GraspFormat):
             raise UnknownNameError("format", str(given), "clench", [f.value for f in GraspFormat])
         return GraspFormat(given)
+    if not Path(path).suffix or Path(path).is_dir():
+        return GraspFormat.DEXGRASPBENCH
     ending = Path(path).suffix.lower()
     if ending not in _ENDINGS:
         raise FileError(path, f"the ending names no format; expected {', '.join(_ENDINGS)}, or a format by name.")

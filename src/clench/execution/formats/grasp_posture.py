@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from clench.base.errors import CommandError
-from clench.base.pose import Pose, invert
+from clench.base.pose import FloatArray, Pose, invert
 from clench.models.command import GraspCommand
+from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
-from clench.solve.solution import GraspSolution
+from clench.solve.posture import posture
+
+#: How files call the frame of the hand's own model file.
+BASE: Final = "world"
 
 
 @dataclass(frozen=True)
@@ -17,9 +22,11 @@ class GraspPosture:
     """Hold a grasp that another program computed.
 
     Args:
-        name: in the file. hand_pose: `T_world_palm`. object_pose: `T_world_object`.
+        name: in the file. hand_pose: of the link `root` in the world. object_pose: `T_world_object`.
         joint_angles: [rad] by name, or in the order of the hand's model; empty when the file gives none.
         confidence: what the file says of its quality, None when nothing.
+        root: a link of the hand, or "world" for the frame of the hand's model file; None, or a name that the hand does
+            not have: the palm.
     """
 
     name: str
@@ -27,6 +34,7 @@ class GraspPosture:
     object_pose: Pose = field(default_factory=Pose.identity)
     joint_angles: Mapping[str, float] | Sequence[float] = ()
     confidence: float | None = None
+    root: str | None = None
 
     def command(self, hand: Hand) -> GraspCommand:
         """Return a command that keeps the posture joints and closes the others anew (METHOD.md section 1).
@@ -35,9 +43,9 @@ class GraspPosture:
             CommandError: angles that the hand's joints cannot have, or another number of them.
             UnknownNameError: a joint that the hand does not have.
         """
-        command = GraspCommand(self.hand_pose, object_pose=self.object_pose)
         if not self.joint_angles:
-            return command
+            q = hand.open_angles()
+            return GraspCommand(self._palm_pose(hand, q), object_pose=self.object_pose)
         if isinstance(self.joint_angles, Mapping):
             angles = dict(self.joint_angles)
         elif len(self.joint_angles) == len(hand.joints):
@@ -45,29 +53,16 @@ class GraspPosture:
         else:
             expected = f"{len(hand.joints)} joint angles in the order of hand '{hand.name}'"
             raise CommandError(f"{self.name}: expected {expected}, got {len(self.joint_angles)}.")
-        posed = GraspCommand.from_posture(hand, angles, self.hand_pose)
-        return GraspCommand(self.hand_pose, object_pose=self.object_pose, preshape=posed.preshape)
+        palm_pose = self._palm_pose(hand, posture(angles, hand, f"{self.name}.joint_angles"))
+        posed = GraspCommand.from_posture(hand, angles, palm_pose)
+        return GraspCommand(palm_pose, object_pose=self.object_pose, preshape=posed.preshape)
 
-
-def palm_in_object(solution: GraspSolution) -> Pose:
-    """Return `T_object_palm` of a solution."""
-    return Pose.from_matrix(invert(solution.object_pose.matrix) @ solution.hand_pose.matrix)
-
-
-def before_the_grasp(solution: GraspSolution) -> Mapping[str, float]:
-    """Return the angles of the pregrasp [rad], else of the open hand from which the fingers close.
-
-    Raises:
-        CommandError: a joint of the grasp is missing there.
-    """
-    key, before = ("pregrasp", solution.pregrasp) if solution.pregrasp else ("open_angles", solution.open_angles)
-    missing = next((name for name in solution.joint_angles if name not in before), None)
-    if missing is not None:
-        raise CommandError(f"{key}.{missing}: missing; every joint of joint_angles is needed.")
-    return before
-
-
-def squeezed(solution: GraspSolution) -> Mapping[str, float]:
-    """Return what position servos are told to squeeze [rad]: the grasp and, where planned, the squeeze's offsets."""
-    offsets = (solution.squeeze or {}).get("offsets") or {}
-    return {name: angle + float(offsets.get(name, 0.0)) for name, angle in solution.joint_angles.items()}
+    def _palm_pose(self, hand: Hand, q: FloatArray) -> Pose:
+        links = [link.name for link in hand.links]
+        if self.root in links:
+            T_palm_root = hand.link_poses(q)[links.index(self.root)]
+        elif self.root == BASE:
+            T_palm_root = base_pose(hand, q)
+        else:
+            return self.hand_pose
+        return Pose.from_matrix(self.hand_pose.matrix @ invert(T_palm_root))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,30 +11,32 @@ from clench.base.errors import CommandError, FileError
 from clench.base.json_files import write_atomically
 from clench.base.numbers import is_finite_number
 from clench.base.pose import Pose
-from clench.solve.solution import GraspSolution
+from clench.base.yaml_files import read_yaml
 
-from .grasp_posture import GraspPosture, before_the_grasp, palm_in_object
+from .grasp_posture import GraspPosture
+from .outgoing import OutgoingGrasp, all_of_one
 
 FORMAT: Final = "isaac_grasp"
 VERSION: Final = 1.0
+#: How files write it, as a number or as text.
+_VERSIONS: Final = ("1.0", "1")
 
 
-def write_isaac_grasp(path: str | Path, solutions: Sequence[GraspSolution]) -> None:
-    """Write solutions of one hand and object; the confidence is 1 for valid ones, else 0.
+def write_isaac_grasp(path: str | Path, grasps: Sequence[OutgoingGrasp]) -> None:
+    """Write grasps of one hand and object; `gripper_frame` is the link whose pose is written.
 
     Raises:
-        CommandError: solutions of several hands or objects. FileError: the file cannot be written.
+        CommandError: grasps of several hands or objects. FileError: the file cannot be written.
     """
     import yaml
 
-    if len({(s.hand, s.object) for s in solutions}) != 1:
-        raise CommandError(f"{FORMAT}: expected solutions of one hand and one object, got several or none.")
+    all_of_one(grasps, FORMAT)
     document = {
         "format": FORMAT,
         "format_version": VERSION,
-        "object_frame": solutions[0].object,
-        "gripper_frame": solutions[0].hand,
-        "grasps": {f"grasp_{i}": _grasp(s) for i, s in enumerate(solutions)},
+        "object_frame": grasps[0].object_name,
+        "gripper_frame": grasps[0].frame,
+        "grasps": {f"grasp_{i}": _grasp(grasp) for i, grasp in enumerate(grasps)},
     }
     write_atomically(path, yaml.safe_dump(document, sort_keys=False, width=110).encode())
 
@@ -44,35 +47,27 @@ def read_isaac_grasp(path: str | Path) -> list[GraspPosture]:
     Raises:
         FileError: missing, not YAML, another format, or a malformed key, which the message names.
     """
-    import yaml
-
-    try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise FileError(path, "no such file.") from None
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise FileError(path, f"not YAML ({' '.join(str(error).split())}).") from None
+    data = read_yaml(path)
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise FileError(path, f"format: expected '{FORMAT}'.")
-    if data.get("format_version") != VERSION:
+    if str(data.get("format_version")) not in _VERSIONS:
         raise FileError(path, f"format_version: expected {VERSION}, got {data.get('format_version')!r}.")
+    frame = data.get("gripper_frame")
+    root = frame.rstrip("/").rpartition("/")[2] if isinstance(frame, str) else None  # a path in USD ends with the link
     grasps = data.get("grasps")
     if not isinstance(grasps, dict) or not grasps:
         raise FileError(path, "grasps: expected at least one, by name.")
-    return [_posture(str(name), grasp, str(path)) for name, grasp in grasps.items()]
+    return [replace(_posture(str(name), grasp, str(path)), root=root) for name, grasp in grasps.items()]
 
 
-def _grasp(solution: GraspSolution) -> dict[str, Any]:
-    T_object_palm = palm_in_object(solution)
-    w, *xyz = T_object_palm.wxyz.tolist()
+def _grasp(grasp: OutgoingGrasp) -> dict[str, Any]:
+    w, *xyz = grasp.T_object_frame.wxyz.tolist()
     return {
-        "confidence": 1.0 if solution.is_valid() else 0.0,
-        "position": T_object_palm.position.tolist(),
+        "confidence": grasp.confidence,
+        "position": grasp.T_object_frame.position.tolist(),
         "orientation": {"w": w, "xyz": xyz},
-        "cspace_position": dict(solution.joint_angles),
-        "pregrasp_cspace_position": dict(before_the_grasp(solution)),
+        "cspace_position": dict(grasp.solution.joint_angles),
+        "pregrasp_cspace_position": dict(grasp.pregrasp),
     }
 
 

@@ -11,20 +11,20 @@ import msgspec
 from clench.base.errors import CommandError, FileError
 from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import Pose
-from clench.solve.solution import GraspSolution
 
-from .grasp_posture import GraspPosture, before_the_grasp
+from .grasp_posture import GraspPosture
+from .outgoing import OutgoingGrasp
 
 FRAME: Final = "world"
 
 
-def write_moveit_grasp(path: str | Path, solutions: Sequence[GraspSolution]) -> None:
-    """Write ``{"grasps": [...]}``; the pose is the palm link's in the world, distances of approach and retreat are 0.
+def write_moveit_grasp(path: str | Path, grasps: Sequence[OutgoingGrasp]) -> None:
+    """Write ``{"grasps": [...]}``; the pose is the frame's in the world, distances of approach and retreat are 0.
 
     Raises:
         ClenchError: a number is not finite. FileError: the file cannot be written.
     """
-    write_json(path, {"grasps": [_grasp(f"grasp_{i}", s) for i, s in enumerate(solutions)]}, "grasps")
+    write_json(path, {"grasps": [_grasp(f"grasp_{i}", grasp) for i, grasp in enumerate(grasps)]}, "grasps")
 
 
 def read_moveit_grasp(path: str | Path) -> list[GraspPosture]:
@@ -97,8 +97,8 @@ def _posture(form: _Grasp, source: str) -> GraspPosture:
     return GraspPosture(form.id or "grasp", pose, joint_angles=angles, confidence=form.grasp_quality)
 
 
-def _grasp(name: str, solution: GraspSolution) -> dict[str, Any]:
-    (x, y, z), (qw, qx, qy, qz) = solution.hand_pose.position.tolist(), solution.hand_pose.wxyz.tolist()
+def _grasp(name: str, grasp: OutgoingGrasp) -> dict[str, Any]:
+    (x, y, z), (qw, qx, qy, qz) = grasp.T_world_frame.position.tolist(), grasp.T_world_frame.wxyz.tolist()
     nowhere = {
         "direction": {"header": _header(), "vector": {"x": 0.0, "y": 0.0, "z": 0.0}},
         "desired_distance": 0.0,
@@ -106,8 +106,8 @@ def _grasp(name: str, solution: GraspSolution) -> dict[str, Any]:
     }
     return {
         "id": name,
-        "pre_grasp_posture": _trajectory(before_the_grasp(solution)),
-        "grasp_posture": _trajectory(solution.joint_angles),
+        "pre_grasp_posture": _trajectory(grasp.pregrasp),
+        "grasp_posture": _trajectory(grasp.solution.joint_angles),
         "grasp_pose": {
             "header": _header(),
             "pose": {
@@ -115,12 +115,12 @@ def _grasp(name: str, solution: GraspSolution) -> dict[str, Any]:
                 "orientation": {"x": qx, "y": qy, "z": qz, "w": qw},
             },
         },
-        "grasp_quality": 1.0 if solution.is_valid() else 0.0,
+        "grasp_quality": grasp.confidence,
         "pre_grasp_approach": nowhere,
         "post_grasp_retreat": nowhere,
         "post_place_retreat": nowhere,
         "max_contact_force": 0.0,
-        "allowed_touch_objects": [solution.object],
+        "allowed_touch_objects": [grasp.object_name],
     }
 
 

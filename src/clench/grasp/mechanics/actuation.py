@@ -156,12 +156,13 @@ class HoldingProgram:
         self.held, self.load, self.unit = held, load, unit
         self.cone = ConeProgram(size, np.zeros(size))
         self.forces = np.eye(count, size)
+        self.normals = self.forces[2 :: held.contacts.width]
         # Arms are centimetres: in these units torques are as large as forces.
         self.arm = float(np.abs(held.jacobian).max(initial=0.0)) or 1.0
         self.torques = held.jacobian.T @ self.forces
         self.tensions: FloatArray | None = None
         self.cone.equal(held.grasp_map @ self.forces, -load / unit)
-        self.cone.at_most(self.forces[2 :: held.contacts.width] / MOST_FORCE, np.ones(len(held.contacts)))
+        self.cone.at_most(self.normals / MOST_FORCE, np.ones(len(held.contacts)))
         if held.drive is not None and tendons:
             # Tensions, too, are counted so that they are as large as forces.
             drive, inner = held.drive, float(np.abs(held.drive.arms).max())
@@ -178,12 +179,17 @@ class HoldingProgram:
         for sign in (1.0, -1.0):
             self.cone.at_most(sign * self.torques / self.arm - worst, np.zeros(len(self.torques)))
 
-    def demand_forces(self, change: FloatArray | None = None, spread: FloatArray | None = None) -> None:
-        """Demand cones and torque limits for the forces, or for `forces + change * (spread x)`."""
-        forces = self.forces if change is None or spread is None else self.forces + np.outer(change, spread)
-        demand_cones(self.cone, self.held.contacts, forces)
-        scale = self.unit * self.arm
-        demand_limits(self.cone, self.held.jacobian.T @ forces / self.arm, self.held.dofs.limits / scale)
+    def demand_forces(self, extra: FloatArray | None = None, change: FloatArray | None = None) -> None:
+        """Demand cones and torque limits for the forces.
+
+        Args:
+            extra: constant forces that are added, shape (C * width,).
+            change: rows that add forces by the unknowns, shape (C * width, size).
+        """
+        forces = self.forces if change is None else self.forces + change
+        demand_cones(self.cone, self.held.contacts, forces, extra)
+        scale, J = self.unit * self.arm, self.held.jacobian.T / self.arm
+        demand_limits(self.cone, J @ forces, self.held.dofs.limits / scale, None if extra is None else J @ extra)
 
     def solve(self) -> tuple[HoldingForces, FloatArray] | None:
         """Return the forces, balanced to rounding, and all unknowns; None when nothing satisfies the demands."""

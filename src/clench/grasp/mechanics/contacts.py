@@ -20,13 +20,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clench.base.defaults import FRICTION
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body
 
-#: Sliding friction where neither link nor object has one [-]: between plastic on plastic and rubber on plastic.
-DEFAULT_FRICTION: Final = 0.5
+from .loads import ends_of
+
 #: Torsional coefficient of soft fingers unless given [m]: torque about the normal per normal force; MuJoCo's default.
 DEFAULT_TORSION: Final = 0.005
 #: Contacts of a link whose places and normals differ by less are one [m, -].
@@ -128,7 +129,7 @@ class ContactSet:
 def make_contacts(
     positions: ArrayLike,
     inward_normals: ArrayLike,
-    friction: ArrayLike = DEFAULT_FRICTION,
+    friction: ArrayLike = FRICTION,
     *,
     model: ContactModel | str = ContactModel.POINT,
     torsion: ArrayLike = DEFAULT_TORSION,
@@ -211,7 +212,7 @@ def edge_directions(count: int, turned: float = 0.0) -> FloatArray:
     return directions
 
 
-def pair_friction(hand: Hand, link: int, body: Body, default: float = DEFAULT_FRICTION) -> float:
+def pair_friction(hand: Hand, link: int, body: Body, default: float = FRICTION) -> float:
     """Return the friction of a link on a body [-]: the smaller of theirs, else the known one, else the default.
 
     No pair grips better than its more slippery side; an unknown side is taken to be as good as the known one.
@@ -233,6 +234,18 @@ def check_friction(friction: ArrayLike, key: str = "friction") -> None:
     bad = values[~(np.isfinite(values) & (values > 0.0))]
     if bad.size:
         raise CommandError(f"{key}: expected a finite number above 0, got {bad.flat[0]:g}; nothing holds without it.")
+
+
+def friction_range(friction: float | tuple[float, float], key: str = "friction") -> tuple[float, float]:
+    """Return the lowest and the highest friction of a number, which is a range of one value, or of a pair [-].
+
+    Raises:
+        CommandError: not finite, not above 0, or a range whose first friction is the larger one.
+    """
+    low, high = ends_of(friction, key)
+    for end in (low, high):
+        check_friction(end, key)
+    return float(low), float(high)
 
 
 def _check_shape(value: FloatArray, shape: tuple[int, ...], key: str) -> None:

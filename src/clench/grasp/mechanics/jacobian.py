@@ -30,12 +30,14 @@ class DegreesOfFreedom:
         motion: rates of all joints per rate of a degree of freedom, shape (J, D).
         limits: largest torque [Nm], infinite where the model gives none, shape (D,). It is the effort limit of
             the leading joint alone, also where followers are driven, too: a bound on the safe side.
+        losses: torque that dry friction in the joints takes [Nm], shape (D,); None: none.
     """
 
     names: tuple[str, ...]
     joints: tuple[int, ...]
     motion: FloatArray
     limits: FloatArray
+    losses: FloatArray | None = None
 
 
 def degrees_of_freedom(hand: Hand, q: FloatArray) -> DegreesOfFreedom:
@@ -54,6 +56,7 @@ def degrees_of_freedom(hand: Hand, q: FloatArray) -> DegreesOfFreedom:
         joints=tuple(leaders),
         motion=motion,
         limits=np.array([np.inf if e is None else e for e in efforts]),
+        losses=np.abs(motion).T @ np.array([joint.friction_loss for joint in hand.joints]),
     )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import cache
 from numbers import Real
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,6 +103,29 @@ def check_mass(mass: float, key: str = "mass") -> float:
     if not (isinstance(mass, Real) and np.isfinite(mass) and mass >= 0.0):
         raise CommandError(f"{key}: expected a finite number of at least 0 kg, got {mass!r}.")
     return float(mass)
+
+
+def mass_range(mass: float | tuple[float, float], key: str = "mass") -> tuple[float, float]:
+    """Return the lightest and the heaviest mass [kg] of a number, which is a range of one value, or of a pair.
+
+    Raises:
+        CommandError: not finite, below 0, or a range whose first mass is the larger one.
+    """
+    low, high = ends_of(mass, key)
+    return check_mass(low, key), check_mass(high, key)
+
+
+def ends_of(value: object, key: str) -> tuple[Any, Any]:
+    """Return both ends of a range; a number is a range of one value.
+
+    Raises:
+        CommandError: not a number or a pair (least, largest) in this order.
+    """
+    if not isinstance(value, tuple):
+        return value, value
+    if len(value) != 2 or not all(isinstance(end, Real) for end in value) or value[0] > value[1]:
+        raise CommandError(f"{key}: expected a number, or a range (least, largest), got {value!r}.")
+    return value[0], value[1]
 
 
 @cache

@@ -1,4 +1,7 @@
-"""List the pairs of links that may overlap: adjacent, excluded by the model, overlapping at the reference posture."""
+"""List the pairs of links that may overlap: adjacent, excluded by the model or the hand file.
+
+Shapes that overlap in every posture near the open one are allowed to as well; see `overlaps`.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,6 @@ from .hand import Hand, Link
 from .hand_file import HandFile
 from .kinematics import Skeleton
 
-#: Links count as overlapping at the reference posture from this distance on [m].
-_TOUCH = 1e-6
-
 
 def allowed_pairs(compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link, ...]) -> tuple[tuple[int, int], ...]:
     """Return the pairs of link indices that may overlap, sorted.
@@ -24,7 +24,7 @@ def allowed_pairs(compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link
     Args:
         compiled: the model. skeleton: its kinematics. links: with shapes.
     """
-    pairs = adjacent_pairs(links) | _excluded(compiled, skeleton) | _overlapping(compiled, skeleton)
+    pairs = adjacent_pairs(links) | _excluded(compiled, skeleton)
     return tuple(sorted(pairs))
 
 
@@ -93,24 +93,5 @@ def _excluded(compiled: CompiledModel, skeleton: Skeleton) -> set[tuple[int, int
             )
     for (a, (type_a, affinity_a)), (b, (type_b, affinity_b)) in itertools.combinations(masks.items(), 2):
         if not (type_a & affinity_b) and not (type_b & affinity_a):
-            pairs.add(_pair(link[a], link[b]))
-    return pairs
-
-
-def _overlapping(compiled: CompiledModel, skeleton: Skeleton) -> set[tuple[int, int]]:
-    """Return pairs that MuJoCo finds in contact at the reference posture."""
-    import mujoco
-
-    m = compiled.model
-    data = mujoco.MjData(m)
-    mujoco.mj_kinematics(m, data)
-    mujoco.mj_collision(m, data)
-    link = skeleton.link_of_body
-    pairs = set()
-    for contact in data.contact:
-        if contact.dist > _TOUCH:
-            continue
-        a, b = (int(m.geom_bodyid[g]) for g in contact.geom)
-        if a in link and b in link and a != b:
             pairs.add(_pair(link[a], link[b]))
     return pairs

@@ -12,6 +12,7 @@ from clench.models.shapes import CollisionSource
 from .findings import Finding, FindingCode, Severity, in_hand_file, quoted
 from .finger_geometry import axis_angle, finger_line
 from .hand import Finger, Hand, JointRole
+from .known_couplings import check_couplings
 
 #: Links of fingers that are longer, or joints farther apart, are no hand's [m].
 _LARGE = 1.0
@@ -23,7 +24,7 @@ _OUT_OF_SCALE = 50.0
 
 def check_understood(hand: Hand) -> list[Finding]:
     """Return what looks wrong or is worth knowing about axes, lengths, shapes and thumb of a hand."""
-    found = [*_lengths(hand)]
+    found = [*_lengths(hand), *check_couplings(hand)]
     for finger in hand.fingers:
         found += _axes(hand, finger)
         found += _bare_joints(hand, finger)

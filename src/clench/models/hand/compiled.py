@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from clench.base.errors import FileError, HandError
+from clench.base.opengl import import_mujoco
 
 from .model_files import ModelText
 
@@ -63,18 +64,17 @@ def compile_model(text: ModelText) -> CompiledModel:
     Raises:
         FileError: MuJoCo refuses it; its reason is passed on.
     """
-    import mujoco
-
+    mujoco = import_mujoco()
     try:
         spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.assets))
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # it raises RuntimeError where memory is short
         raise FileError(text.label, f"MuJoCo cannot read it: {_first_lines(error)}") from None
     stated = _stated(spec, text)
     if stated.reversed:
         return _recompiled(spec, text.label, stated)
     try:
         return CompiledModel(spec, spec.compile(), text.xml, text.label, stated)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         if "volume" not in str(error) and "mjMINVAL" not in str(error):
             raise FileError(text.label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
     # Flat or open meshes have no volume to take a mass from: their surface does as well. What has none is given some.
@@ -94,6 +94,11 @@ def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
         return compiled
     spec = compiled.spec
     bodies = list(spec.bodies)
+    removed = {bodies[b].name for b in range(1, m.nbody) if b not in kept}
+    # MuJoCo takes what is tied to a removed body along, but not what looks at it.
+    for looking in [*spec.lights, *spec.cameras]:
+        if looking.targetbody in removed:
+            spec.delete(looking)
     for body in gone:
         spec.delete(bodies[body])
     for key in list(spec.keys):
@@ -186,7 +191,7 @@ def _recompiled(spec: Any, label: str, stated: StatedJoints) -> CompiledModel:
     try:
         model = spec.compile()
         return CompiledModel(spec, model, spec.to_xml(), label, stated)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         raise FileError(label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
 
 

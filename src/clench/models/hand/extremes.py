@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from clench.base.errors import HandError
+from clench.base.file_limits import MODEL_BODIES
 from clench.base.tolerances import LARGEST_LENGTH
 
 from .compiled import CompiledModel
@@ -23,6 +24,8 @@ def refuse_extremes(compiled: CompiledModel) -> None:
         HandError: with the joint or link.
     """
     m = compiled.model
+    if m.nbody > MODEL_BODIES:
+        raise HandError(f"{compiled.label}: has {m.nbody} bodies; expected a hand, or a robot of up to {MODEL_BODIES}.")
     for j in range(m.njnt):
         angles = (*m.jnt_range[j], m.qpos0[m.jnt_qposadr[j]])
         if not np.abs(angles).max() <= LARGEST_ANGLE:

@@ -42,6 +42,8 @@ class FindingCode(StrEnum):
     """lengths as if they were scaled down once too often"""
     COLLISION_FROM_VISUALS = "collision_from_visuals"
     """links without collision shapes collide with what is drawn"""
+    HULL_OFF_MESH = "hull_off_mesh"
+    """convex hulls replace concave meshes"""
     NO_SHAPE = "no_shape"
     """a joint moves nothing that has a shape"""
     SHAPE_LEFT_OUT = "shape_left_out"
@@ -66,6 +68,8 @@ class FindingCode(StrEnum):
     """the hand file gives a direction to a joint that follows another"""
     COUPLING_LEFT_OUT = "coupling_left_out"
     """a coupling to a joint that is no part of the hand"""
+    COUPLING_MISSING = "coupling_missing"
+    """a coupling that the maker publishes and the file leaves out"""
     JOINT_HELD = "joint_held"
     """a joint before the palm that is not revolute is held still"""
     LINKS_LEFT_OUT = "links_left_out"
@@ -93,8 +97,13 @@ class Finding:
 
 def in_hand_file(table: str, name: str, line: str) -> str:
     """Return what to write in the hand file, e.g. ``under [joints.X]: direction = 1``."""
+    return f"under {table_header(table, name)}: {line}"
+
+
+def table_header(table: str, name: str) -> str:
+    """Return the line that begins a table of the hand file, e.g. ``[joints.X]``."""
     key = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{name}"'
-    return f"under [{table}.{key}]: {line}"
+    return f"[{table}.{key}]"
 
 
 def quoted(names: tuple[str, ...] | list[str]) -> str:

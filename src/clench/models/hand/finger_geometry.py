@@ -48,13 +48,21 @@ def finger_line(hand: Hand, finger: Finger, q: FloatArray) -> FingerLine:
 
 def tip_point(hand: Hand, finger: Finger) -> FloatArray:
     """Return the middle of the far end of the tip link, in its frame [m], shape (3,)."""
-    link = hand.links[finger.tip_link]
-    shapes = next(s for s in (link.shapes[source] for source in CollisionSource) if s)
-    points = np.vstack([_outer_points(shape) for shape in shapes])
-    start = _joint_place(hand, finger.tip_link)
-    away = np.linalg.norm(points - start, axis=1)
+    points, away = _distances(hand, finger.tip_link)
     far = points[away >= _TIP_PART * away.max()]
     return np.asarray(0.5 * (far.min(axis=0) + far.max(axis=0)))
+
+
+def link_reach(hand: Hand, link: int) -> float:
+    """Return how far the shapes of a link reach from the joint that moves it [m]."""
+    return float(_distances(hand, link)[1].max())
+
+
+def _distances(hand: Hand, link: int) -> tuple[FloatArray, FloatArray]:
+    """Return points on the outside of a link, in its frame, and how far they are from the joint that moves it [m]."""
+    shapes = next(s for s in (hand.links[link].shapes[source] for source in CollisionSource) if s)
+    points = np.vstack([_outer_points(shape) for shape in shapes])
+    return points, np.linalg.norm(points - _joint_place(hand, link), axis=1)
 
 
 def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float | None]:
@@ -76,6 +84,18 @@ def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float 
             continue
         found.append(float(np.arctan2(np.cross(before, after) @ axis, before @ after)))
     return found
+
+
+def built_alike(hand: Hand, one: Finger, other: Finger) -> bool:
+    """Return whether two fingers have the same joints: axes turned alike, and as far from each other."""
+    if len(one.joints) != len(other.joints):
+        return False
+    q = np.array([j.reference for j in hand.joints])
+    a, b = (finger_line(hand, finger, q) for finger in (one, other))
+    turned, turned_other = (np.abs(line.axes @ line.axes[-1]) for line in (a, b))
+    apart, apart_other = (np.linalg.norm(np.diff(line.anchors, axis=0), axis=1) for line in (a, b))
+    alike = np.allclose(turned, turned_other, atol=1e-2)
+    return bool(alike and np.allclose(apart, apart_other, rtol=1e-2, atol=1e-4))
 
 
 def axis_angle(a: FloatArray, b: FloatArray) -> float:

@@ -8,12 +8,15 @@ from clench.base.errors import FileError, HandError, UnknownNameError
 from clench.base.pose import FloatArray
 
 from .findings import Finding, FindingCode, quoted
+from .finger_geometry import link_reach
 from .finger_names import names_thumb, place_names, short_names
 from .hand import Finger, Hand, Link
 from .hand_file import FingerOverride, HandFile
 
 #: A finger is a thumb when its likeness to the others is so much lower than theirs to each other [-].
 _THUMB_UNLIKE = 0.6
+#: Links that reach equally far differ by less than this [m]; the one later in the chain is the tip then.
+_SAME_REACH = 1e-4
 
 
 def own_chains(hand: Hand) -> list[tuple[int, ...]]:
@@ -175,7 +178,18 @@ def _finger(hand: Hand, name: str, chain: tuple[int, ...]) -> Finger:
     with_shape = _with_shape(hand, chain)
     if not with_shape:
         raise HandError(f"{hand.name}: no link moved by the joints {_quoted(hand, chain)} has any geometry.")
-    return Finger(name, _links_of(hand, chain), chain, names_thumb(name), with_shape[-1])
+    return Finger(name, _links_of(hand, chain), chain, names_thumb(name), _tip_link(hand, chain, with_shape))
+
+
+def _tip_link(hand: Hand, chain: tuple[int, ...], links: list[int]) -> int:
+    """Return the most distal of a finger's links: past the most joints, and of those the one that reaches farthest.
+
+    The order of links in the file tells nothing: a pad on a proximal link may come after all that moves beyond it.
+    """
+    place = {joint: n for n, joint in enumerate(chain)}
+    depths = {i: place[_joints_from_palm(hand, i)[-1]] for i in links}
+    last = [i for i in links if depths[i] == max(depths.values())]
+    return max(last, key=lambda i: (round(link_reach(hand, i) / _SAME_REACH), i))
 
 
 def _with_shape(hand: Hand, chain: tuple[int, ...]) -> list[int]:

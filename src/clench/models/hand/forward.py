@@ -60,6 +60,20 @@ def poses_at(hand: Hand, postures: FloatArray) -> FloatArray:
     return placed
 
 
+def base_pose(hand: Hand, q: FloatArray) -> FloatArray:
+    """Return `T_palm_base` at a posture: the frame of the model's file that the root link stands in, shape (4, 4).
+
+    Args:
+        hand: the hand. q: angles of all its joints [rad], shape (J,).
+    """
+    root = hand.links[0]
+    local = root.T_parent_link
+    if root.joint >= 0:
+        local = local @ _joint_motions(hand.joint_arrays, q[None])[0, root.joint]
+    base: FloatArray = poses_at(hand, q[None])[0, 0] @ np.linalg.inv(local)
+    return base
+
+
 def _joint_motions(joints: JointArrays, postures: FloatArray) -> FloatArray:
     """Return the motion of every joint at several postures in the frame of its link, shape (S, J, 4, 4)."""
     angles = postures - joints.reference

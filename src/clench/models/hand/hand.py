@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from clench.models.shapes import CollisionSource, Shape
 from .findings import Finding, Severity
 from .forward import JointArrays, joint_arrays, poses_at
 from .tendons import TendonMap
+
+if TYPE_CHECKING:
+    from .overlaps import Overlaps, Pairs
 
 #: Speed of joints whose model gives no limit [rad/s].
 DEFAULT_SPEED: Final = 2.0
@@ -47,7 +50,10 @@ class Joint:
         reference: the angle [rad] at which `Link.T_parent_link` holds.
         velocity: limit [rad/s], or None when the model gives none.
         effort: limit [Nm], or None when the model gives none.
-        stiffness: gain of its position servo [Nm/rad], or None when the model has none.
+        stiffness: gain of its position servo [Nm/rad], or None when the model has none. A servo of a fixed tendon
+            with gain k_p and coefficients c_i counts as k_p times the sum of c_i² for every joint of the tendon.
+        servo_share: `stiffness` beside the servo's own gain [-]: the sum of c_i² for a tendon's servo, 1 without one.
+        friction_loss: torque that dry friction in the joint takes [Nm].
         role, role_reason: what it does in a grasp, and why that was concluded.
         direction: +1 when its angle grows while the finger closes, else -1.
         direction_reason: why.
@@ -63,6 +69,8 @@ class Joint:
     velocity: float | None = None
     effort: float | None = None
     stiffness: float | None = None
+    servo_share: float = 1.0
+    friction_loss: float = 0.0
     role: JointRole = JointRole.POSTURE
     role_reason: str = ""
     direction: int = 1
@@ -151,10 +159,13 @@ class Hand:
         links, joints, couplings, fingers: see their types.
         palm: index of the palm link.
         fixed_links: indices of links that no finger moves (palm included) and that objects can hit.
-        allowed_pairs: link index pairs that may overlap (adjacent, excluded, overlapping at reference), sorted.
+        allowed_pairs: link index pairs that may overlap whatever their shapes (adjacent, or excluded by the model or
+            the hand file), sorted; see `allowed_pairs_for`.
         palm_center: centroid of the finger bases in the palm frame [m]; palm_normal: mean closing direction
             of the tips, unit.
         default_source: the collision source used unless a command names one.
+        overlaps_allowed: whether links may overlap that do so in every posture, or when the hand is open, besides
+            `allowed_pairs`: so it is with hands that are read from a model.
         tendons: of the hand file, or else of the model; None when joints are driven by themselves.
         findings: what loading found wrong or worth knowing; `clench.check_hand` looks for more.
         spec_xml: MJCF or URDF text that MuJoCo compiles, with `assets`, for simulation: the model's own numbers, or
@@ -173,6 +184,7 @@ class Hand:
     palm_center: FloatArray
     palm_normal: FloatArray
     default_source: CollisionSource = CollisionSource.ENGINE
+    overlaps_allowed: bool = False
     tendons: TendonMap | None = None
     findings: tuple[Finding, ...] = ()
     spec_xml: str = ""
@@ -223,6 +235,51 @@ class Hand:
     def solid_links(self) -> tuple[int, ...]:
         """Indices of the links that can touch, ascending: the fixed ones and those of the fingers."""
         return tuple(sorted({*self.fixed_links, *(link for finger in self.fingers for link in finger.links)}))
+
+    def allowed_pairs_for(self, source: CollisionSource) -> tuple[tuple[int, int], ...]:
+        """Return the pairs of link indices that may overlap when links have the shapes of one source, sorted.
+
+        These are `allowed_pairs` and the pairs whose shapes overlap in the open posture and in every other one that is
+        looked at. They are found once and kept.
+        """
+        return self._with_overlapping(source, self._overlaps(source).always)
+
+    def allowed_pairs_from(self, source: CollisionSource, q: FloatArray) -> tuple[tuple[int, int], ...]:
+        """Return the pairs of link indices that may overlap in a motion that starts at a posture, sorted.
+
+        These are `allowed_pairs_for` and the pairs that overlap there because they do so when the hand is open: a link
+        and the palm, or links of one finger. A motion that starts with them apart must keep them apart.
+
+        Args:
+            source: which shapes the links have. q: angles of all joints [rad], shape (J,).
+        """
+        found = self._overlaps(source)
+        if not found.when_open:
+            return self._with_overlapping(source, found.always)
+        from .overlaps import overlapping
+
+        at_start = overlapping(self, CollisionSource(source), found.when_open, q)
+        return self._with_overlapping(source, found.always | at_start)
+
+    def _overlaps(self, source: CollisionSource) -> Overlaps:
+        if source not in self._found_overlaps:
+            from .overlaps import NO_OVERLAPS, find_overlaps
+
+            if not self.overlaps_allowed:
+                return NO_OVERLAPS
+            self._found_overlaps[source] = find_overlaps(self, CollisionSource(source))
+        return self._found_overlaps[source]
+
+    def _with_overlapping(self, source: CollisionSource, pairs: Pairs) -> tuple[tuple[int, int], ...]:
+        return self._allowed_pairs.setdefault((source, pairs), tuple(sorted({*self.allowed_pairs, *pairs})))
+
+    @cached_property
+    def _found_overlaps(self) -> dict[CollisionSource, Overlaps]:
+        return {}
+
+    @cached_property
+    def _allowed_pairs(self) -> dict[tuple[CollisionSource, Pairs], tuple[tuple[int, int], ...]]:
+        return {}
 
     def joint_index(self, name: str) -> int:
         """Return the index of a joint.

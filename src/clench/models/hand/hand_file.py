@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from clench.base.errors import FileError, HandError
-from clench.base.files import read_text
 from clench.base.numbers import is_finite_number
+from clench.base.toml_files import read_toml
 from clench.models.shapes import CollisionSource
 
 from .hand import JointRole
@@ -91,11 +90,7 @@ def read_hand_file(path: Path) -> HandFile:
     Raises:
         FileError: missing, not TOML, an unknown key or a value of another kind, with the key.
     """
-    try:
-        data = tomllib.loads(read_text(path, "no hand file can be read here."))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise FileError(path, f"not TOML: {error}.") from None
-    top = _Table(path, "", data)
+    top = _Table(path, "", read_toml(path, "no hand file can be read here."))
     top.allow("palm", "collision_source", "fingers", "joints", "links", "allowed_pairs", "tendons")
     source = top.choice("collision_source", [str(s) for s in CollisionSource])
     return HandFile(

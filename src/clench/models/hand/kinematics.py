@@ -141,6 +141,7 @@ def _joint(
     if effort is not None and effort > EFFORT_PLACEHOLDER:
         effort = None
     axis = np.array(m.jnt_axis[j])
+    stiffness, share = _servo(m, j)
     return Joint(
         name=name,
         axis=axis / np.linalg.norm(axis),
@@ -150,7 +151,9 @@ def _joint(
         reference=reference,
         velocity=velocities.get(name),
         effort=effort,
-        stiffness=_stiffness(m, j),
+        stiffness=stiffness,
+        servo_share=share,
+        friction_loss=float(m.dof_frictionloss[m.jnt_dofadr[j]]),
     )
 
 
@@ -197,17 +200,29 @@ def actuator_forces(model: Any, a: int) -> tuple[float, float]:
     return -float("inf"), float("inf")
 
 
-def _stiffness(model: Any, joint: int) -> float | None:
-    """Return the gain of a joint's position servo [Nm/rad], None when it has none."""
+def _servo(model: Any, joint: int) -> tuple[float | None, float]:
+    """Return the gain that a position servo has at a joint [Nm/rad], and that gain beside the servo's own [-].
+
+    The servo is that of the joint or of its fixed tendon; without one the gain is None. A tendon's servo counts as
+    `k_p sum(c_i²)`: when every joint of the tendon is told `tau_i / stiffness` more than it
+    has, with `tau_i = c_i F`, the tendon is told `F / k_p` more and pulls with the force F.
+    """
     import mujoco
 
     for a in range(model.nu):
-        if model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT and int(model.actuator_trnid[a, 0]) == joint:
-            gain, bias = float(model.actuator_gainprm[a, 0]), float(model.actuator_biasprm[a, 1])
-            if model.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_AFFINE and gain > 0.0 and bias == -gain:
-                stiffness = gain * float(model.actuator_gear[a, 0]) ** 2
-                return stiffness if np.isfinite(stiffness) else None
-    return None
+        gain, bias = float(model.actuator_gainprm[a, 0]), float(model.actuator_biasprm[a, 1])
+        if model.actuator_biastype[a] != mujoco.mjtBias.mjBIAS_AFFINE or gain <= 0.0 or bias != -gain:
+            continue
+        target = int(model.actuator_trnid[a, 0])
+        arms = {}
+        if model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT:
+            arms = {target: 1.0}
+        elif model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_TENDON:
+            arms = dict(fixed_tendon(model, target))
+        if arms.get(joint, 0.0) != 0.0:
+            share = float(model.actuator_gear[a, 0]) ** 2 * sum(arm * arm for arm in arms.values())
+            return (gain * share, share) if np.isfinite(gain * share) else (None, 1.0)
+    return None, 1.0
 
 
 def fixed_tendon(model: Any, tendon: int) -> list[tuple[int, float]]:

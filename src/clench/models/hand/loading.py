@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,16 +19,17 @@ from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies
 from .coupling import FoundCouplings, Relation, find_couplings, flatten
 from .extremes import refuse_extremes
 from .findings import Finding, FindingCode, Severity, quoted
-from .finger_geometry import finger_line, tip_motion
+from .finger_geometry import built_alike, finger_line, tip_motion
 from .fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
 from .geometry import ShapeReader, bodies_without_collision
-from .hand import Hand, JointRole, Link
+from .hand import Finger, Hand, JointRole, Link
 from .hand_file import HandFile, LinkOverride, find_hand_file
 from .kinematics import Skeleton, build_skeleton
 from .model_files import ModelText, read_model
 from .palm import find_palm, hand_bodies
 from .roles import assign_roles
 from .tendons import TendonMap, model_tendons
+from .whole_meshes import with_whole_meshes
 
 #: Tips whose mean closing direction is shorter oppose each other: the palm faces along the fingers [-].
 _OPPOSED = 0.4
@@ -46,7 +48,7 @@ def load_hand(
         model: built-in name or path. hand_file: TOML overrides. palm: the palm link's name.
         collision_source: which geometry is meant unless a command says otherwise.
     """
-    text = read_model(model)
+    text = with_whole_meshes(read_model(model))
     overrides = find_hand_file(text.path, hand_file or text.hand_file)
     source = _source(collision_source, overrides)
     compiled, palm_body, findings = _hand_alone(text, palm or overrides.palm)
@@ -69,6 +71,7 @@ def load_hand(
         palm_center=np.zeros(3),
         palm_normal=np.zeros(3),
         default_source=source,
+        overlaps_allowed=True,
         tendons=_tendons(compiled, skeleton, overrides),
         findings=(*findings, *skeleton.findings, *found.findings, *reader.findings),
         spec_xml=compiled.xml,
@@ -185,20 +188,48 @@ def _with_given_couplings(found: FoundCouplings, skeleton: Skeleton, overrides: 
 def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> Hand:
     """Return the hand with fingers, roles, thumb, fixed links and the palm's centre and normal."""
     fingers, findings = find_fingers(hand, overrides)
-    hand = replace(hand, fingers=fingers, findings=(*hand.findings, *findings))
-    hand = assign_roles(hand, overrides, held)
+    bare = replace(hand, fingers=fingers, findings=(*hand.findings, *findings))
+    hand = assign_roles(bare, overrides, held)
     bases, tips, stretch, closing = _directions(hand)
     thumb = find_thumb(hand.fingers, stretch, closing)
+    told = [finger.is_thumb for finger in fingers]
     places = row_places(bases, thumb, tips[thumb or 0])
     fingers = name_fingers(hand, thumb, places, overrides)
+    called = _called_thumbs(fingers, told, overrides)
+    swinging = [
+        f.is_thumb and (named or (_closes_before_it_turns(hand, f) and (f.name in called or _unlike_others(hand, f))))
+        for f, named in zip(fingers, told, strict=True)
+    ]
+    if swinging != told:
+        # The base of a thumb has another role than that of a finger, which was not known before.
+        known = tuple(replace(f, is_thumb=swings) for f, swings in zip(fingers, swinging, strict=True))
+        hand = assign_roles(replace(bare, fingers=known), overrides, held)
+        bases, tips, stretch, closing = _directions(hand)
     hand = replace(hand, fingers=fingers, fixed_links=fixed_links(hand.links, fingers, hand.palm))
     hand = replace(
         hand,
         allowed_pairs=with_given_pairs(hand, overrides),
         palm_center=bases.mean(axis=0),
-        palm_normal=_normal(hand, stretch, closing),
+        palm_normal=_normal(hand, stretch, closing, gripper=not called),
     )
     return replace(hand, findings=(*hand.findings, *check_understood(hand)))
+
+
+def _called_thumbs(fingers: Sequence[Finger], told: Sequence[bool], overrides: HandFile) -> set[str]:
+    """Return the names of fingers that the model or the hand file calls thumbs; others only stand against the rest."""
+    called = {finger.name for finger, named in zip(fingers, told, strict=True) if named}
+    return called | {name for name, finger in overrides.fingers.items() if finger.thumb}
+
+
+def _closes_before_it_turns(hand: Hand, finger: Finger) -> bool:
+    """Return whether a posture joint comes after a closing one, so that a thumb's base may be parallel by chance."""
+    closing = [hand.joints[j].role is JointRole.CLOSING for j in finger.joints]
+    return any(a and not b for a, b in itertools.combinations(closing, 2))
+
+
+def _unlike_others(hand: Hand, finger: Finger) -> bool:
+    """Return whether no other finger is built like this one: several of one kind close alike."""
+    return not any(built_alike(hand, finger, other) for other in hand.fingers if other.joints != finger.joints)
 
 
 def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -221,20 +252,21 @@ def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray, FloatAr
     return np.array(bases), np.array(tips), np.array(stretch), np.array(closing)
 
 
-def _normal(hand: Hand, stretch: FloatArray, closing: FloatArray) -> FloatArray:
-    """Return the palm's normal: the mean closing direction of the tips, without the thumb where others remain.
+def _normal(hand: Hand, stretch: FloatArray, closing: FloatArray, *, gripper: bool) -> FloatArray:
+    """Return the palm's normal: the mean closing direction of the fingers' tips, without the thumb.
 
-    A thumb that stretches out against the fingers counts as much as they do together (two fingers against one).
-    Fingers that close towards each other (claws, grippers) have no common side: their palm faces along them.
+    Fingers that close towards each other (claws, grippers) have no common side: their palm faces along them. In a
+    gripper the finger that stands against the others counts as much as they do together.
     """
     others = [i for i, f in enumerate(hand.fingers) if not f.is_thumb]
-    thumbs = [i for i, f in enumerate(hand.fingers) if f.is_thumb]
-    groups = [group for group in (others, thumbs) if group]
+    against = [i for i, f in enumerate(hand.fingers) if f.is_thumb]
+    groups = [group for group in (others, against) if group]
     mean = closing[groups[0]].mean(axis=0)
-    if len(groups) == 2 and stretch[others].mean(axis=0) @ stretch[thumbs].mean(axis=0) < -_OPPOSED:
+    if len(groups) == 1 or not gripper:
+        return _unit(mean if np.linalg.norm(mean) >= _OPPOSED else stretch[groups[0]].mean(axis=0))
+    if stretch[others].mean(axis=0) @ stretch[against].mean(axis=0) < -_OPPOSED:
         mean = np.mean([closing[group].mean(axis=0) for group in groups], axis=0)
-    against = any(_unit(mean) @ closing[i] < -_OPPOSED for i in thumbs)
-    if np.linalg.norm(mean) < _OPPOSED or against:
+    if np.linalg.norm(mean) < _OPPOSED or any(_unit(mean) @ closing[i] < -_OPPOSED for i in against):
         mean = np.mean([stretch[group].mean(axis=0) for group in groups], axis=0)
     return _unit(mean)
 

@@ -8,7 +8,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from clench.base.errors import FileError
+from clench.base.file_limits import ASSET_BYTES, MESH_BYTES
 from clench.base.files import read_file
+from clench.models.mesh_parsing import PARSED, MeshError, parse_mesh
+
+from .pictures import PNG, checked_png
 
 _NATIVE = (".obj", ".stl", ".msh")
 #: MuJoCo refuses larger STL files; OBJ has no such limit.
@@ -26,6 +30,7 @@ class MeshStore:
         self.model = model
         self.assets: dict[str, bytes] = {}
         self._keys: dict[Path, str] = {}
+        self._size = 0
 
     def add(self, named: str, candidates: Iterable[Path], owner: str, *, is_mesh: bool = True) -> str:
         """Read the first candidate that exists and return its key.
@@ -46,8 +51,13 @@ class MeshStore:
             raise FileError(self.model, f"{kind} '{named}' of {owner} is missing; looked for {looked}.")
         file = file.resolve()
         if file not in self._keys:
-            data = read_file(file)
+            data = read_file(file, MESH_BYTES)
+            self._size += len(data)
+            if self._size > ASSET_BYTES:
+                raise FileError(self.model, f"its meshes and textures have more than {ASSET_BYTES >> 20} MB together.")
             suffix = file.suffix.lower()
+            if data.startswith(PNG):
+                data = self._picture(data, file, owner)
             if is_mesh:
                 data, suffix = self._native(data, suffix, file, owner)
             stem = re.sub(r"[^A-Za-z0-9_.-]", "_", file.stem)
@@ -63,10 +73,19 @@ class MeshStore:
             raise FileError(self.model, f"mesh '{file.name}' of {owner} is empty.")
         if suffix in _NATIVE and not (suffix == ".stl" and _unreadable_stl(data)):
             return data, suffix
+        if suffix not in PARSED:
+            expected = ", ".join(sorted({*PARSED, *_NATIVE}))
+            raise FileError(self.model, f"mesh '{file.name}' of {owner}: expected one of {expected}.")
         try:
             return _converted(data, suffix)
-        except Exception as error:
+        except (MeshError, FileError, ValueError) as error:
             raise FileError(self.model, f"mesh '{file.name}' of {owner} cannot be read ({error}).") from None
+
+    def _picture(self, data: bytes, file: Path, owner: str) -> bytes:
+        try:
+            return checked_png(data)
+        except ValueError as error:
+            raise FileError(self.model, f"picture '{file.name}' of {owner}: {error}.") from None
 
 
 def _unreadable_stl(data: bytes) -> bool:
@@ -78,7 +97,7 @@ def _unreadable_stl(data: bytes) -> bool:
 
 
 def _converted(data: bytes, suffix: str) -> tuple[bytes, str]:
-    """Convert a mesh file of any kind that trimesh reads to STL or, when large, OBJ; scene transforms are applied.
+    """Convert a mesh file of the other kinds to STL or, when large, OBJ; scene transforms are applied.
 
     MuJoCo keeps vertices in single precision, as STL does, and merges those that coincide.
     """
@@ -87,8 +106,7 @@ def _converted(data: bytes, suffix: str) -> tuple[bytes, str]:
     import numpy as np
     import trimesh
 
-    loaded = trimesh.load(io.BytesIO(data), file_type=suffix.lstrip("."), process=False)
-    mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+    mesh = parse_mesh(data, suffix)
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise ValueError("it holds no triangles")
     if len(mesh.faces) <= _STL_FACES:

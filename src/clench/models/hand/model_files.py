@@ -9,31 +9,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from clench.base.errors import FileError, UnknownNameError
-from clench.base.files import read_file
+from clench.base.file_limits import MODEL_BYTES
+from clench.base.xml_files import check_xml, read_xml
 
 from .mesh_files import MeshStore
+from .mjcf_checks import check_mjcf
 from .named import find_named, how_to_get_more, known_names
+from .odd_numbers import refuse_odd_numbers
 
 _BUILTIN = Path(__file__).parent / "builtin"
 _SUFFIXES = (".urdf", ".xml", ".mjcf")
-#: Attributes of MJCF that hold numbers which decide where things are.
-_NUMBERS = frozenset(
-    (
-        "pos",
-        "quat",
-        "euler",
-        "axisangle",
-        "xyaxes",
-        "zaxis",
-        "axis",
-        "range",
-        "size",
-        "fromto",
-        "ref",
-        "scale",
-        "polycoef",
-    )
-)
+_EXPECTED = "URDF or MJCF"
+#: Elements of MJCF that name files, and the attributes that do.
+_FILES = {
+    **dict.fromkeys(("mesh", "hfield", "skin", "flexcomp"), ("file",)),
+    "texture": ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back"))),
+}
 
 
 @dataclass(frozen=True)
@@ -106,15 +97,16 @@ def read_model(model: str | Path) -> ModelText:
         FileError: missing, unreadable or malformed file. UnknownNameError: no such built-in hand.
     """
     path, builtin = find_model(model)
-    root = _parse(path)
+    root, size = read_xml(path, _EXPECTED)
     if root.tag == "robot":
         from .urdf import prepare_urdf, take_still_joints, velocity_limits
 
         velocities, still = velocity_limits(root), take_still_joints(root, path)
         assets = prepare_urdf(root, path)
+        refuse_odd_numbers(root, path)
     elif root.tag == "mujoco":
         velocities, still = {}, {}
-        assets = _prepare_mjcf(root, path)
+        assets = _prepare_mjcf(root, path, size)
     else:
         raise FileError(path, f"root element <{root.tag}>; expected <robot> (URDF) or <mujoco> (MJCF).")
     own = path.with_suffix(".hand.toml")
@@ -132,45 +124,33 @@ def read_model(model: str | Path) -> ModelText:
     )
 
 
-def _parse(path: Path) -> ET.Element:
-    try:
-        return ET.fromstring(read_file(path))
-    except FileError:
-        raise
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise FileError(path, f"not well-formed XML ({error}); expected URDF or MJCF.") from None
-
-
-def _prepare_mjcf(root: ET.Element, path: Path) -> dict[str, bytes]:
+def _prepare_mjcf(root: ET.Element, path: Path, size: int) -> dict[str, bytes]:
     """Expand includes and rename every file of an MJCF tree to a key of the returned assets."""
-    _expand_includes(root, path, depth=0)
-    _refuse_nan(root, path)
+    _expand_includes(root, path, {path.resolve(): size})
+    check_xml(root, path)
+    refuse_odd_numbers(root, path)
+    check_mjcf(root, path)
     _name_bodies(root)
     folders = _asset_folders(root)
     store = MeshStore(path)
     for element in root.iter():
-        file = element.get("file")
-        if file is None or element.tag not in ("mesh", "texture", "hfield", "skin"):
-            continue
-        if folders["strip"]:
-            file = Path(file).name
-        folder = folders["texture" if element.tag == "texture" else "mesh"]
-        owner = f"<{element.tag}> '{element.get('name', Path(file).stem)}'"
-        if element.tag == "mesh" and element.get("name") is None:
-            element.set("name", Path(file).stem)
-        key = store.add(file, [path.parent / folder / file], owner, is_mesh=element.tag == "mesh")
-        element.set("file", key)
-        element.attrib.pop("content_type", None)
+        for attribute in _FILES.get(element.tag, ()):
+            if attribute in element.attrib:
+                _store_file(element, attribute, path.parent, folders, store)
     return store.assets
 
 
-def _refuse_nan(root: ET.Element, path: Path) -> None:
-    """Refuse numbers that are none, which MuJoCo would take."""
-    for element in root.iter():
-        for key, text in element.attrib.items():
-            if key in _NUMBERS and any(word.lower().lstrip("+-") == "nan" for word in text.split()):
-                name = element.get("name", "")
-                raise FileError(path, f"<{element.tag}> '{name}': {key} '{text}'; expected finite numbers.")
+def _store_file(element: ET.Element, attribute: str, parent: Path, folders: dict[str, str], store: MeshStore) -> None:
+    """Read the file that an attribute names, and put its key in the attribute."""
+    file = element.get(attribute, "")
+    if folders["strip"]:
+        file = Path(file).name
+    folder = folders["texture" if element.tag == "texture" else "mesh"]
+    owner = f"<{element.tag}> '{element.get('name', Path(file).stem)}'"
+    if element.tag == "mesh" and element.get("name") is None:
+        element.set("name", Path(file).stem)
+    element.set(attribute, store.add(file, [parent / folder / file], owner, is_mesh=element.tag == "mesh"))
+    element.attrib.pop("content_type", None)
 
 
 def _name_bodies(root: ET.Element) -> None:
@@ -205,20 +185,28 @@ def _asset_folders(root: ET.Element) -> dict[str, str]:
     return folders
 
 
-def _expand_includes(element: ET.Element, main: Path, depth: int) -> None:
-    """Replace `<include file=…/>` by the children of the included root, as MuJoCo does."""
-    if depth > 20:
-        raise FileError(main, "includes are nested more than 20 deep; a file seems to include itself.")
-    for child in list(element):
-        if child.tag != "include":
-            _expand_includes(child, main, depth)
-            continue
-        file = main.parent / child.get("file", "")
-        if not file.is_file():
-            raise FileError(main, f"included file '{child.get('file', '')}' is missing; looked for {file}.")
-        included = _parse(file)
-        _expand_includes(included, main, depth + 1)
-        place = list(element).index(child)
-        element.remove(child)
-        for offset, grandchild in enumerate(list(included)):
-            element.insert(place + offset, grandchild)
+def _expand_includes(root: ET.Element, main: Path, sizes: dict[Path, int]) -> None:
+    """Replace `<include file=…/>` by the children of the included root; each file is included once, as in MuJoCo.
+
+    Args:
+        root: of the tree that is changed. main: the model file. sizes: of the files so far [bytes].
+    """
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        while (child := element.find("include")) is not None:
+            place = list(element).index(child)
+            element[place : place + 1] = list(_included(child.get("file", ""), main, sizes))
+        waiting.extend(element)
+
+
+def _included(named: str, main: Path, sizes: dict[Path, int]) -> ET.Element:
+    file = main.parent / named
+    if not file.is_file():
+        raise FileError(main, f"included file '{named}' is missing; looked for {file}.")
+    if file.resolve() in sizes:
+        raise FileError(main, f"file '{named}' is included twice; MuJoCo allows each file once.")
+    included, sizes[file.resolve()] = read_xml(file, _EXPECTED)
+    if sum(sizes.values()) > MODEL_BYTES:
+        raise FileError(main, f"has more than {MODEL_BYTES >> 20} MB together with the files that it includes.")
+    return included

@@ -130,10 +130,15 @@ def describe_hand(hand: Hand, findings: tuple[Finding, ...] | None = None) -> Ha
         joints=tuple(_joint(hand, i) for i in range(len(hand.joints))),
         links=_links(hand),
         fixed_links=tuple(hand.links[i].name for i in hand.fixed_links),
-        allowed_pairs=tuple((hand.links[a].name, hand.links[b].name) for a, b in hand.allowed_pairs),
+        allowed_pairs=_allowed_pairs(hand),
         warnings=hand.warnings,
         findings=hand.findings if findings is None else findings,
     )
+
+
+def _allowed_pairs(hand: Hand) -> tuple[tuple[str, str], ...]:
+    pairs = hand.allowed_pairs_for(hand.default_source)
+    return tuple((hand.links[a].name, hand.links[b].name) for a, b in pairs)
 
 
 def _fingers(hand: Hand) -> tuple[FingerReport, ...]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from clench.base.errors import FileError, HandError, UnknownNameError
 from clench.base.tolerances import CLOSING_ANGLE
 
-from .findings import Finding, FindingCode, Severity, in_hand_file, quoted
+from .closing_sense import FingerPlan, contradicting, decide_senses, note_limits
+from .findings import Finding, FindingCode, in_hand_file, quoted
 from .finger_geometry import axis_angle, bends, finger_line
 from .hand import Finger, Hand, Joint, JointRole
 from .hand_file import HandFile, JointOverride
@@ -20,32 +20,6 @@ from .hand_file import HandFile, JointOverride
 _ZERO_TRUST = np.deg2rad(25.0)
 #: The angle in the model's reference posture is taken as straight when the links say so within this [rad].
 _REFERENCE_TRUST = np.deg2rad(10.0)
-#: Limits are equally far when their distances differ by less than this share of the range [-].
-_EQUALLY_FAR = 0.05
-#: How far the fingers are curled to see on which side they meet [rad].
-_CURL = np.deg2rad(60.0)
-#: Sides whose mean tip distances differ by less than this share cannot be told apart [-].
-_UNDECIDED = 0.02
-
-
-@dataclass
-class FingerPlan:
-    """Collect what is decided about one finger.
-
-    Args:
-        finger: which. closing: joint indices, palm side first. signs: of each closing axis against the most
-            distal one. straight: angle of each closing joint at which the finger is straight [rad].
-        sense: +1 or -1 about the most distal axis, None while undecided.
-    """
-
-    finger: Finger
-    closing: list[int] = field(default_factory=list)
-    signs: list[int] = field(default_factory=list)
-    straight: list[float] = field(default_factory=list)
-    straight_reason: list[str] = field(default_factory=list)
-    votes: dict[int, tuple[int, float, str]] = field(default_factory=dict)
-    sense: int | None = None
-    sense_reason: str = ""
 
 
 def assign_roles(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> Hand:
@@ -67,7 +41,7 @@ def assign_roles(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> 
     plans = [_plan(hand, finger, overrides, joints) for finger in hand.fingers]
     if not any(p.closing for p in plans):
         raise HandError(f"{hand.name}: has no closing joint: all joints of its fingers are posture joints.")
-    findings = [*hand.findings, *_decide_senses(replace(hand, joints=tuple(joints)), plans)]
+    findings = [*hand.findings, *decide_senses(replace(hand, joints=tuple(joints)), plans)]
     for plan in plans:
         _apply(plan, joints, findings)
     _override(hand, joints, overrides)
@@ -115,6 +89,7 @@ def _below_palm(hand: Hand) -> set[int]:
 def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) -> FingerPlan:
     """Find a finger's closing joints, where it is straight, and what the limits say about its sense."""
     plan = FingerPlan(finger)
+    followers = {c.follower for c in hand.couplings}
     line = finger_line(hand, finger, np.array([j.reference for j in hand.joints]))
     mobile = [k for k, j in enumerate(finger.joints) if hand.joints[j].upper - hand.joints[j].lower > 1e-9]
     for k, j in enumerate(finger.joints):
@@ -130,6 +105,10 @@ def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) 
         override = overrides.joints.get(hand.joints[j].name, JointOverride())
         closing = angle <= CLOSING_ANGLE if override.role is None else override.role is JointRole.CLOSING
         reason = _role_reason(angle, k == mobile[-1], override.role)
+        if closing and override.role is None and finger.is_thumb:
+            turner, away = _turned_away(hand, finger, k, mobile)
+            closing = away <= CLOSING_ANGLE
+            reason = reason if closing else _base_reason(hand.joints[turner].name, away)
         joints[j] = replace(joints[j], role=JointRole.CLOSING if closing else JointRole.POSTURE, role_reason=reason)
         if closing:
             places.append(k)
@@ -140,8 +119,35 @@ def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) 
         straight, reason = _straight(hand.joints[j], plan.signs[n], bent[n], first=n == 0)
         plan.straight.append(straight)
         plan.straight_reason.append(reason)
-        _vote(plan, n, hand.joints[j], overrides.joints.get(hand.joints[j].name, JointOverride()))
+        if j not in followers:
+            note_limits(plan, n, hand.joints[j], overrides.joints.get(hand.joints[j].name, JointOverride()))
     return plan
+
+
+def _turned_away(hand: Hand, finger: Finger, place: int, mobile: list[int]) -> tuple[int, float]:
+    """Return which later joint turns a joint farthest from the last one's axis, and how far that is [rad].
+
+    An axis that is parallel to the closing ones in one posture alone does not close: turned away, it swings the thumb.
+    """
+    start = np.array([j.reference for j in hand.joints])
+    worst = (finger.joints[mobile[-1]], 0.0)
+    line = finger_line(hand, finger, start)
+    swings = [k for k in mobile if place < k and axis_angle(line.axes[k], line.axes[mobile[-1]]) > CLOSING_ANGLE]
+    for between in (finger.joints[k] for k in swings):
+        for limit in (hand.joints[between].lower, hand.joints[between].upper):
+            q = start.copy()
+            q[between] = limit
+            axes = finger_line(hand, finger, q).axes
+            worst = max(worst, (between, axis_angle(axes[place], axes[mobile[-1]])), key=lambda found: found[1])
+    return worst
+
+
+def _base_reason(turner: str, away: float) -> str:
+    degrees = np.rad2deg(away)
+    return (
+        "the base of a thumb, parallel to its most distal joint only at the model's zero: "
+        f"'{turner}' turns it {degrees:.0f} deg away"
+    )
 
 
 def _role_reason(angle: float, most_distal: bool, given: JointRole | None) -> str:
@@ -171,100 +177,47 @@ def _straight(joint: Joint, sign: int, bend: float | None, *, first: bool) -> tu
     return stretched, f"links in line at {degrees:.0f} deg"
 
 
-def _vote(plan: FingerPlan, n: int, joint: Joint, override: JointOverride) -> None:
-    """Record which way a joint says that its finger closes, from its limits or the hand file."""
-    j = plan.closing[n]
-    if override.direction is not None:
-        plan.votes[j] = (override.direction, np.inf, "hand file")
-        return
-    up, down = joint.upper - plan.straight[n], plan.straight[n] - joint.lower
-    if abs(up - down) <= _EQUALLY_FAR * (joint.upper - joint.lower):
-        return
-    far = "upper" if up > down else "lower"
-    angles = f"{np.rad2deg(max(up, down)):.0f} deg against {np.rad2deg(min(up, down)):.0f}"
-    plan.votes[j] = (1 if up > down else -1, abs(up - down), f"the {far} limit is farther from straight ({angles})")
-
-
-def _decide_senses(hand: Hand, plans: list[FingerPlan]) -> list[Finding]:
-    """Give every finger its sense: from its joints' limits, else the side on which the fingertips meet."""
-    for plan in plans:
-        weight = sum(
-            plan.signs[n] * plan.votes[j][0] * min(plan.votes[j][1], 1e3)
-            for n, j in enumerate(plan.closing)
-            if j in plan.votes
-        )
-        if weight != 0.0:
-            plan.sense = 1 if weight > 0.0 else -1
-            plan.sense_reason = "limits equally far; closes like the other joints of the finger"
-    open_plans = [p for p in plans if p.sense is None and p.closing]
-    if not open_plans:
-        return []
-    if len(plans) == 1:
-        open_plans[0].sense, open_plans[0].sense_reason = 1, "limits equally far and no other finger: assumed"
-        text = f"Finger '{plans[0].finger.name}': closing direction could not be told; set it in a hand file."
-        return [_uncertain(hand, open_plans, text, Severity.WARNING)]
-    scores = []
-    for senses in itertools.product((1, -1), repeat=len(open_plans)):
-        scores.append((_tip_spread(hand, plans, dict(zip(map(id, open_plans), senses, strict=True))), senses))
-    scores.sort(key=lambda s: s[0])
-    for plan, sense in zip(open_plans, scores[0][1], strict=True):
-        plan.sense = sense
-        plan.sense_reason = "limits equally far; closes to the side where the fingertips meet"
-    if scores[1][0] - scores[0][0] < _UNDECIDED * scores[0][0]:
-        text = "Closing directions could hardly be told from limits or fingertips; check them, or set a hand file."
-        return [_uncertain(hand, open_plans, text, Severity.WARNING)]
-    names = quoted([plan.finger.name for plan in open_plans])
-    text = f"The limits of {names} are equally far from straight; these fingers close to where the fingertips meet."
-    return [_uncertain(hand, open_plans, text, Severity.NOTE)]
-
-
-def _uncertain(hand: Hand, plans: list[FingerPlan], text: str, severity: Severity) -> Finding:
-    names = tuple(hand.joints[j].name for plan in plans for j in plan.closing)
-    return Finding(
-        FindingCode.DIRECTION_UNCERTAIN,
-        text,
-        "Look at the picture (--figure). Where it is wrong, write in the hand file, "
-        f"{in_hand_file('joints', names[0], 'direction = 1')} (or -1), and so for each of the others.",
-        severity,
-        joints=names,
-    )
-
-
-def _tip_spread(hand: Hand, plans: list[FingerPlan], senses: Mapping[int, int]) -> float:
-    """Return the mean distance between fingertips [m] when all fingers curl, for given senses."""
-    q = np.array([j.open_value for j in hand.joints])
-    for plan in plans:
-        sense = plan.sense if plan.sense is not None else senses.get(id(plan), 1)
-        for n, j in enumerate(plan.closing):
-            way = plan.votes[j][0] if j in plan.votes else sense * plan.signs[n]
-            q[j] = nearest_inside(plan.straight[n] + way * _CURL, hand.joints[j])
-    tips = [finger_line(hand, p.finger, q).tip for p in plans]
-    return float(np.mean([np.linalg.norm(a - b) for a, b in itertools.combinations(tips, 2)]))
-
-
 def _apply(plan: FingerPlan, joints: list[Joint], findings: list[Finding]) -> None:
     """Write a plan into the joints."""
-    turns = set()
+    against = contradicting(plan)
     for n, j in enumerate(plan.closing):
-        direction, reason = (plan.sense or 1) * plan.signs[n], plan.sense_reason
-        if j in plan.votes:
-            direction, reason = plan.votes[j][0], plan.votes[j][2]
-        turns.add(direction * plan.signs[n])
-        value = nearest_inside(plan.straight[n], joints[j])
-        where = plan.straight_reason[n]
+        direction, reason = plan.direction(n, plan.sense or 1), plan.sense_reason
+        if j in plan.given:
+            reason = "hand file"
+        elif j in against:
+            reason = f"like the other joints of the finger, though {plan.votes[j].reason}"
+        elif j in plan.votes and not plan.shut_when_straight:
+            reason = plan.votes[j].reason
+        value, where = _open_value(plan, n, joints[j], direction)
         joints[j] = replace(
-            joints[j],
-            direction=direction,
-            direction_reason=reason,
-            open_value=value,
-            open_reason=f"straight: {where}" if value == plan.straight[n] else f"limit nearest to straight: {where}",
+            joints[j], direction=direction, direction_reason=reason, open_value=value, open_reason=where
         )
-    if len(turns) > 1:
-        names = tuple(joints[j].name for j in plan.closing)
-        text = f"Joints {quoted(names)} of one finger close in opposite senses; check the limits."
-        line = in_hand_file("joints", names[-1], "direction = 1")
-        advice = f"Correct the limits, or write in the hand file, {line} (or -1)."
-        findings.append(Finding(FindingCode.DIRECTIONS_OPPOSED, text, advice, joints=names))
+    if against:
+        findings.append(_contradiction(plan, joints, against))
+
+
+def _open_value(plan: FingerPlan, n: int, joint: Joint, direction: int) -> tuple[float, str]:
+    """Return the angle of an open finger at a joint [rad], and why."""
+    if plan.shut_when_straight and plan.closing[n] in plan.votes:
+        value = joint.lower if direction > 0 else joint.upper
+        return value, "the limit away from straight, where the finger is closed"
+    value, where = nearest_inside(plan.straight[n], joint), plan.straight_reason[n]
+    if value == plan.straight[n]:
+        return value, f"straight: {where}"
+    return value, f"limit nearest to straight: {where}"
+
+
+def _contradiction(plan: FingerPlan, joints: list[Joint], against: list[int]) -> Finding:
+    names = tuple(joints[j].name for j in against)
+    left = [(joints[j].upper if joints[j].direction > 0 else joints[j].lower) - joints[j].open_value for j in against]
+    degrees = ", ".join(f"{abs(np.rad2deg(angle)):.0f} deg" for angle in left)
+    text = (
+        f"The limits of {quoted(names)} contradict those of the other joints of the finger about the way it closes. "
+        f"All joints of a finger close one way, which leaves {degrees} here."
+    )
+    line = in_hand_file("joints", names[-1], f"direction = {-joints[against[-1]].direction}")
+    advice = f"Correct the limits or the axis. If the finger is built like this, write in the hand file, {line}."
+    return Finding(FindingCode.DIRECTIONS_OPPOSED, text, advice, joints=names)
 
 
 def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, findings: list[Finding]) -> None:

@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 from clench.base.errors import FileError, UnknownNameError
+from clench.base.file_limits import MODEL_BODIES
 
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _SHAPES = {
@@ -29,6 +30,8 @@ def check_urdf(root: ET.Element, path: Path) -> None:
     links = _names(root, "link", path)
     if not links:
         raise FileError(path, "has no <link>; expected a URDF hand.")
+    if len(links) > MODEL_BODIES:
+        raise FileError(path, f"has {len(links)} links; expected a hand, or a robot of up to {MODEL_BODIES} links.")
     joints = _names(root, "joint", path)
     for joint in root.findall("joint"):
         _check_ends(joint, links, path)
@@ -41,6 +44,7 @@ def check_urdf(root: ET.Element, path: Path) -> None:
         _check_origin(joint, f"joint '{joint.get('name')}'", path)
     _check_tree(root, links, path)
     for link in root.findall("link"):
+        _check_mass(link, path)
         for kind in ("visual", "collision"):
             for element in link.findall(kind):
                 where = f"{kind} of link '{link.get('name')}'"
@@ -116,6 +120,14 @@ def _check_mimic(joint: ET.Element, joints: list[str], path: Path) -> None:
         text = mimic.get(key)
         if text is not None and len(_numbers(text)) != 1:
             raise FileError(path, f"joint '{name}': {key} '{text}' of its mimic; expected a finite number.")
+
+
+def _check_mass(link: ET.Element, path: Path) -> None:
+    mass = link.find("inertial/mass")
+    text = "0" if mass is None else mass.get("value", "")
+    numbers = _numbers(text)
+    if len(numbers) != 1 or numbers[0] < 0.0:
+        raise FileError(path, f"mass of link '{link.get('name')}' is '{text}'; expected a number of at least 0 [kg].")
 
 
 def _check_origin(element: ET.Element, where: str, path: Path) -> None:

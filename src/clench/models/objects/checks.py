@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clench.base.errors import ObjectError
 from clench.base.memory import expect, in_parts
+from clench.base.numbers import real_array
 from clench.base.pose import FloatArray
 from clench.base.tolerances import LARGEST_LENGTH, SMALLEST_LENGTH
 from clench.models.mesh import IntArray, TriangleMesh
@@ -96,13 +97,12 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
     Raises:
         ObjectError: wrong shape, empty, not finite, an index out of range.
     """
-    try:
-        points = np.asarray(vertices, dtype=np.float64)
-        indices = np.asarray(triangles)
-        with np.errstate(invalid="ignore"):  # what is no number is refused below
-            faces = indices.astype(np.int64)
-    except (TypeError, ValueError, OverflowError):
-        raise ObjectError(f"{name}: expected arrays of numbers for vertices (V, 3) and triangles (T, 3).") from None
+    points = real_array(vertices)
+    if points is None or real_array(triangles) is None:
+        raise ObjectError(f"{name}: expected arrays of numbers for vertices (V, 3) and triangles (T, 3).")
+    indices = np.asarray(triangles)
+    with np.errstate(invalid="ignore"):  # what is no number is refused below
+        faces = indices.astype(np.int64)
     expect(points.nbytes + faces.nbytes)
     if points.size == 0 or faces.size == 0:
         missing = "vertices" if points.size == 0 else "triangles"

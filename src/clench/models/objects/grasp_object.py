@@ -78,7 +78,7 @@ class GraspObject:
         pose: `T_world_object`.
         collision_source: which geometry is meant.
         warnings: sentences about what looks wrong (units, winding, holes).
-        path: the file it was read from, or None.
+        path: the file it was read from, or None. scale: what the lengths of the file were multiplied by [-].
     """
 
     name: str
@@ -87,6 +87,7 @@ class GraspObject:
     collision_source: CollisionSource = CollisionSource.RAW
     warnings: tuple[str, ...] = ()
     path: Path | None = None
+    scale: float = 1.0
 
     def __post_init__(self) -> None:
         if not any(body.role is BodyRole.GRASPABLE for body in self.bodies):

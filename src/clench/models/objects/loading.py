@@ -85,7 +85,7 @@ def load_object(
         check_size(shape, path.name if path else name)
     body = in_source(body, source)
     warnings += unit_warnings(_body_points(body), path.name if path else name)
-    return GraspObject(name, (body,), pose or Pose.identity(), source, warnings, path)
+    return GraspObject(name, (body,), pose or Pose.identity(), source, warnings, path, factor)
 
 
 def object_from_shape(

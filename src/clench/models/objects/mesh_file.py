@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.base.errors import FileError
+from clench.base.file_limits import MESH_BYTES
 from clench.base.files import read_file
 from clench.base.memory import expect
 from clench.base.pose import FloatArray
 from clench.models.mesh import IntArray
+from clench.models.mesh_parsing import MeshError, arrays_of, parse_mesh
 
 #: Below this there is nothing to merge by: the check of sizes will refuse it [-].
 SMALLEST_COORDINATE: Final = 1e-100
@@ -31,11 +33,14 @@ def read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
     suffix = path.suffix.lower()
     if os.path.exists(path) and not os.path.isdir(path) and suffix not in SUFFIXES:
         raise FileError(path, f"cannot read '{suffix or path.name}'; expected one of {', '.join(SUFFIXES)}.")
-    size = len(read_file(path))
-    if size == 0:
+    data = read_file(path, MESH_BYTES)
+    if not data:
         raise FileError(path, "the file is empty.")
-    expect(size)
-    vertices, triangles = _parse(path, suffix[1:])
+    expect(len(data))
+    try:
+        vertices, triangles = arrays_of(parse_mesh(data, suffix))
+    except (MeshError, FileError) as error:
+        raise FileError(path, f"not a readable {suffix[1:].upper()} mesh ({error}).") from None
     if len(vertices) == 0:
         raise FileError(path, f"not a mesh, nothing in it reads as {suffix[1:].upper()}.")
     if len(triangles) == 0:
@@ -68,19 +73,3 @@ def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntAr
         _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
         return points[first], place.reshape(-1)[faces]
     return np.ldexp(np.array(mesh.vertices, dtype=np.float64), exponent), np.array(mesh.faces, dtype=np.int64)
-
-
-def _parse(path: Path, file_type: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices and triangles that trimesh reads; what its readers raise on garbage becomes one sentence."""
-    import trimesh
-
-    options: dict[str, Any] = {"skip_materials": True} if file_type == "obj" else {}
-    try:
-        loaded: Any = trimesh.load(path, file_type=file_type, process=False, **options)
-        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
-        return np.asarray(mesh.vertices), np.asarray(getattr(mesh, "faces", ()))
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror or error}).") from None
-    except Exception as error:
-        reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
-        raise FileError(path, f"not a readable {file_type.upper()} mesh ({reason}).") from None

@@ -1,0 +1,103 @@
+"""The triangles of every link of a hand, ready for the kernels, and how deep two links overlap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.keeping import kept_by_identity
+from clench.base.pose import FloatArray, invert
+from clench.models.mesh import TriangleMesh, is_closed
+from clench.models.parts import part_points
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
+from clench.models.tessellation import shape_mesh
+
+from .hand import Hand
+
+if TYPE_CHECKING:
+    from clench.kernels.tree import MeshTree
+
+_KEPT_HANDS: Final = 16
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMesh:
+    """Hold the triangles of one link in its frame.
+
+    Args:
+        link: index of the link in the hand.
+        tree: all its shapes as triangles, round ones inscribed.
+        owners: `feature_owners` of the tree.
+        closed: every shape is watertight with outward normals.
+        center, radius: of a ball around it [m], in the link's frame. points: one of every connected part, (N, 3).
+    """
+
+    link: int
+    tree: MeshTree
+    owners: NDArray[np.uint8]
+    closed: bool
+    center: FloatArray
+    radius: float
+    points: FloatArray
+
+
+def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[LinkMesh, ...]:
+    """Return the meshes of all links of the hand that have a shape; made once per hand and source."""
+    return _meshes(hand, hand.default_source if source is None else CollisionSource(source))
+
+
+@kept_by_identity(_KEPT_HANDS)
+def _meshes(hand: Hand, source: CollisionSource) -> tuple[LinkMesh, ...]:
+    made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
+    return tuple(mesh for mesh in made if len(mesh.tree.triangles))
+
+
+def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:
+    from clench.kernels.tree import build_tree, feature_owners
+
+    meshes = [shape_mesh(shape, source) for shape in shapes]
+    mesh = TriangleMesh.joined(meshes)
+    tree = build_tree(mesh.vertices, mesh.triangles)
+    corners = tree.vertices[tree.triangles].reshape(-1, 3)
+    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) if len(corners) else np.zeros(3)
+    return LinkMesh(
+        link,
+        tree,
+        feature_owners(tree),
+        all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True)),
+        center,
+        float(np.linalg.norm(corners - center, axis=1).max(initial=0.0)),
+        part_points(tree),
+    )
+
+
+def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
+    """Return how deep two links overlap [m], 0 when they do not.
+
+    Args:
+        a, b: the links. poses: of all links in the palm frame, shape (L, 4, 4).
+    """
+    from clench.kernels.depth import CROSSINGS, penetration
+    from clench.kernels.tree import STACK_SIZE
+
+    centers = [poses[m.link][:3, :3] @ m.center + poses[m.link][:3, 3] for m in (a, b)]
+    if np.linalg.norm(centers[0] - centers[1]) > a.radius + b.radius:
+        return 0.0
+    T_b_a = invert(poses[b.link]) @ poses[a.link]
+    depth, *_ = penetration(
+        a.tree,
+        a.owners,
+        a.closed,
+        b.tree,
+        b.owners,
+        b.closed,
+        np.ascontiguousarray(T_b_a[:3]),
+        np.ascontiguousarray(invert(T_b_a)[:3]),
+        np.inf,
+        np.empty(CROSSINGS),
+        np.empty(STACK_SIZE, dtype=np.int32),
+    )
+    return float(depth)

@@ -1,0 +1,98 @@
+"""Parse mesh files with trimesh: the geometry alone, from the bytes of one file and from no other file or address."""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from clench.base.file_limits import LINE_BYTES, MESH_TRIANGLES, SCENE_PARTS
+
+from .gltf_scene import bare_glb
+
+#: Lines that part an OBJ file; the parser's time grows with the square of their number.
+_GROUP: Final = re.compile(rb"^(?:o|g|s|usemtl|mtllib)\b.*$", re.MULTILINE)
+_LONG_LINE: Final = re.compile(b"[^\r\n]{%d}" % (LINE_BYTES + 1))
+
+
+class MeshError(ValueError):
+    """Say why bytes are no mesh."""
+
+
+def parse_mesh(data: bytes, suffix: str) -> Any:
+    """Return the `trimesh.Trimesh` that a mesh file holds; the meshes of a scene become one.
+
+    Args:
+        data: of the file. suffix: of its name, one of `PARSED`, in lower case.
+
+    Raises:
+        MeshError: whatever the parser raises on it, or a limit of docs/security.md, as part of a sentence.
+    """
+    import trimesh
+
+    # The library tells what it cannot read on standard error, with names from the file.
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
+    options: dict[str, Any] = {"skip_materials": True} if suffix == ".obj" else {}
+    try:
+        stream = io.BytesIO(PARSED[suffix](data))
+        loaded: Any = trimesh.load(stream, file_type=suffix[1:], process=False, **options)
+        mesh = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+        count = len(getattr(mesh, "faces", ()))
+    except MeshError:
+        raise
+    except Exception as error:  # a damaged file can fail in any way
+        reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
+        raise MeshError(reason) from None
+    if count > MESH_TRIANGLES:
+        raise MeshError(f"{count} triangles; expected up to {MESH_TRIANGLES}")
+    return mesh
+
+
+def _as_it_is(data: bytes) -> bytes:
+    return data
+
+
+def _obj(data: bytes) -> bytes:
+    if _LONG_LINE.search(data):
+        raise MeshError(f"a line has more than {LINE_BYTES} bytes")
+    return data if len(_GROUP.findall(data)) <= SCENE_PARTS else _GROUP.sub(b"", data)
+
+
+def _glb(data: bytes) -> bytes:
+    try:
+        return bare_glb(data)
+    except ValueError as error:
+        raise MeshError(str(error)) from None
+
+
+def _dae(data: bytes) -> bytes:
+    """Let only plain XML of a small scene pass: the parser unpacks archives, and expands entities without end."""
+    from clench.base.xml_files import parse_xml
+
+    root = parse_xml(data, "", "COLLADA")
+    copies = sum(1 for element in root.iter() if str(element.tag).endswith("}instance_node"))
+    if copies > _DAE_COPIES:
+        raise MeshError(f"its scene has {copies} copies of nodes; expected up to {_DAE_COPIES}")
+    return data
+
+
+#: Copies of nodes may hold copies: so many make at most 256 of one.
+_DAE_COPIES: Final = 16
+#: Suffixes of the files that are parsed, and what makes their bytes fit for the parser.
+PARSED: Final[dict[str, Callable[[bytes], bytes]]] = {
+    ".obj": _obj,
+    ".stl": _as_it_is,
+    ".ply": _as_it_is,
+    ".off": _as_it_is,
+    ".glb": _glb,
+    ".dae": _dae,
+}
+
+
+def arrays_of(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices and triangles of what `parse_mesh` returned; no triangles where it has points alone."""
+    return np.asarray(mesh.vertices), np.asarray(getattr(mesh, "faces", ()))

@@ -1,0 +1,63 @@
+"""Hold tests of meshes that are not convex: solved again on the pieces that the simulation collides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import clench
+from clench.execution.convex_pieces import in_pieces
+from clench.execution.hold import Hold
+from clench.execution.piece_hold import hold_as_collided
+from clench.execution.trajectory import plan_trajectory
+from clench.grasp.depths import hand_depths
+from clench.grasp.scene import pack_object
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
+from clench.solve.solution import GraspSolution
+
+
+def waisted() -> GraspObject:
+    """A body of revolution with a waist: pieces bridge it."""
+    import trimesh
+
+    heights = np.linspace(-0.05, 0.05, 21)
+    profile = np.column_stack([0.022 + 4.0 * heights**2, heights])
+    mesh = trimesh.creation.revolve(np.vstack([[0.0, -0.05], profile, [0.0, 0.05]]), sections=24)
+    return GraspObject.from_meshes([(mesh.vertices, mesh.faces)], name="waisted")
+
+
+@pytest.fixture(scope="module")
+def grip() -> tuple[Hand, GraspObject, GraspSolution]:
+    hand, obj = clench.Hand.load("robonaut2"), waisted()
+    for pose in clench.approach_poses(hand, obj, 30, 1):
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+        if solution.is_valid() and clench.plan_squeeze(solution, hand, obj, gravity=None).feasible:
+            return hand, obj, solution
+    raise AssertionError("no grip found")
+
+
+def test_the_grasp_that_is_tested_fits_the_pieces(grip: tuple[Hand, GraspObject, GraspSolution]) -> None:
+    hand, obj, solution = grip
+    report = hold_as_collided(solution, hand, obj, Hold(duration=0.2), plan_trajectory(solution, hand, obj=obj))
+    assert report.as_given is not None
+    assert "solved again on the object's convex pieces; as given, it was: " in report.reason
+    document = report.to_dict()
+    assert document["as_given"]["held"] == report.as_given.held
+    assert document["as_given"]["as_given"] is None
+    # As given, it overlaps the pieces or misses them; solved again, neither: nothing is pushed before it is squeezed.
+    collided = in_pieces(obj)
+    q = np.array(list(solution.joint_angles.values()))
+    T = np.linalg.inv(solution.hand_pose.matrix)
+    off = hand_depths(hand, q, pack_object(collided), T, CollisionSource.ENGINE)
+    assert max((found.depth for found in off), default=0.0) > 1e-5 or not report.as_given.held
+    assert report.closed.distance < 1e-4
+
+
+def test_an_object_that_is_convex_is_tested_as_it_is() -> None:
+    hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
+    pose = clench.approach_poses(hand, ball, 5, 1)[4]
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+    report = hold_as_collided(solution, hand, ball, Hold(duration=0.2), plan_trajectory(solution, hand, obj=ball))
+    assert report.as_given is None

@@ -1,0 +1,59 @@
+"""An object far larger than the hand is told at once, and solved all the same."""
+
+import warnings
+
+import pytest
+
+import clench
+from clench.apps.cli.main import main
+from clench.grasp.sizes import hand_size
+from clench.models.objects.grasp_object import BodyRole
+
+INSIDE = clench.GraspCommand(hand_pose=clench.Pose([0.05, 0.02, 0.01]))
+
+
+@pytest.fixture(scope="module")
+def hand():
+    return clench.Hand.load("robonaut2")
+
+
+def test_the_size_of_a_hand(hand):
+    assert 0.2 < hand_size(hand) < 0.4
+
+
+@pytest.mark.parametrize(("model", "scale"), [("sphere:r=3", 1.0), ("sphere:r=30", 1.0), ("mug", 1000.0)])
+def test_millimetres_taken_for_metres(model, scale, hand):
+    obj = clench.GraspObject.load(model, scale=scale)
+    with pytest.warns(UserWarning, match=f"^{model} is .* m across, .* times the size of the hand {hand.name}"):
+        solution = clench.solve(hand, obj, INSIDE)
+    assert solution.status == "blocked"
+    assert solution.reason["link"] == "palm"
+    with pytest.warns(UserWarning, match=r"load it with a scale of 0\.001\.$"):
+        clench.solve_batch(hand, obj, [clench.Pose([0.05, 0.02, 0.01])])
+
+
+def test_how_deep_a_hand_far_inside_is(hand):
+    obj = clench.GraspObject.load("sphere:r=3")
+    with pytest.warns(UserWarning, match="times the size of the hand"):
+        solution = clench.solve(hand, obj, INSIDE)
+    assert "palm overlaps sphere:r=3 by at least 1" in solution.reason["text"]
+    assert 0.1 < solution.max_penetration < 0.2
+    assert solution.reason["retreat"] == pytest.approx(3.12, abs=0.01)
+
+
+def test_a_large_table_is_no_mistake(hand):
+    scene = clench.GraspObject.load("mug").with_object(
+        clench.GraspObject.load("box:x=5,y=5,z=0.1"), clench.Pose([0.0, 0.0, -0.05]), BodyRole.OBSTACLE
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        clench.solve(hand, scene, clench.GraspCommand(hand_pose=clench.Pose([-0.05, -0.1, 0.3])))
+
+
+def test_the_command_line_says_it_once(tmp_path, capsys):
+    (tmp_path / "c.json").write_text('{"hand_pose": {"position": [0.05, 0.02, 0.01], "wxyz": [1, 0, 0, 0]}}')
+    call = ["--hand", "robonaut2", "--object", "sphere:r=3", "--command", str(tmp_path / "c.json")]
+    assert main(["solve", *call]) == 1
+    told = capsys.readouterr().err.splitlines()
+    assert [line for line in told if "times the size of the hand" in line] == told[:1]
+    assert told[0].startswith("clench: warning: sphere:r=3 is 6 m across, ")

@@ -1,0 +1,201 @@
+"""Read files in processes of their own, with limits on memory and time: a crash or a hang harms nothing else.
+
+`python -m hostile.apart` reads lines of JSON, `[kind, path]`, and answers each with `[exit code, text, seconds]`.
+"""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+#: What reading one file may take [bytes], [s].
+MEMORY = 2 << 30
+SECONDS = 30
+#: What does nothing for so long waits for something that never comes [s].
+PATIENCE = 300
+
+
+class Outcome(NamedTuple):
+    """Hold what came of reading a file: the exit code (negative: a signal), what was said, and how long it took."""
+
+    code: int
+    text: str
+    seconds: float
+
+
+def read_apart(files: Iterable[tuple[str, Path]]) -> list[Outcome]:
+    """Read files, each in a process of its own; `kind` is one of `READERS`."""
+    asked = [json.dumps([kind, str(path)]) for kind, path in files]
+    done = subprocess.run(
+        [sys.executable, "-m", "hostile.apart"],
+        cwd=Path(__file__).parents[1],
+        input="\n".join(asked),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return [Outcome(*json.loads(line)) for line in done.stdout.splitlines()]
+
+
+def hand(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["hand", path]))
+
+
+def thing(path: str) -> None:
+    import clench
+
+    clench.GraspObject.load(path)
+
+
+def command(path: str) -> None:
+    import clench
+
+    clench.load_command(path)
+
+
+def solve(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["solve", "--hand", "patent15", "--object", "ball", "--command", path]))
+
+
+def solution(path: str) -> None:
+    import clench
+
+    clench.GraspSolution.load(path)
+
+
+def execute(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["execute", path]))
+
+
+def trajectory(path: str) -> None:
+    import clench
+
+    clench.Trajectory.load(path)
+
+
+def record(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    code = main(["record", path])
+    raise SystemExit(code or main(["record", path, "--id", "1"]))
+
+
+def grasps(path: str) -> None:
+    from clench.execution.formats.exchange import import_grasps
+
+    import_grasps(path)
+
+
+def calibration(path: str) -> None:
+    from clench.grasp.calibration import load_calibration
+
+    load_calibration(Path(path))
+
+
+def hand_file(path: str) -> None:
+    import clench
+
+    clench.Hand.load("patent15", hand_file=path)
+
+
+def joint_map(path: str) -> None:
+    from clench.execution.joint_map import JointMap
+
+    JointMap.load(path)
+
+
+def poses(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["batch", "--hand", "patent15", "--object", "ball", "--poses", path]))
+
+
+_ANSWERS = (hand, solve, execute, record, poses)
+_LOADERS = (thing, command, solution, trajectory, grasps, calibration, hand_file, joint_map)
+READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in (*_ANSWERS, *_LOADERS)}
+
+
+def _in_child(read: Callable[[str], None], path: str, place: int) -> None:
+    """Read a file under limits, and end this process with the exit code that the command line would give."""
+    from clench.base.errors import ClenchError
+
+    os.dup2(place, 1)
+    os.dup2(place, 2)
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        read(path)
+        code = 0
+    except SystemExit as end:
+        code = int(end.code or 0)
+    except ClenchError as error:
+        os.write(2, f"clench: error: {error}\n".encode())
+        code = 2
+    except BaseException as error:
+        os.write(2, f"{type(error).__name__}: {error}\n".encode()[:1000])
+        code = 70
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _outcome(kind: str, path: str, place: int) -> Outcome:
+    os.ftruncate(place, 0)
+    os.lseek(place, 0, os.SEEK_SET)
+    start = time.perf_counter()
+    read, child = READERS[kind], os.fork()
+    if child == 0:
+        _in_child(read, path, place)
+    status = None
+    while status is None:
+        ended, found = os.waitpid(child, os.WNOHANG)
+        if ended:
+            status = os.waitstatus_to_exitcode(found)
+        elif time.perf_counter() - start > PATIENCE:
+            os.kill(child, signal.SIGKILL)
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        else:
+            time.sleep(0.002)
+    seconds = time.perf_counter() - start
+    os.lseek(place, 0, os.SEEK_SET)
+    return Outcome(status, os.read(place, 20_000).decode(errors="replace"), seconds)
+
+
+def serve() -> None:
+    """Answer the lines of standard input."""
+    import tempfile
+
+    # What every child needs is loaded once.
+    import mujoco  # noqa: F401
+    import trimesh  # noqa: F401
+    import tyro  # noqa: F401
+
+    import clench
+    import clench.models.hand.loading
+    import clench.models.objects.loading
+
+    clench.Hand.load("patent15")
+    asked: list[Any] = [json.loads(line) for line in sys.stdin]
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as place:
+        os.chdir(folder)  # where engines leave their logs
+        for kind, path in asked:
+            outcome = _outcome(kind, path, place.fileno())
+            sys.stdout.write(json.dumps(outcome) + "\n")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,0 +1,56 @@
+"""Mesh files parsed from their bytes alone: the geometry is that of the whole file, without its looks."""
+
+import io
+import struct
+
+import numpy as np
+import pytest
+
+from clench.base.file_limits import SCENE_PARTS
+from clench.models.gltf_scene import bare_glb
+from clench.models.mesh_parsing import MeshError, arrays_of, parse_mesh
+
+
+def textured_scene():
+    """Return two balls at their places, one with a picture on it."""
+    import trimesh
+    from PIL import Image
+
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.02)
+    picture = Image.fromarray(np.zeros((8, 8, 3), dtype=np.uint8))
+    painted = ball.copy()
+    painted.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(ball.vertices), 2)), image=picture)
+    scene = trimesh.Scene()
+    scene.add_geometry(painted, transform=trimesh.transformations.translation_matrix([0.1, 0.0, 0.0]))
+    scene.add_geometry(ball, transform=trimesh.transformations.rotation_matrix(0.3, [1.0, 2.0, 3.0]))
+    return scene
+
+
+def test_a_scene_keeps_its_geometry_and_loses_its_looks():
+    import trimesh
+
+    data = textured_scene().export(file_type="glb")
+    assert b'"images"' in data
+    assert b'"images"' not in bare_glb(data)
+    assert b'"material"' not in bare_glb(data)
+    expected = trimesh.load(io.BytesIO(data), file_type="glb", process=False).to_mesh()
+    vertices, triangles = arrays_of(parse_mesh(data, ".glb"))
+    np.testing.assert_array_equal(vertices, expected.vertices)
+    np.testing.assert_array_equal(triangles, expected.faces)
+
+
+def test_a_scene_that_says_that_it_is_longer():
+    data = textured_scene().export(file_type="glb")
+    longer = data[:12] + struct.pack("<I", len(data)) + data[16:]
+    with pytest.raises(MeshError, match="incorrect header"):
+        parse_mesh(longer, ".glb")
+
+
+@pytest.mark.parametrize("groups", [1, SCENE_PARTS + 1])
+def test_groups_of_an_obj_file_do_not_change_its_surface(groups):
+    corners = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\n"
+    faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    text = corners + "".join(f"o part{i}\nusemtl m{i}\n" for i in range(groups)) + faces
+    mesh = parse_mesh(text.encode(), ".obj")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(0.1**3 / 6.0)
