@@ -10,8 +10,10 @@ import pytest
 
 import clench
 from clench.base.pose import FloatArray, invert
-from clench.execution.landing import LANDING_SPEED, is_clear, plan_landing
+from clench.execution.landing import LANDING_SPEED, plan_landing
 from clench.execution.trajectory import Trajectory, plan_trajectory
+from clench.execution.way_to_touch import placed_object
+from clench.grasp.path_check import find_path_overlap
 from clench.grasp.reach import nearest_link
 from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
@@ -108,9 +110,14 @@ def test_a_path_through_the_object_is_not_clear(grip: Grip) -> None:
     q, source = touch(grip), CollisionSource(solution.collision_source)
     opened = np.array(list(solution.open_angles.values()))
     deeper = q + 0.05 * (q - opened)
-    assert is_clear(solution, hand, ball, [q, q], source)
-    assert not is_clear(solution, hand, ball, [q, deeper], source)
-    assert not is_clear(solution, hand, ball, [opened, deeper, opened], source)
+
+    def overlaps(*path: FloatArray) -> bool:
+        found = find_path_overlap(hand, np.array(path), source, placed_object(solution, ball))
+        return found is not None and found.with_object
+
+    assert not overlaps(q, q)
+    assert overlaps(q, deeper)
+    assert overlaps(opened, deeper, opened)
 
 
 def test_a_joint_without_room_to_open(grip: Grip) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,13 +14,15 @@ from clench.execution.executing import execute
 from clench.execution.next_steps import Phase, plan_next_steps
 from clench.execution.scene import PREFIX, build_scene
 from clench.execution.simulation import SimulatedHand
-from clench.execution.step_check import DRIVEN_IN, step_overlap
+from clench.execution.step_check import squeeze_overlap, step_overlap
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
-from handmade import make_solution
+from handmade import make_contact, make_solution
 
+#: A thumb that is driven in is deeper than this at some way-point [m].
+DEEP = 1e-3
 #: A thumb that closes into the curled index finger, and a fist that it stays out of.
 ACROSS = {
     "index_proximal": 1.5,
@@ -80,16 +83,29 @@ def collisions(hand: Hand, phases: tuple[Phase, ...]) -> dict[frozenset[str], fl
 def test_a_thumb_that_closes_into_a_finger_is_found(hand: Hand) -> None:
     phases = planned(hand, {}, ACROSS)
     said = step_overlap(hand, phases, CollisionSource.ENGINE)
-    names = re.fullmatch(r"Next step 2 would drive '(.*)' into '(.*)'\.", said or "")
+    names = re.fullmatch(r"In next step 2, '(.*)' would overlap '(.*)' by at least .* mm\.", said or "")
     assert names is not None, said
-    assert collisions(hand, phases)[frozenset(names.groups())] > DRIVEN_IN
+    assert collisions(hand, phases)[frozenset(names.groups())] > DEEP
 
 
 def test_a_fist_is_none(hand: Hand) -> None:
     phases = planned(hand, FIST)
     assert step_overlap(hand, phases, CollisionSource.ENGINE) is None
-    assert max(collisions(hand, phases).values(), default=0.0) <= DRIVEN_IN
+    assert max(collisions(hand, phases).values(), default=0.0) <= 1e-5
     assert step_overlap(hand, (), CollisionSource.ENGINE) is None
+
+
+def test_a_squeeze_is_checked_but_for_fingers_that_the_object_holds(hand: Hand) -> None:
+    solution = stepping(hand)
+    offsets = np.array([ACROSS.get(name, 0.0) for name in hand.joint_names]) - hand.open_angles()
+    offsets[[name not in ACROSS for name in hand.joint_names]] = 0.0
+    assert squeeze_overlap(solution, hand, np.zeros(len(offsets))) is None
+    said = squeeze_overlap(solution, hand, offsets)
+    assert said is not None
+    assert said.startswith("In the squeeze, 'thumb_")
+    fingers = ("index", "middle", "thumb")
+    holding = tuple(make_contact(finger=name, link=f"{name}_distal") for name in fingers)
+    assert squeeze_overlap(replace(solution, contacts=holding), hand, offsets) is None
 
 
 def test_it_is_refused_unless_forced(hand: Hand, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +114,7 @@ def test_it_is_refused_unless_forced(hand: Hand, monkeypatch: pytest.MonkeyPatch
     simulated = SimulatedHand(hand, FAR)
     report = execute(stepping(hand, ACROSS), simulated)
     assert not report.success
-    assert report.reason.startswith("Not carried out: Next step 1 would drive 'thumb_distal'")
+    assert re.match(r"Not carried out: In next step 1, 'thumb_distal' would overlap", report.reason)
     assert not moved
     execute(stepping(hand, ACROSS), simulated, force=True)
     execute(stepping(hand, ACROSS), simulated, next_steps=False)

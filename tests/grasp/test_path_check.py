@@ -1,0 +1,151 @@
+"""A path is free or not: judged by closed forms for capsules, and by depths at many postures for boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import clench
+from chain_hands import HandBuilder, along_x, mount
+from clench.base.pose import FloatArray, Pose
+from clench.grasp.path_check import PlacedObject, find_path_overlap
+from clench.grasp.scene import pack_object
+from clench.models.hand.hand import Hand
+from clench.models.hand.link_mesh import link_meshes, overlap_depth
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
+
+SOURCE = CollisionSource.ENGINE
+X, Y, Z = np.eye(3)
+RADIUS, LENGTH = 0.006, 0.04
+#: What a path may overlap by and still be free [m]; see `clench.kernels.path_overlap`.
+TOLERANCE = 1e-5
+angles = st.lists(st.floats(-1.6, 1.6), min_size=4, max_size=4)
+
+
+def two_chains(box: bool = False, apart: float = 0.05) -> Hand:
+    """Return two fingers of two links each, whose axes are not parallel, so that they can meet anywhere."""
+    shape = along_x(RADIUS, LENGTH)
+    if box:
+        shape = Shape(ShapeKind.BOX, (LENGTH / 2, RADIUS, RADIUS / 2), Pose([LENGTH / 2, 0.0, 0.0]))
+    builder = HandBuilder().finger("a", [shape, shape], [LENGTH, LENGTH], axes=[Y, Z], lower=-2.0)
+    tilted = mount((0.0, apart, 0.01))
+    return builder.finger("b", [shape, shape], [LENGTH, LENGTH], base=tilted, axes=[Z, Y], lower=-2.0).hand()
+
+
+def segment_distance(p: FloatArray, u: FloatArray, q: FloatArray, v: FloatArray) -> float:
+    """Distance of the segments p + s u and q + t v, s and t from 0 to 1: inside, or with one end in the other."""
+    found = [np.inf]
+    a, b, c, w = u @ u, u @ v, v @ v, p - q
+    if a * c - b * b > 1e-15:
+        s, t = np.linalg.solve([[a, -b], [b, -c]], [-u @ w, -v @ w])
+        if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+            found.append(float(np.linalg.norm(w + s * u - t * v)))
+    for end in (0.0, 1.0):
+        t = np.clip((w + end * u) @ v / c, 0.0, 1.0)
+        s = np.clip((end * v - w) @ u / a, 0.0, 1.0)
+        found += [float(np.linalg.norm(w + end * u - t * v)), float(np.linalg.norm(w + s * u - end * v))]
+    return min(found)
+
+
+def capsule_depth(hand: Hand, q: FloatArray) -> float:
+    """Deepest overlap of capsules of the two chains, and of links of one chain that do not follow each other."""
+    poses = hand.link_poses(q)
+    depths = []
+    for i, j in ((1, 3), (1, 4), (2, 3), (2, 4)):
+        (p, u), (r, v) = ((poses[k][:3, 3], poses[k][:3, 0] * LENGTH) for k in (i, j))
+        depths.append(2 * RADIUS - segment_distance(p, u, r, v))
+    return max(depths)
+
+
+def box_depth(hand: Hand, q: FloatArray) -> float:
+    meshes = {mesh.link: mesh for mesh in link_meshes(hand, SOURCE)}
+    poses = hand.link_poses(q)
+    return max(overlap_depth(meshes[i], meshes[j], poses) for i, j in ((1, 3), (1, 4), (2, 3), (2, 4)))
+
+
+def along(path: FloatArray, place: float) -> FloatArray:
+    k = min(int(place), len(path) - 2)
+    return path[k] + (place - k) * (path[k + 1] - path[k])
+
+
+@pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
+@settings(max_examples=40, deadline=None)
+@given(points=st.lists(angles, min_size=2, max_size=4))
+def test_a_free_path_has_no_overlap_and_the_first_one_is_found(box: bool, points: list[list[float]]) -> None:
+    hand, path = two_chains(box), np.array(points)
+    depth = box_depth if box else capsule_depth
+    if depth(hand, path[0]) > 0.0:
+        return
+    found = find_path_overlap(hand, path, SOURCE)
+    end = float(len(path) - 1) if found is None else found.place
+    before = [depth(hand, along(path, place)) for place in np.linspace(0.0, end, 150)[:-1]]
+    assert max(before) <= TOLERANCE
+    if found is not None:
+        assert 1e-6 < depth(hand, along(path, found.place)) <= 2 * TOLERANCE
+        assert not found.with_object
+        # Farther on, the two are deeper in each other, or past each other.
+        assert found.depth <= 2 * TOLERANCE
+
+
+def test_a_thin_thing_is_not_stepped_over() -> None:
+    """A finger turns by 2 rad past a needle 0.1 mm thick; postures at both ends are free."""
+    hand = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH], lower=-2.0).hand()
+    needle = clench.GraspObject.from_shape(
+        Shape(ShapeKind.BOX, (5e-5, 0.1, 5e-5), Pose([0.03, 0.0, 0.0])), name="needle"
+    )
+    around = PlacedObject(pack_object(needle), np.eye(4))
+    found = find_path_overlap(hand, np.array([[-1.0], [1.0]]), SOURCE, around)
+    assert found is not None
+    assert (found.link, found.other, found.with_object) == ("a_link_0", "needle", True)
+    # The link's side is as far above the needle as its radius.
+    clear = np.arcsin((RADIUS + 5e-5) / 0.03)
+    assert 2.0 * found.place - 1.0 == pytest.approx(-clear, abs=2e-3)
+    assert find_path_overlap(hand, np.array([[-1.0], [-1.01 * clear]]), SOURCE, around) is None
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-7, 5e-5])
+def test_fingers_that_slide_along_each_other_are_free(gap: float) -> None:
+    """Side by side at a gap that never changes, for the whole motion, even where they touch."""
+    builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH])
+    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=mount((0.0, 2 * RADIUS + gap, 0.0))).hand()
+    assert find_path_overlap(hand, np.array([[0.0, 0.0], [1.0, 0.4], [0.2, 1.2]]), SOURCE) is None
+
+
+def test_links_that_overlap_at_the_start_may_part_but_not_come_back() -> None:
+    builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH])
+    away = mount((0.0, 1.5 * RADIUS, 0.0))
+    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=away, axes=[-Z]).hand()
+    assert find_path_overlap(hand, np.array([[0.0, 0.0], [0.0, -0.5]]), SOURCE) is None
+    back = find_path_overlap(hand, np.array([[0.0, 0.0], [0.0, -0.5], [0.0, 0.0]]), SOURCE)
+    assert back is not None
+    assert back.place > 1.0
+    deeper = find_path_overlap(hand, np.array([[0.0, 0.0], [0.0, 0.5]]), SOURCE)
+    assert deeper is not None
+    assert {deeper.link, deeper.other} == {"a_link_0", "b_link_0"}
+
+
+def test_held_links_are_not_checked_against_each_other() -> None:
+    hand = two_chains(apart=0.02)
+    path = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]])
+    found = find_path_overlap(hand, path, SOURCE)
+    assert found is not None
+    held = [hand.link_index(name) for name in (*(f"a_link_{k}" for k in range(2)), *(f"b_link_{k}" for k in range(2)))]
+    assert find_path_overlap(hand, path, SOURCE, held=held) is None
+
+
+def test_way_points_on_a_straight_line_change_nothing() -> None:
+    hand = two_chains(apart=0.02)
+    ends = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]])
+    many = np.array([along(ends, s) for s in np.linspace(0.0, 1.0, 11)])
+    one, other = find_path_overlap(hand, ends, SOURCE), find_path_overlap(hand, many, SOURCE)
+    assert one is not None
+    assert other is not None
+    assert other.place == pytest.approx(10.0 * one.place, rel=1e-9)
+    assert (one.link, one.other) == (other.link, other.other)
+
+
+def test_a_path_of_one_posture() -> None:
+    hand = two_chains()
+    assert find_path_overlap(hand, np.zeros((1, 4)), SOURCE) is None
