@@ -11,8 +11,8 @@ import pytest
 import clench
 from clench.base.pose import FloatArray, invert
 from clench.execution.landing import LANDING_SPEED, plan_landing
+from clench.execution.step_check import placed_object
 from clench.execution.trajectory import Trajectory, plan_trajectory
-from clench.execution.way_to_touch import placed_object
 from clench.grasp.path_check import find_path_overlap
 from clench.grasp.reach import nearest_link
 from clench.grasp.scene import pack_object

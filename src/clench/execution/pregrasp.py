@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from clench.base.errors import CommandError
+from clench.base.errors import CommandError, MotionError
 from clench.base.pose import FloatArray, invert
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -42,10 +42,13 @@ def plan_pregrasp(
     if not (np.isfinite(clearance) and clearance > 0.0):
         raise CommandError(f"clearance: expected a finite number above 0 m, got {clearance!r}.")
     if obj is not None:
-        way = plan_trajectory(solution, hand, obj=obj, clearance=clearance)
-        if way.pregrasp is not None:
+        try:
+            way = plan_trajectory(solution, hand, obj=obj, clearance=clearance)
+        except MotionError:
+            way = None
+        if way is not None and way.pregrasp is not None:
             return dict(zip(hand.joint_names, way.positions[way.pregrasp].tolist(), strict=True))
-    trajectory = plan_trajectory(solution, hand)
+    trajectory = plan_trajectory(solution, hand, force=True)
     q = posture(solution.joint_angles, hand, "joint_angles")
     poses, T_palm_world = hand.link_poses(q), solution.hand_pose.inverse()
     for finger in hand.fingers:

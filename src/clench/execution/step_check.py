@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from clench.base.errors import MotionError
-from clench.base.pose import FloatArray
-from clench.grasp.path_check import find_path_overlap
+from clench.base.pose import FloatArray, invert
+from clench.grasp.path_check import PlacedObject, find_path_overlap
+from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
@@ -52,6 +54,31 @@ def squeeze_overlap(solution: GraspSolution, hand: Hand, offsets: FloatArray) ->
     return None if found is None else f"In the squeeze, {found.sentence}."
 
 
+def told_overlap(
+    solution: GraspSolution,
+    hand: Hand,
+    obj: GraspObject | None,
+    pregrasp: Mapping[str, float],
+    squeezed: Mapping[str, float],
+) -> str | None:
+    """Return a sentence about the first overlap on straight lines from pregrasp to grasp and squeeze; None without.
+
+    Another program that reads only these three postures moves the joints like that.
+
+    Args:
+        solution: the grasp. hand, obj: what it was computed for; without the object only links are kept apart.
+        pregrasp, squeezed: angles by joint name [rad].
+    """
+    q = posture(solution.joint_angles, hand, "joint_angles")
+    before = np.array([pregrasp.get(name, angle) for name, angle in zip(hand.joint_names, q, strict=True)])
+    after = np.array([squeezed.get(name, angle) for name, angle in zip(hand.joint_names, q, strict=True)])
+    around = None if obj is None else placed_object(solution, obj)
+    found = find_path_overlap(hand, np.array([before, q]), CollisionSource(solution.collision_source), around)
+    if found is not None:
+        return f"On the straight line from the pregrasp to the grasp, {found.sentence}."
+    return squeeze_overlap(solution, hand, after - q)
+
+
 def step_overlap(hand: Hand, phases: Sequence[Phase], source: CollisionSource) -> str | None:
     """Return a sentence about the first two links that next steps drive into each other; None when there are none.
 
@@ -71,3 +98,8 @@ def step_overlap(hand: Hand, phases: Sequence[Phase], source: CollisionSource) -
     ends = np.cumsum([len(phase.positions) - 1 for phase in steps])
     number = min(int(np.searchsorted(ends, found.place)), len(steps) - 1)
     return f"In next step {1 + (steps[number].step or 0)}, {found.sentence}."
+
+
+def placed_object(solution: GraspSolution, obj: GraspObject) -> PlacedObject:
+    """Return the object of a solution where the palm sees it."""
+    return PlacedObject(pack_object(obj), invert(solution.hand_pose.matrix) @ solution.object_pose.matrix)

@@ -14,9 +14,8 @@ from typing import Final
 import numpy as np
 
 from clench.base.errors import MotionError
-from clench.base.pose import FloatArray, invert
-from clench.grasp.path_check import PathOverlap, PlacedObject, find_path_overlap
-from clench.grasp.scene import pack_object
+from clench.base.pose import FloatArray
+from clench.grasp.path_check import PathOverlap, find_path_overlap
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import Hand, JointRole
 from clench.models.objects.grasp_object import GraspObject
@@ -26,6 +25,7 @@ from clench.solve.solution import GraspSolution
 
 from .closing_path import STILL, closing_path, distinct
 from .landing import LANDING_SPEED, plan_landing
+from .step_check import placed_object
 from .timing import TimedPath, time_path
 
 #: Way-points per stage; speed rises from zero and falls to zero within each.
@@ -223,11 +223,6 @@ class WayFinder:
         if _closed_at_once(self.solution):
             return _path_at_once(self.solution, self.hand, joints, start, goal)
         return list(_closing_stages(self.hand, joints, start, goal))
-
-
-def placed_object(solution: GraspSolution, obj: GraspObject) -> PlacedObject:
-    """Return the object of a solution where the palm sees it."""
-    return PlacedObject(pack_object(obj), invert(solution.hand_pose.matrix) @ solution.object_pose.matrix)
 
 
 def refuse_way(way: Way, hand: Hand) -> None:

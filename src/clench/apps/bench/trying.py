@@ -100,7 +100,7 @@ def try_grasp(
     Args:
         solution: the grasp. score: its own. hand, obj: what it is of. hold: the test. harder: also other settings.
     """
-    trajectory = plan_trajectory(solution, hand, obj=obj)
+    trajectory = plan_trajectory(solution, hand, obj=obj, force=True)
     return Trial(
         solution,
         score,

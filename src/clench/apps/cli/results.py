@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.base.errors import FileError
+from clench.base.errors import FileError, MotionError
 from clench.base.json_files import encode_document
 
 if TYPE_CHECKING:
@@ -27,7 +27,9 @@ def print_json(document: dict[str, Any]) -> None:
 def write_results(
     hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, folder: Path
 ) -> list[Path]:
-    """Write solution.json, trajectory.json where the path is known, and the figures; return their paths.
+    """Write solution.json, trajectory.json where there is a free path, and the figures; return their paths.
+
+    Without a free path, one sentence on standard error says why.
 
     Raises:
         FileError: the folder or a file cannot be written.
@@ -39,8 +41,12 @@ def write_results(
     solution.save(folder / "solution.json")
     written = [folder / "solution.json"]
     if solution.rounds == 1:
-        plan_trajectory(solution, hand, obj=obj).save(folder / "trajectory.json")
-        written.append(folder / "trajectory.json")
+        try:
+            plan_trajectory(solution, hand, obj=obj).save(folder / "trajectory.json")
+            written.append(folder / "trajectory.json")
+        except MotionError as error:
+            (folder / "trajectory.json").unlink(missing_ok=True)
+            sys.stderr.write(f"clench: no trajectory was written. {error}\n")
     return [*written, *draw_solution(hand, obj, command, solution, folder)]
 
 

@@ -13,6 +13,7 @@ from clench.execution.executing import check_geometry
 from clench.execution.hold import Hold
 from clench.execution.piece_hold import hold_as_collided
 from clench.execution.pregrasp import plan_pregrasp
+from clench.execution.step_check import told_overlap
 from clench.execution.trajectory import plan_trajectory
 from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
 from clench.models.hand.forward import base_pose
@@ -62,7 +63,8 @@ class OutgoingGrasp:
         frame: the link whose pose is written. T_world_frame: its pose.
         pregrasp, squeezed: angles [rad] of the same joints as the solution's, by name.
         joints: those that the frame carries, in the order of the hand's model.
-        confidence: 1 held in the test, 0.5 with a feasible squeeze, 0 without, dropped in the test or not valid.
+        confidence: 1 held in the test, 0.5 with a feasible squeeze, 0 without, dropped in the test, not valid, or where
+            the straight way from pregrasp to squeeze is not free.
         notes: sentences about what is missing.
     """
 
@@ -100,7 +102,8 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
         obj = obj.posed(solution.object_pose)
         solution = _completed(solution, hand, obj, settings)
         if settings.hold is not None:
-            report = hold_as_collided(solution, hand, obj, settings.hold, plan_trajectory(solution, hand, obj=obj))
+            trajectory = plan_trajectory(solution, hand, obj=obj, force=True)
+            report = hold_as_collided(solution, hand, obj, settings.hold, trajectory)
             held = report.held
             notes += [] if held else [f"The hold test: {report.reason}"]
     elif settings.hold is not None:
@@ -108,16 +111,19 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
     frame, T_world_frame, joints, unplaced = _frame(solution, hand, settings.root)
     missing = () if hand is not None and obj is not None else _missing(solution)
     squeezed, unpressed = _squeezed(solution, hand, settings.stiffness)
+    before = before_the_grasp(solution)
+    driven_in = None if hand is None else told_overlap(solution, hand, obj, before, squeezed)
+    driven = () if driven_in is None else (driven_in,)
     return OutgoingGrasp(
         solution,
         settings.name or solution.object,
         frame,
         T_world_frame,
-        before_the_grasp(solution),
+        before,
         squeezed,
         joints,
-        _confidence(solution, held),
-        (*notes, *unplaced, *missing, *unpressed),
+        NEITHER if driven else _confidence(solution, held),
+        (*notes, *driven, *unplaced, *missing, *unpressed),
     )
 
 
