@@ -101,7 +101,7 @@ def find_path_overlap(
     share = out[0] - corner
     after = min(corner + 1, len(points) - 1)
     q = points[corner] + share * (points[after] - points[corner])
-    place = float(kept[corner] + share * (kept[after] - kept[corner]))
+    place = _place(path[kept[corner] : kept[after] + 1], share) + float(kept[corner])
     name = hand.links[m].name
     if r >= 0:
         return PathOverlap(place, name, hand.links[r].name, False, float(out[1]))
@@ -137,6 +137,18 @@ def _corners(path: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
     if len(path) > 1:
         kept.append(len(path) - 1)
     return np.ascontiguousarray(path[kept]), np.array(kept, dtype=np.int64)
+
+
+def _place(line: FloatArray, share: float) -> float:
+    """Return the place among way-points on a straight line, (N, J), of a share of the way to the last one."""
+    whole = line[-1] - line[0]
+    if not whole.any():
+        return 0.0
+    shares = (line - line[0]) @ whole / (whole @ whole)
+    k = int(np.searchsorted(shares, share, side="right")) - 1
+    if k >= len(line) - 1:
+        return float(len(line) - 1)
+    return float(k + (share - shares[k]) / (shares[k + 1] - shares[k]))
 
 
 def _problem(
