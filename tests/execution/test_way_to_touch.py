@@ -38,7 +38,10 @@ def facing_fingers() -> Hand:
 
 def crossing(hand: Hand, start: float, end: float) -> GraspSolution:
     fingers = {
-        name: FingerResult(name, FingerStatus.LIMIT, "limit", 0, (make_candidate(contacts=()),)) for name in "ab"
+        name: FingerResult(
+            name, FingerStatus.LIMIT, "limit", 0, (make_candidate(joint_angles={f"{name}_0": end}, contacts=()),)
+        )
+        for name in "ab"
     }
     return make_solution(
         hand=hand.name,

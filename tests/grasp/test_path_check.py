@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import clench
-from chain_hands import HandBuilder, along_x, mount
+from chain_hands import HandBuilder, along_x, mount, turned
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.path_check import PlacedObject, find_path_overlap
 from clench.grasp.scene import pack_object
@@ -115,8 +115,8 @@ def test_fingers_that_slide_along_each_other_are_free(gap: float) -> None:
 
 def test_links_that_overlap_at_the_start_may_part_but_not_come_back() -> None:
     builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH])
-    away = mount((0.0, 1.5 * RADIUS, 0.0))
-    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=away, axes=[-Z]).hand()
+    leaning = mount((0.0, 2.5 * RADIUS, 0.0), turned(Z, -np.arcsin(RADIUS / LENGTH)))
+    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=leaning, axes=[-Z]).hand()
     assert find_path_overlap(hand, np.array([[0.0, 0.0], [0.0, -0.5]]), SOURCE) is None
     back = find_path_overlap(hand, np.array([[0.0, 0.0], [0.0, -0.5], [0.0, 0.0]]), SOURCE)
     assert back is not None
