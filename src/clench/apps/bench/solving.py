@@ -87,7 +87,7 @@ def _describe_problem(report: BenchReport, hand: Hand, obj: GraspObject, asked: 
         "object_triangles": sum(len(mesh.triangles) for mesh in meshes),
         "order": asked.order.value,
         "planes": asked.planes,
-        "seed": asked.seed,
+        "seed": asked.seed or 0,
     }
 
 
