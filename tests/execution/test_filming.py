@@ -108,7 +108,7 @@ def test_what_cannot_be_written_is_said_before_anything_moves(tmp_path: Path, mo
     with pytest.raises(FileError, match="no folder"):
         Film(tmp_path / "nowhere" / "a.gif")
     (tmp_path / "file").touch()
-    with pytest.raises(FileError, match="it is no folder"):
+    with pytest.raises(FileError, match="cannot be made a folder"):
         Film(stills=tmp_path / "file")
     assert make_film(None, None) is None
 

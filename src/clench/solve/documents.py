@@ -5,20 +5,20 @@ Keys are only ever added to the schema, so reading ignores keys it does not know
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from clench.base.errors import ClenchError, FileError
+from clench.base.errors import FileError
 from clench.base.json_files import encode_document, non_finite_path, read_json, write_json
 from clench.base.pose import Pose
 from clench.models.hand.extremes import LARGEST_ANGLE
 from clench.models.shapes import CollisionSource
 
+from .document_values import check_said, convert, read_limits, read_numbers, read_pose
 from .solution import (
     Candidate,
     Contact,
@@ -33,7 +33,6 @@ SCHEMA = "clench.solution/1"
 #: Relative speeds are up to so many times larger or smaller than the usual 1 [-].
 FASTEST = 1e6
 
-_T = TypeVar("_T")
 _Vector = tuple[float, float, float]
 _Map = dict[str, Any]  # its values are converted one by one, so that messages name the key
 
@@ -174,17 +173,17 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
     bad = non_finite_path(data)
     if bad is not None:
         raise FileError(source, f"{bad}: expected a finite number.")
-    form = _convert(data, _SolutionForm, source, "")
+    form = convert(data, _SolutionForm, source, "")
 
     def angles(value: Mapping[str, Any], key: str) -> dict[str, float]:
-        return _read_numbers(value, key, source, -LARGEST_ANGLE, LARGEST_ANGLE)
+        return read_numbers(value, key, source, -LARGEST_ANGLE, LARGEST_ANGLE)
 
-    _check_said(form.reason, ("code", "text"), source, "reason")
-    _check_said(form.certificate, ("text",), source, "certificate")
+    check_said(form.reason, ("code", "text"), source, "reason")
+    check_said(form.certificate, ("text",), source, "certificate")
     if form.rounds < 0:
         raise FileError(source, f"rounds: expected at least 0, got {form.rounds}.")
     if form.squeeze is not None:  # is kept as it is, but what hands are told of it has to be of the right form
-        squeeze = _convert(form.squeeze, _SqueezeForm, source, "squeeze")
+        squeeze = convert(form.squeeze, _SqueezeForm, source, "squeeze")
         angles(squeeze.offsets, "squeeze.offsets")
         angles(squeeze.torques, "squeeze.torques")
     return GraspSolution(
@@ -198,10 +197,10 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         seed=form.seed,
         status=form.status,
         reason=form.reason,
-        hand_pose=_read_pose(form.hand_pose, source, "hand_pose"),
-        object_pose=_read_pose(form.object_pose, source, "object_pose"),
+        hand_pose=read_pose(form.hand_pose, source, "hand_pose"),
+        object_pose=read_pose(form.object_pose, source, "object_pose"),
         decomposition={
-            part: angles(_convert(v, _Map, source, f"decomposition.{part}"), f"decomposition.{part}")
+            part: angles(convert(v, _Map, source, f"decomposition.{part}"), f"decomposition.{part}")
             for part, v in form.decomposition.items()
         },
         joint_angles=angles(form.joint_angles, "joint_angles"),
@@ -217,11 +216,11 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         squeeze=form.squeeze,
         pregrasp=None if form.pregrasp is None else angles(form.pregrasp, "pregrasp"),
         choice=form.choice,
-        timing=_read_numbers(form.timing, "timing", source),
-        speeds=_read_numbers(form.speeds, "speeds", source, 1.0 / FASTEST, FASTEST),
+        timing=read_numbers(form.timing, "timing", source),
+        speeds=read_numbers(form.speeds, "speeds", source, 1.0 / FASTEST, FASTEST),
         rounds=form.rounds,
         next_steps=tuple(angles(step, f"next_steps[{i}]") for i, step in enumerate(form.next_steps)),
-        joint_limits={name: _read_limits(v, source, f"joint_limits.{name}") for name, v in form.joint_limits.items()},
+        joint_limits={name: read_limits(v, source, f"joint_limits.{name}") for name, v in form.joint_limits.items()},
     )
 
 
@@ -317,46 +316,22 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _read_numbers(
-    value: Mapping[str, Any], key: str, source: str, least: float = -math.inf, most: float = math.inf
-) -> dict[str, float]:
-    found = {name: _convert(v, float, source, f"{key}.{name}") for name, v in value.items()}
-    for name, number in found.items():
-        if not least <= number <= most:
-            raise FileError(source, f"{key}.{name}: expected a number from {least:g} to {most:g}, got {number:g}.")
-    return found
-
-
-def _read_limits(value: Any, source: str, key: str) -> tuple[float, float]:
-    low, high = _convert(value, tuple[float, float], source, key)
-    if low > high:
-        raise FileError(source, f"{key}: expected the lower limit first, got [{low:g}, {high:g}].")
-    return low, high
-
-
-def _check_said(value: dict[str, Any] | None, keys: tuple[str, ...], source: str, where: str) -> None:
-    """Refuse a free-form value that lacks the text by which people are told of it."""
-    for key in () if value is None else keys:
-        if value is not None and not isinstance(value.get(key), str):
-            raise FileError(source, f"{where}.{key}: {'expected text' if key in value else 'missing'}.")
-
-
 def _read_finger(name: str, data: Any, source: str) -> FingerResult:
     key = f"fingers.{name}"
-    form = _convert(data, _FingerForm, source, key)
+    form = convert(data, _FingerForm, source, key)
     if form.candidates and not 0 <= form.chosen < len(form.candidates):
         last = len(form.candidates) - 1
         raise FileError(source, f"{key}.chosen: expected the index of a candidate, 0 to {last}, got {form.chosen}.")
-    _check_said(form.cause, ("code", "text"), source, f"{key}.cause")
+    check_said(form.cause, ("code", "text"), source, f"{key}.cause")
     candidates = [_read_candidate(c, source, f"{key}.candidates[{i}]") for i, c in enumerate(form.candidates)]
     return FingerResult(name, form.status, form.reason, form.chosen, tuple(candidates), form.cause)
 
 
 def _read_candidate(data: Any, source: str, key: str) -> Candidate:
-    form = _convert(data, _CandidateForm, source, key)
+    form = convert(data, _CandidateForm, source, key)
 
     def numbers(values: Mapping[str, Any], part: str) -> dict[str, float]:
-        return _read_numbers(values, f"{key}.{part}", source)
+        return read_numbers(values, f"{key}.{part}", source)
 
     return Candidate(
         plane=form.plane,
@@ -374,37 +349,8 @@ def _read_candidate(data: Any, source: str, key: str) -> Candidate:
 
 
 def _read_contacts(data: list[Any], source: str, key: str) -> tuple[Contact, ...]:
-    forms = [_convert(c, _ContactForm, source, f"{key}[{i}]") for i, c in enumerate(data)]
+    forms = [convert(c, _ContactForm, source, f"{key}[{i}]") for i, c in enumerate(data)]
     return tuple(
         Contact(**{**msgspec.structs.asdict(f), "position": np.array(f.position), "normal": np.array(f.normal)})
         for f in forms
     )
-
-
-def _read_pose(data: Any, source: str, key: str) -> Pose:
-    try:
-        pose = Pose.from_dict(data, key)
-    except ClenchError as error:
-        raise FileError(source, str(error)) from None
-    written = np.array(data.get("wxyz", pose.wxyz), dtype=np.float64)
-    if np.allclose(written, pose.wxyz, rtol=0.0, atol=4e-16):
-        # Normalising a unit quaternion again may change its last bit: keep what was written.
-        exact = np.concatenate([written, pose.position])
-        exact.flags.writeable = False
-        object.__setattr__(pose, "wxyz_xyz", exact)
-    return pose
-
-
-def _convert(value: Any, kind: type[_T], source: str, key: str) -> _T:
-    try:
-        return msgspec.convert(value, kind)
-    except msgspec.ValidationError as error:
-        _refuse(str(error), source, key)
-
-
-def _refuse(message: str, source: str, key: str) -> NoReturn:
-    """Turn "Expected `float`, got `str` - at `$.gap`" into a sentence that starts with the whole key."""
-    problem, _, place = message.partition(" - at `$")
-    path = (key + place.rstrip("`")).lstrip(".")
-    problem = problem[:1].lower() + problem[1:].replace("`", "'")
-    raise FileError(source, f"{path}: {problem}." if path else f"{problem}.")
