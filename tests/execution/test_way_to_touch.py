@@ -7,53 +7,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from facing_fingers import crossing, facing_fingers
 
 import clench
-from chain_hands import HandBuilder, along_x, mount, turned
 from clench.base.errors import MotionError
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.grasp.path_check import find_path_overlap
-from clench.grasp.scene import hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.hand.opposition import opposing_preshapes
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
-from handmade import make_candidate, make_solution
+from clench.solve.solution import GraspSolution
 
 X, Y, Z = np.eye(3)
 ENGINE = CollisionSource.ENGINE
 DATA = Path(__file__).parents[3] / "shared" / "data" / "hands"
 REAL = ("leap_hand_urdf/leap_hand_right.urdf", "wonik_allegro_mjcf/right_hand.xml", "shadow_hand_mjcf/right_hand.xml")
-
-
-def facing_fingers() -> Hand:
-    """Return two fingers that point at each other at angle 0, where their tips would overlap by 2 mm."""
-    shape = along_x(0.006, 0.04)
-    builder = HandBuilder().finger("a", [shape], [0.04], axes=[Z], lower=-2.0)
-    away = mount((0.09, 0.0, 0.0), turned(Z, np.pi))
-    return builder.finger("b", [shape], [0.04], base=away, axes=[Z], lower=-2.0).hand()
-
-
-def crossing(hand: Hand, start: float, end: float) -> GraspSolution:
-    fingers = {
-        name: FingerResult(
-            name, FingerStatus.LIMIT, "limit", 0, (make_candidate(joint_angles={f"{name}_0": end}, contacts=()),)
-        )
-        for name in "ab"
-    }
-    return make_solution(
-        hand=hand.name,
-        status=SolutionStatus.PARTIAL,
-        geometry_hash=f"{hash_hand(hand, ENGINE)}+",
-        open_angles={"a_0": start, "b_0": start},
-        joint_angles={"a_0": end, "b_0": end},
-        joint_limits={},
-        fingers=fingers,
-        contacts=(),
-        max_penetration=0.0,
-    )
 
 
 def test_one_finger_waits_where_both_would_meet(tmp_path: Path) -> None:

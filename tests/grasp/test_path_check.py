@@ -126,15 +126,6 @@ def test_links_that_overlap_at_the_start_may_part_but_not_come_back() -> None:
     assert {deeper.link, deeper.other} == {"a_link_0", "b_link_0"}
 
 
-def test_held_links_are_not_checked_against_each_other() -> None:
-    hand = two_chains(apart=0.02)
-    path = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]])
-    found = find_path_overlap(hand, path, SOURCE)
-    assert found is not None
-    held = [hand.link_index(name) for name in (*(f"a_link_{k}" for k in range(2)), *(f"b_link_{k}" for k in range(2)))]
-    assert find_path_overlap(hand, path, SOURCE, held=held) is None
-
-
 def test_way_points_on_a_straight_line_change_nothing() -> None:
     hand = two_chains(apart=0.02)
     ends = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]])

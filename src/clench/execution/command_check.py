@@ -22,6 +22,19 @@ MEASURED_OUTSIDE = 0.3
 SHORTEST = 1e-6
 
 
+class NotFollowingError(RefusedCommandError):
+    """Say that a joint is too far from where it was told to be.
+
+    Args:
+        sentence: one line. joint: the controller's name. told: where it was told to be, and positions: where the joints
+            are, by the controller's names and in its units.
+    """
+
+    def __init__(self, sentence: str, joint: str, told: float, positions: Mapping[str, float]) -> None:
+        super().__init__(sentence)
+        self.joint, self.told, self.positions = joint, told, positions
+
+
 @dataclass(frozen=True)
 class CommandLimits:
     """Hold what a joint of a controller may be told, in its own units.
@@ -100,9 +113,12 @@ class CommandCheck:
                     f"[{limits.lower:.4g}, {limits.upper:.4g}] {limits.unit}; is the controller's unit right?"
                 )
             if expected is not None and abs(value - expected[name]) > self.max_deviation * limits.scale:
-                raise RefusedCommandError(
+                raise NotFollowingError(
                     f"Joint '{name}' does not follow: it is at {value:.4g} {limits.unit} and was told to be "
-                    f"at {expected[name]:.4g} {limits.unit}."
+                    f"at {expected[name]:.4g} {limits.unit}.",
+                    name,
+                    expected[name],
+                    state.positions,
                 )
 
     def command(self, path: JointPath, start: Mapping[str, float]) -> None:

@@ -15,14 +15,15 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
-from .command_check import CommandCheck, check_tensions, command_limits, slowed_down
+from .command_check import CommandCheck, NotFollowingError, check_tensions, command_limits
 from .driven_report import Done, report_on
 from .driven_squeeze import DrivenSqueeze, plan_driven_squeeze, squeeze_by_driver
 from .driven_steps import DrivenStep, go_to_steps, plan_driven_steps
-from .driver import DriverError, HandDriver, HandState, RefusedCommandError, TendonDriver
+from .driven_way import plan_driven_way
+from .driver import DriverError, HandDriver, RefusedCommandError, TendonDriver
 from .driver_line import CALL_LIMIT
 from .driver_session import STOP_TRIES, DriverSession
-from .following import CLOSEST, Follower, TimedPlan
+from .following import CLOSEST, Follower
 from .halting import halt
 from .history import CommandsSent
 from .joint_map import JointMap, MappedJoint
@@ -34,14 +35,13 @@ from .trajectory import Trajectory
 WAITING = 0.005
 #: How often the end of an execution is tried when it is interrupted.
 ENDINGS = 5
-#: Points of the way from where the hand is found to the trajectory's start.
-WAY_POINTS = 9
 
 
 class DrivenHand:
     """Carry solutions out on a controller; every command is checked before it is sent.
 
-    The hand moves in a straight line from where it is found to the trajectory's start, then along the trajectory. The
+    The hand moves from where it is found to the trajectory's start, then along the trajectory. The whole motion is
+    proven free before the first command, see `plan_trajectory`: of the hand's links and, with `obj`, of the object. The
     controller is told the next 0.3 s at a time, so that a cut connection stops the hand. On any trouble the hand
     is stopped and the report says why. A stop stays in force until `release_stop`, for everybody who uses this driver.
     The driver is called from a thread of its own. Without sensors of touch the report compares joint angles only.
@@ -157,7 +157,7 @@ class DrivenHand:
                 a joint. KeyboardInterrupt: and whatever else is no error of the driver; the hand was stopped before,
                 and `last_report` says what was sent.
         """
-        done = Done(self.joint_map.of(self.hand))
+        done = Done(self.joint_map.of(self.hand), obj=self.obj)
         posture(solution.joint_angles, self.hand, "joint_angles")
         session = DriverSession(self.driver)
         raised: BaseException | None = None
@@ -189,7 +189,8 @@ class DrivenHand:
         done.check = check = CommandCheck(limits, self.max_age, self.max_deviation)
         state = session.read()
         check.state(state)
-        plan, done.way = self._plan(trajectory, mapped, check, state)
+        way = plan_driven_way(solution, trajectory, self.hand, self.obj, mapped, check, state)
+        plan, done.way = way.plan, way.text
         check.command(plan.window(0.0, plan.duration + CLOSEST), plan.at(0.0))
         done.squeeze = squeeze = plan_driven_squeeze(solution, self.hand, mapped, check, self.squeeze)
         steps = self._steps(solution, trajectory, squeeze, mapped, check)
@@ -230,6 +231,8 @@ class DrivenHand:
         supervision = session.supervision
         if raised is not None and not done.trouble:
             done.trouble = _trouble(raised)
+            if isinstance(raised, NotFollowingError):
+                done.left_behind = raised
         interrupted = raised is not None and not isinstance(raised, Exception)
         if interrupted:
             supervision.stop(_trouble(raised))
@@ -289,31 +292,6 @@ class DrivenHand:
                 said = "" if joint.name == name else f" (joint '{name}' of the hand)"
                 raise UnknownNameError("joint", joint.name, f"controller '{self.name}'{said}", known)
 
-    def _plan(
-        self, trajectory: Trajectory, mapped: Mapping[str, MappedJoint], check: CommandCheck, state: HandState
-    ) -> tuple[TimedPlan, float]:
-        """Return the whole motion in the controller's units, and how far the way to its start is [rad]."""
-        columns = [trajectory.joints.index(name) for name in mapped]
-        joints = list(mapped.values())
-        angles = trajectory.positions[:, columns]
-        found = np.array([joint.to_angle(state.positions[joint.name]) for joint in joints])
-        limits = [check.limits[joint.name] for joint in joints]
-        speeds = np.array([limit.velocity / abs(j.scale) for limit, j in zip(limits, joints, strict=True)])
-        # As fast as the trajectory itself, compared with what its joints could do.
-        share = _largest_share(trajectory)
-        s = np.linspace(0.0, 1.0, WAY_POINTS)[:, None]
-        way = found + (s * s * (3.0 - 2.0 * s)) * (angles[0] - found)
-        step = max(float((np.abs(np.diff(way, axis=0)) / (speeds * share)).max(initial=0.0)), CLOSEST * 10.0)
-        before = step * np.arange(WAY_POINTS)
-        after = slowed_down(trajectory.times, angles, speeds)
-        scale, offset = np.array([j.scale for j in joints]), np.array([j.offset for j in joints])
-        plan = TimedPlan(
-            joints=tuple(joint.name for joint in joints),
-            times=np.concatenate([before[:-1], before[-1] + after]),
-            positions=np.vstack([way[:-1], angles]) * scale + offset,
-        )
-        return plan.thinned(), float(np.abs(angles[0] - found).max(initial=0.0))
-
 
 def _trouble(error: BaseException | None) -> str:
     """Say in a sentence what ended an execution."""
@@ -322,12 +300,3 @@ def _trouble(error: BaseException | None) -> str:
     if isinstance(error, Exception):
         return f"It failed ({type(error).__name__}: {error})."
     return f"Interrupted ({type(error).__name__})."
-
-
-def _largest_share(trajectory: Trajectory) -> float:
-    """Return the largest share of a joint's speed limit that a trajectory uses, above 0 and up to 1 [-]."""
-    if len(trajectory.times) < 2:
-        return 1.0
-    rates = np.abs(np.diff(trajectory.positions, axis=0)) / np.diff(trajectory.times)[:, None]
-    share = float((rates / trajectory.velocity_limits).max(initial=0.0))
-    return min(1.0, share) if share > 0.0 else 1.0

@@ -9,12 +9,15 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
-from .command_check import CommandCheck
+from .blocking import modelled_blocker
+from .command_check import CommandCheck, NotFollowingError
 from .driven_squeeze import DrivenSqueeze
 from .driven_steps import DrivenStep, step_reached
+from .driven_way import found_posture
 from .driver_session import Sent
 from .following import Followed
 from .halting import Halted
@@ -30,15 +33,18 @@ class Done:
 
     Args:
         mapped: the joints as the controller says them. check: what commands must pass, None before it is known.
-        way: how far it is to the trajectory's start [rad]. squeeze: as planned.
+        obj: the object, None when it is not known. way: a sentence about the way to the trajectory's start.
+        squeeze: as planned.
         followed, squeezed, stepped: samples of the trajectory, the squeeze, and the next steps that were begun.
         pulled: a sentence about tendons. during: what was under way at the end. trouble: why it ended early.
+        left_behind: the fault, where a joint was too far from where it was told to be.
         halted: what came of the stop, None when none was sent.
     """
 
     mapped: Mapping[str, MappedJoint]
     check: CommandCheck | None = None
-    way: float = 0.0
+    obj: GraspObject | None = None
+    way: str = ""
     squeeze: DrivenSqueeze = field(default_factory=DrivenSqueeze)
     followed: Followed = field(default_factory=Followed)
     squeezed: Followed = field(default_factory=Followed)
@@ -46,6 +52,7 @@ class Done:
     pulled: str = ""
     during: State = State.IDLE
     trouble: str = ""
+    left_behind: NotFollowingError | None = None
     halted: Halted | None = None
 
     @property
@@ -92,8 +99,13 @@ def report_on(
     )
     if done.trouble and not stepping:
         success, reason = False, f"{_BEFORE.get(done.during, '')}{done.ending()}"
+        if done.left_behind is not None:
+            reason += f" {_left_behind(done, done.left_behind, solution, hand)}"
     else:
         success, reason = _judge(joints, error, tolerance)
+        if not success:
+            worst = _worst(joints)
+            reason += f" {_blocker(done, solution, hand, worst, joints[worst].computed, at_touch)}"
         if success or stepping:
             success, reason = judge_steps(success, reason, steps)
     history = _history(done.ways, done.mapped)
@@ -123,16 +135,34 @@ _BEFORE = {State.SQUEEZING: "While squeezing: ", State.PULLING: "While pulling t
 
 def _judge(joints: Mapping[str, JointReached], error: float | None, tolerance: float) -> tuple[bool, str]:
     if error is None or error > tolerance:
-        worst = max(joints, key=lambda name: abs(joints[name].error))
+        worst = _worst(joints)
         far = f"joint '{worst}' is {abs(joints[worst].error):.3g} rad from its computed angle"
         return False, f"Not reached: {far}; tolerance {tolerance:g} rad."
     return True, f"Every joint is within {error:.2g} rad of its computed angle."
 
 
+def _worst(joints: Mapping[str, JointReached]) -> str:
+    return max(joints, key=lambda name: abs(joints[name].error))
+
+
+def _left_behind(done: Done, fault: NotFollowingError, solution: GraspSolution, hand: Hand) -> str:
+    joint = next(name for name, said in done.mapped.items() if said.name == fault.joint)
+    told = done.mapped[joint].to_angle(fault.told)
+    return _blocker(done, solution, hand, joint, told, fault.positions)
+
+
+def _blocker(
+    done: Done, solution: GraspSolution, hand: Hand, joint: str, told: float, measured: Mapping[str, float]
+) -> str:
+    """Name what is in the way of a joint that is not where it was told to be [rad]."""
+    others = posture(solution.joint_angles, hand, "joint_angles")
+    reached = found_posture(hand, done.mapped, measured, others)
+    return modelled_blocker(solution, hand, done.obj, reached, joint, told)
+
+
 def _notes(done: Done) -> tuple[str, ...]:
-    way = f"The way began with a straight part to the trajectory's start, {done.way:.3g} rad at most."
     begun = done.squeeze.plan is None or (done.squeezed.times and done.during is not State.SQUEEZING)
-    return tuple(filter(None, (way, done.squeeze.text if begun else "", done.pulled)))
+    return tuple(filter(None, (done.way, done.squeeze.text if begun else "", done.pulled)))
 
 
 def _counted(sent: Sent, mapped: Mapping[str, MappedJoint]) -> CommandsSent:

@@ -18,6 +18,7 @@ from .driver_session import DriverSession
 from .following import CLOSEST, Followed, Follower, TimedPlan
 from .joint_map import MappedJoint
 from .next_steps import BUILDING_UP
+from .step_check import squeeze_overlap
 from .supervision import Event
 
 #: Way-points of it.
@@ -58,6 +59,10 @@ def plan_driven_squeeze(
         return DrivenSqueeze(f"There was no squeeze: {_unknown(silent)}" if silent and share else "")
     if not plan.get("feasible"):
         return DrivenSqueeze(f"There was no squeeze: {plan.get('text', 'none is planned.')}")
+    beyond = np.array([offsets.get(name, 0.0) for name in hand.joint_names])
+    overlap = squeeze_overlap(solution, hand, beyond)
+    if overlap is not None:
+        return DrivenSqueeze(f"There was no squeeze: {overlap}")
     timed = _timed(solution, hand, mapped, offsets, check)
     try:
         check.command(timed.window(0.0, timed.duration + CLOSEST), timed.at(0.0))

@@ -9,6 +9,7 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
@@ -18,6 +19,7 @@ from .following import CLOSEST, PERIOD, Followed, Follower, TimedPlan
 from .joint_map import MappedJoint
 from .next_steps import Phase, moved_joints, plan_next_steps
 from .report import JointReached, NextStepReached, step_sentence
+from .step_check import step_overlap
 from .supervision import Event
 
 
@@ -51,10 +53,14 @@ def plan_driven_steps(
         mapped: the joints as the controller says them. check: what every command must pass.
 
     Raises:
-        RefusedCommandError: a step that may not be sent; the message says which, and why.
+        RefusedCommandError: a step may not be sent, or drives links into each other; the message says which, and why.
     """
     steps = []
-    for phase in plan_next_steps(solution, hand, told, pace):
+    phases = plan_next_steps(solution, hand, told, pace)
+    overlap = step_overlap(hand, phases, CollisionSource(solution.collision_source))
+    if overlap is not None:
+        raise RefusedCommandError(overlap)
+    for phase in phases:
         plan = _timed(phase, hand, mapped, check)
         assert phase.step is not None
         whole = JointPath(plan.joints, plan.times[-1:], plan.positions[-1:], PERIOD)

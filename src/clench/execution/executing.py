@@ -47,7 +47,7 @@ def execute(
         solution: what to carry out.
         actuator: what moves the hand, e.g. `SimulatedHand`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry it out all the same.
+        force: carry it out all the same. A `DrivenHand` refuses what is not free even then.
         next_steps: carry out its next steps, too, after the touch and the squeeze.
 
     Raises:

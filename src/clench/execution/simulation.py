@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from clench.models.objects.grasp_object import GraspObject
 from clench.solve.posture import posture
 from clench.solve.solution import Contact, FingerStatus, GraspSolution
 
+from .blocking import simulated_blocker
 from .drives import Drive, check_drive, sentences
 from .filming import Film
 from .history import ExecutionHistory
@@ -111,7 +113,7 @@ class SimulatedHand:
             if nearest(scene, data, i, self.contact_tolerance)[0] <= self.contact_tolerance
         )
         error = float(np.abs(reached - computed).max(initial=0.0))
-        success, reason = self._judge(solution, joints, contacts, error)
+        success, reason = self._judge(solution, joints, contacts, partial(simulated_blocker, scene, data, self.hand))
         held: HoldReport | None = None
         steps: tuple[NextStepReached, ...] = ()
         if success and self.hold is not None:
@@ -222,15 +224,16 @@ class SimulatedHand:
         solution: GraspSolution,
         joints: dict[str, JointReached],
         contacts: tuple[ContactReached, ...],
-        error: float,
+        blocker: Callable[[str], str],
     ) -> tuple[bool, str]:
         touching = {c.finger for c in contacts if c.touches}
         wanted = [n for n, f in solution.fingers.items() if f.status is FingerStatus.TOUCH]
         absent = [name for name in wanted if name not in touching]
+        worst = max(joints, key=lambda name: abs(joints[name].error))
+        error = abs(joints[worst].error)
         if error > self.angle_tolerance:
-            worst = max(joints, key=lambda name: abs(joints[name].error))
             far = f"joint '{worst}' is {error:.3g} rad from its computed angle"
-            return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad."
+            return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad. {blocker(worst)}".rstrip()
         if absent:
             return False, f"Finger '{absent[0]}' does not touch; tolerance {self.contact_tolerance:g} m."
         return True, f"Every joint is within {error:.2g} rad of its computed angle, and {len(wanted)} fingers touch."

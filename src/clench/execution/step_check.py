@@ -38,8 +38,8 @@ def refuse_after(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -
 def squeeze_overlap(solution: GraspSolution, hand: Hand, offsets: FloatArray) -> str | None:
     """Return a sentence about the first two links that a squeeze drives into each other; None without.
 
-    The object holds the fingers that touch it: they press and do not move, whatever angles they are told. So fingers
-    that touch are not checked against each other, but against the rest of the hand.
+    The object holds the fingers that touch it: they press and do not move, whatever angles they are told. So the
+    other joints move alone.
 
     Args:
         solution: the solution. hand: what it was computed for. offsets: angles beyond the touch [rad], shape (J,).
@@ -47,10 +47,12 @@ def squeeze_overlap(solution: GraspSolution, hand: Hand, offsets: FloatArray) ->
     if not offsets.any():
         return None
     touching = {c.finger for c in solution.contacts if not c.passed}
-    held = [link for f in hand.fingers if f.name in touching for link in f.links]
+    moved = offsets.copy()
+    for finger in hand.fingers:
+        if finger.name in touching:
+            moved[list(finger.joints)] = 0.0
     q = posture(solution.joint_angles, hand, "joint_angles")
-    path = np.array([q, q + offsets])
-    found = find_path_overlap(hand, path, CollisionSource(solution.collision_source), held=held)
+    found = find_path_overlap(hand, np.array([q, q + moved]), CollisionSource(solution.collision_source))
     return None if found is None else f"In the squeeze, {found.sentence}."
 
 

@@ -12,6 +12,7 @@ from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.solve.solution import GraspSolution
 
+from .blocking import simulated_blocker
 from .filming import Film
 from .hold import Hold, HoldTest, Pulled
 from .next_steps import Phase, moved_joints, plan_next_steps
@@ -115,6 +116,9 @@ class Stepper:
         assert phase.step is not None
         stable = is_stable(data)
         reached, reason = step_sentence(phase.step, joints, self.tolerance)
+        if stable and not reached:
+            worst = max(joints, key=lambda name: abs(joints[name].error))
+            reason = f"{reason} {simulated_blocker(scene, data, self.hand, worst)}".rstrip()
         if not stable:
             reached, reason = False, f"Next step {phase.step + 1}: the simulation did not stay finite."
         touching = TouchWatch(scene, self.hand).touching(data) if stable else ()

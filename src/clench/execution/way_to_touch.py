@@ -8,6 +8,7 @@ space, the finger goes along its closing path instead, joint by joint.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -77,15 +78,21 @@ class WayFinder:
     Args:
         solution: the solution. hand, obj: what it was computed for; without the object only links are kept apart.
         pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
+        start: where the hand is [rad], shape (J,); None is the solution's open hand.
     """
 
     def __init__(
-        self, solution: GraspSolution, hand: Hand, obj: GraspObject | None, pace: tuple[FloatArray, FloatArray]
+        self,
+        solution: GraspSolution,
+        hand: Hand,
+        obj: GraspObject | None,
+        pace: tuple[FloatArray, FloatArray],
+        start: FloatArray | None = None,
     ) -> None:
         self.solution, self.hand, self.pace = solution, hand, pace
         self.source = CollisionSource(solution.collision_source)
         self.around = None if obj is None else placed_object(solution, obj)
-        self.start = posture(solution.open_angles, hand, "open_angles")
+        self.start = posture(solution.open_angles, hand, "open_angles") if start is None else start
         self.end = posture(solution.joint_angles, hand, "joint_angles")
 
     def find(self, clearance: float) -> Way:
@@ -100,11 +107,11 @@ class WayFinder:
             if landing is None:
                 continue
             goal, last = landing
-            way = self._search(goal, straight=True, last=last)
+            way = self.search(goal, last=last)
             if way.overlap is None:
                 return way
             failed.append(way)
-        way = self._search(self.end, straight=False, last=None)
+        way = self.search(self.end, straight=False)
         if way.overlap is not None:
             # The order of the certificate: one finger after another, along the paths that were computed.
             order = list(self.solution.fingers)
@@ -118,17 +125,35 @@ class WayFinder:
     def _landing(self, clearance: float) -> tuple[FloatArray, _Part] | None:
         """Return a pregrasp and the straight line from there to all contacts at once; None where it is not free."""
         goal = plan_landing(self.solution, self.hand, clearance)
-        if goal is None or self._overlap(np.array([goal, self.end])) is not None:
+        if goal is None or self.overlap(np.array([goal, self.end])) is not None:
             return None
         slow = np.minimum(self.pace[0], np.abs(self.end - goal) * (LANDING_SPEED / clearance))
         line = time_path([np.array([goal, self.end])], slow, self.pace[1])
         return goal, _joined([line], self.end, [range(len(self.end))])
 
-    def _overlap(self, path: FloatArray) -> PathOverlap | None:
+    def begun_at(self, start: FloatArray) -> WayFinder:
+        """Return the same search from another posture."""
+        other = copy(self)
+        other.start = start
+        return other
+
+    def overlap(self, path: FloatArray) -> PathOverlap | None:
+        """Return the first overlap on a path, shape (N, J); None where it is free."""
         return find_path_overlap(self.hand, path, self.source, self.around)
 
-    def _search(self, goal: FloatArray, *, straight: bool, last: _Part | None) -> Way:
-        """Return a free way to a posture; where none is found the first one tried, with its overlap."""
+    def straight(self, goal: FloatArray) -> Way:
+        """Return the straight line in joint space to a posture, with its overlap where it is not free."""
+        line = time_path([np.array([self.start, goal])], *self.pace)
+        times, positions = _joined([line], goal, [range(len(goal))])
+        return Way(times, positions, None, (), self.overlap(positions))
+
+    def search(self, goal: FloatArray, *, straight: bool = True, last: _Part | None = None) -> Way:
+        """Return a free way to a posture; where none is found the first one tried, with its overlap.
+
+        Args:
+            goal: the posture [rad], shape (J,). straight: whether fingers first try straight lines, or else their
+                closing paths. last: times [s] and postures [rad] of what follows.
+        """
         count = len(self.hand.fingers)
         plans = [FingerPlan((0,) * count, (straight,) * count)]
         seen, first = set(plans), None
@@ -149,7 +174,7 @@ class WayFinder:
 
     def _checked(self, plan: FingerPlan, goal: FloatArray, last: _Part | None) -> Way:
         times, positions = self._timed(plan, goal)
-        overlap = self._overlap(positions)
+        overlap = self.overlap(positions)
         pregrasp = None
         if last is not None:
             pregrasp = len(times) - 1

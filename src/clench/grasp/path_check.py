@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -72,8 +71,6 @@ def find_path_overlap(
     path: FloatArray,
     source: CollisionSource,
     around: PlacedObject | None = None,
-    *,
-    held: Collection[int] = (),
 ) -> PathOverlap | None:
     """Return the first overlap on a path of the whole hand; None proves that the path is free.
 
@@ -86,12 +83,11 @@ def find_path_overlap(
     Args:
         hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.
         source: geometry of the links. around: the object; None checks the hand alone.
-        held: links that something holds where they are; they are not checked against each other.
     """
     from clench.kernels.path_overlap import first_overlap
 
     points, kept = _corners(np.ascontiguousarray(path, dtype=np.float64))
-    problem = _problem(hand, points, source, around, held)
+    problem = _problem(hand, points, source, around)
     out = np.zeros(2)
     found = first_overlap(problem, out)
     if found < 0:
@@ -151,9 +147,7 @@ def _place(line: FloatArray, share: float) -> float:
     return float(k + (share - shares[k]) / (shares[k + 1] - shares[k]))
 
 
-def _problem(
-    hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None, held: Collection[int]
-) -> PathProblem:
+def _problem(hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None) -> PathProblem:
     from clench.kernels.bodies import no_body
     from clench.kernels.link_meshes import ObjectMesh
     from clench.kernels.pair_motion import PathProblem
@@ -168,8 +162,6 @@ def _problem(
     else:
         pairs, body, T = tables.all, around.packed.bodies, around.T_palm_object
         solid = object_mesh(around.packed)
-    if held:
-        pairs = np.ascontiguousarray(pairs[~np.isin(pairs, list(held)).all(axis=1)])
     pads = np.array([hand.links[m].pad_indentation if r < 0 else 0.0 for m, r in pairs.tolist()], dtype=np.float64)
     return PathProblem(
         frames=hand_frames(hand),
