@@ -307,7 +307,8 @@ def test_a_signal_stops_the_hand_and_what_was_sent_is_kept(
     assert json.loads(printed.out) == report
     assert not report["success"]
     assert report["sent"]["commands"] == 5
-    assert servos.calls == [*["command"] * 5, "stop"]
+    assert servos.calls[:5] == ["command"] * 5
+    assert set(servos.calls[5:]) == {"stop"}  # once more where a busy machine lets the first call take too long
     assert len(report["history"]["times"]) >= 5
     seen = "The hand was told to stop: it was seen to stand still."
     if swallow:

@@ -125,7 +125,8 @@ class WayFinder:
     def _landing(self, clearance: float) -> tuple[FloatArray, _Part] | None:
         """Return a pregrasp and the straight line from there to all contacts at once; None where it is not free."""
         goal = plan_landing(self.solution, self.hand, clearance)
-        if goal is None or self.overlap(np.array([goal, self.end])) is not None:
+        # From the touch on, which is free: links that overlap where a path begins would be let apart.
+        if goal is None or self.overlap(np.array([self.end, goal])) is not None:
             return None
         slow = np.minimum(self.pace[0], np.abs(self.end - goal) * (LANDING_SPEED / clearance))
         line = time_path([np.array([goal, self.end])], slow, self.pace[1])
@@ -157,14 +158,18 @@ class WayFinder:
         count = len(self.hand.fingers)
         plans = [FingerPlan((0,) * count, (straight,) * count)]
         seen, first = set(plans), None
-        for _ in range(_MOST_PLANS):
-            if not plans:
-                break
+        blocked: set[tuple[int, bool]] = set()
+        while plans and len(seen) <= _MOST_PLANS:
             plan = plans.pop(0)
+            if any(way in blocked for way in enumerate(plan.straight)):
+                continue
             way = self._checked(plan, goal, last)
             if way.overlap is None:
                 return way
             first = first or way
+            met = self._fingers_of(way.overlap)
+            if len(met) == 1:  # what it meets is there in every turn
+                blocked.add((met[0], plan.straight[met[0]]))
             for other in self._alternatives(plan, way.overlap):
                 if other not in seen:
                     seen.add(other)
@@ -192,8 +197,7 @@ class WayFinder:
 
     def _alternatives(self, plan: FingerPlan, overlap: PathOverlap) -> Iterator[FingerPlan]:
         """Yield plans that may avoid an overlap: one of two fingers waits, or a finger goes along its closing path."""
-        met = [self._finger_of(overlap.link), None if overlap.with_object else self._finger_of(overlap.other)]
-        fingers = [f for f in dict.fromkeys(met) if f is not None]
+        fingers = self._fingers_of(overlap)
         if len(fingers) == 2 and plan.turn[fingers[0]] == plan.turn[fingers[1]]:
             # The finger that was closed later waits first.
             for waits in sorted(fingers, key=self._rank, reverse=True):
@@ -206,6 +210,10 @@ class WayFinder:
             swapped = list(plan.turn)
             swapped[earlier], swapped[later] = plan.turn[later], plan.turn[earlier]
             yield replace(plan, turn=tuple(swapped))
+
+    def _fingers_of(self, overlap: PathOverlap) -> list[int]:
+        met = [self._finger_of(overlap.link), None if overlap.with_object else self._finger_of(overlap.other)]
+        return [f for f in dict.fromkeys(met) if f is not None]
 
     def _rank(self, finger: int) -> int:
         names = list(self.solution.fingers)
