@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
@@ -26,7 +26,9 @@ _UNEVEN: Final = 1e4
 _UNCOUPLED: Final = 1e-7
 
 
-def plan_landing(solution: GraspSolution, hand: Hand, clearance: float = CLEARANCE) -> FloatArray | None:
+def plan_landing(
+    solution: GraspSolution, hand: Hand, clearance: float = CLEARANCE, resting: Collection[int] = ()
+) -> FloatArray | None:
     """Return the posture from which a straight line in joint space reaches all contacts of all fingers at once.
 
     At the touch every contact of a finger comes near at the same speed, as far as its joints allow: the rates follow
@@ -34,6 +36,7 @@ def plan_landing(solution: GraspSolution, hand: Hand, clearance: float = CLEARAN
 
     Args:
         solution: the solution. hand: what it was computed for. clearance: of every contact at the start [m].
+        resting: indices of joints that stay as they are.
 
     Returns:
         joint angles [rad], shape (J,); None when the joints of a finger cannot take all of its contacts off at once.
@@ -44,7 +47,7 @@ def plan_landing(solution: GraspSolution, hand: Hand, clearance: float = CLEARAN
     for finger in hand.fingers:
         contacts = [c for c in solution.contacts if not c.passed and hand.link_index(c.link) in finger.links]
         if contacts:
-            rates = _opening(solution, hand, finger, contacts, q, dofs, clearance)
+            rates = _opening(solution, hand, finger, contacts, q, (dofs, resting), clearance)
             if rates is None:
                 return None
             start += clearance * rates
@@ -63,12 +66,13 @@ def _opening(
     finger: Finger,
     contacts: Sequence[Contact],
     q: FloatArray,
-    dofs: DegreesOfFreedom,
+    free: tuple[DegreesOfFreedom, Collection[int]],
     clearance: float,
 ) -> FloatArray | None:
     """Return rates of all joints per distance [rad/m], shape (J,), at which a finger's contacts come off, or None."""
+    dofs, resting = free
     rows = _normal_rows(solution, hand, contacts, q, dofs)
-    own = [d for d, j in enumerate(dofs.joints) if j in finger.joints]
+    own = [d for d, j in enumerate(dofs.joints) if j in finger.joints and j not in resting]
     closing = [d for d in own if hand.joints[dofs.joints[d]].role is JointRole.CLOSING]
     for used in (closing, own):
         rates = _even_rates(rows[:, used], *_room(hand, q, dofs, used, clearance))

@@ -59,19 +59,19 @@ class Trajectory:
 
     @property
     def touches_at_once(self) -> bool:
-        """Whether all fingers touch at the same moment: from a pregrasp, or where one turn has all fingers."""
-        return self.pregrasp is not None or len(self.turns) <= 1
+        """Whether all fingers touch at the same moment: from a pregrasp, or where one finger alone moves."""
+        return self.pregrasp is not None or sum(map(len, self.turns)) <= 1
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences about fingers that wait, and about fingers that do not touch at the same moment."""
-        if len(self.turns) <= 1:
-            return ()
-        order = ", then ".join(" and ".join(f"'{name}'" for name in turn) for turn in self.turns)
-        waits = f"Fingers wait for each other, so that they do not meet: {order}."
-        if self.touches_at_once:
-            return (waits,)
-        return (waits, "The fingers do not touch at the same moment, so the object may be pushed.")
+        found = []
+        if len(self.turns) > 1:
+            order = ", then ".join(" and ".join(f"'{name}'" for name in turn) for turn in self.turns)
+            found.append(f"Fingers wait for each other, so that they do not meet: {order}.")
+        if not self.touches_at_once:
+            found.append("The path has no pregrasp: fingers may touch one after another, and push the object.")
+        return tuple(found)
 
     @property
     def duration(self) -> float:

@@ -34,7 +34,7 @@ STAGE_STEPS: Final = 8
 #: Way-points of a path on which all joints move at once, besides those at which one stops.
 AT_ONCE_STEPS: Final = 32
 #: Where no way to a pregrasp is free, one nearer to the touch is tried: shares of the clearance [-].
-_CLEARANCES: Final = (1.0, 0.4, 0.1)
+_CLEARANCES: Final = (1.0, 0.25)
 #: So many plans are checked for one pregrasp at most.
 _MOST_PLANS: Final = 24
 #: Times [s], shape (N,), and postures [rad], shape (N, J).
@@ -124,13 +124,27 @@ class WayFinder:
 
     def _landing(self, clearance: float) -> tuple[FloatArray, _Part] | None:
         """Return a pregrasp and the straight line from there to all contacts at once; None where it is not free."""
-        goal = plan_landing(self.solution, self.hand, clearance)
-        # From the touch on, which is free: links that overlap where a path begins would be let apart.
-        if goal is None or self.overlap(np.array([self.end, goal])) is not None:
+        goal = self._pregrasp(clearance)
+        if goal is None:
             return None
         slow = np.minimum(self.pace[0], np.abs(self.end - goal) * (LANDING_SPEED / clearance))
         line = time_path([np.array([goal, self.end])], slow, self.pace[1])
         return goal, _joined([line], self.end, [range(len(self.end))])
+
+    def _pregrasp(self, clearance: float) -> FloatArray | None:
+        """Return a posture from which the straight line to the touch is free; a joint rests where that helps."""
+        choices: list[tuple[int, ...]] = [()]
+        for resting in choices:
+            goal = plan_landing(self.solution, self.hand, clearance, resting)
+            if goal is None:
+                continue
+            # From the touch on, which is free: links that overlap where a path begins would be let apart.
+            overlap = self.overlap(np.array([self.end, goal]))
+            if overlap is None:
+                return goal
+            if not resting:
+                choices += [(j,) for f in self._fingers_of(overlap) for j in self.hand.fingers[f].joints]
+        return None
 
     def begun_at(self, start: FloatArray) -> WayFinder:
         """Return the same search from another posture."""
