@@ -149,15 +149,23 @@ def _is_whole(found: Mapping[str, NDArray[Any]], names: Mapping[str, Any], rows:
     shapes = {
         **dict.fromkeys(_OF_CONTACTS, (contacts,)),
         **dict.fromkeys(PER_POSE, (poses,)),
-        **{"contact_first": (poses + 1,), "contact_position": (contacts, 3), "contact_normal": (contacts, 3)},
-        **{"hand_poses": (poses, 7), "object_poses": (poses, 7), "joint_angles": (poses, joints)},
-        **{"finger_codes": (poses, fingers), "planes": (poses, fingers)},
+        "contact_first": (poses + 1,),
+        "contact_position": (contacts, 3),
+        "contact_normal": (contacts, 3),
+        "hand_poses": (poses, 7),
+        "object_poses": (poses, 7),
+        "joint_angles": (poses, joints),
+        "finger_codes": (poses, fingers),
+        "planes": (poses, fingers),
     }
     if any(found[key].shape != shape or found[key].dtype.kind == "U" for key, shape in shapes.items()):
         return False
     counts = {
-        **{"status_codes": len(STATUSES), "finger_codes": len(FINGER_STATUSES)},
-        **{"contact_finger": fingers, "contact_link": len(names["link_names"]), "contact_joint": joints},
+        "status_codes": len(STATUSES),
+        "finger_codes": len(FINGER_STATUSES),
+        "contact_finger": fingers,
+        "contact_link": len(names["link_names"]),
+        "contact_joint": joints,
         "contact_body": len(names["body_names"]),
     }
     first = found["contact_first"]

@@ -83,8 +83,12 @@ class SavedBatch:
         """Check that the arrays fit each other, and that text is text."""
         poses, joints, fixed = (self._arrays[key].size for key in ("status", "joint_names", "preshape_joints"))
         shapes = {
-            **{"status": (poses,), "joint_names": (joints,), "preshape_joints": (fixed,)},
-            **{"hand_poses": (poses, 7), "object_poses": (poses, 7), "joint_angles": (poses, joints)},
+            "status": (poses,),
+            "joint_names": (joints,),
+            "preshape_joints": (fixed,),
+            "hand_poses": (poses, 7),
+            "object_poses": (poses, 7),
+            "joint_angles": (poses, joints),
         }
         # Without posture joints of their own, batches have an array without rows.
         shapes["preshape_angles"] = (fixed, poses) if fixed else (0,)
