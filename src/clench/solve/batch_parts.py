@@ -108,7 +108,8 @@ class BatchParts:
         if not _is_whole(found, names, rows):
             return None
         contacts = BatchContacts(**{f.name: found[f"contact_{f.name}"] for f in fields(BatchContacts)})
-        return GraspBatch(**names, **{name: found[name] for name in PER_POSE}, contacts=contacts)
+        columns: dict[str, Any] = {name: found[name] for name in PER_POSE}
+        return GraspBatch(**names, **columns, contacts=contacts)
 
     @property
     def _question(self) -> Path:
