@@ -122,8 +122,41 @@ def poses(path: str) -> None:
     raise SystemExit(main(["batch", "--hand", "patent15", "--object", "ball", "--poses", path]))
 
 
-_ANSWERS = (hand, solve, execute, record, poses)
-_LOADERS = (thing, command, solution, trajectory, grasps, calibration, hand_file, joint_map)
+def export(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    out = Path(path).parent / "out.yaml"
+    code = main(["export", path, "--out", str(out)])
+    if code and out.exists():
+        raise AssertionError("something was written")
+    raise SystemExit(code)
+
+
+def examples(path: str) -> None:
+    from clench.apps.cli.main import main
+
+    raise SystemExit(main(["calibrate", path]))
+
+
+def moved(path: str) -> None:
+    """Tell a hand in a simulation a trajectory, which must not move it."""
+    import clench
+    from clench.execution.simulation import SimulatedHand
+
+    from .data import good_solution
+
+    hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
+    solution = clench.GraspSolution.from_dict(json.loads(good_solution()))
+    trajectory = clench.Trajectory.load(path)
+
+    def on_step(*_: Any) -> None:
+        raise AssertionError("it moved")
+
+    SimulatedHand(hand, ball, on_step=on_step).carry_out(solution, trajectory)
+
+
+_ANSWERS = (hand, solve, execute, record, poses, export, examples)
+_LOADERS = (thing, command, solution, trajectory, moved, grasps, calibration, hand_file, joint_map)
 READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in (*_ANSWERS, *_LOADERS)}
 
 

@@ -236,6 +236,32 @@ def trajectory(times: Any = (0.0, 1.0), angles: Any = (0.0, 0.1), **changed: Any
     return json.dumps({"schema": "clench.trajectory/1", **document, **changed})
 
 
+def planned_with(change: Callable[[dict[str, Any]], None]) -> Writer:
+    """Return a writer of a trajectory as it was planned, but for a change."""
+
+    def write(folder: Path) -> Path:
+        import clench
+
+        hand, solution = clench.Hand.load("patent15"), clench.GraspSolution.from_dict(json.loads(good_solution()))
+        document = clench.plan_trajectory(solution, hand).to_dict()
+        change(document)
+        (folder / "t.json").write_text(json.dumps(document))
+        return folder / "t.json"
+
+    return write
+
+
+def bend(point: int, angle: float) -> Callable[[dict[str, Any]], None]:
+    """Return a change of all angles of a way-point, so slow that no limit of velocity is passed."""
+
+    def change(document: dict[str, Any]) -> None:
+        for i, each in enumerate(document["points"]):
+            each["time"] = 100.0 * i
+        document["points"][point]["positions"] = [angle] * len(document["joints"])
+
+    return change
+
+
 TOML_KEYS = ".".join(["a"] * 20_000)
 
 REFUSED: dict[str, tuple[str, Writer]] = {
@@ -290,6 +316,29 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "trajectory early": ("trajectory", file("t.json", trajectory([-1e300, 1.0]))),
     "trajectory deep": ("trajectory", file("trajectory.json", LESS_DEEP)),
     "trajectory endless": ("trajectory", endless_file("trajectory.json")),
+    "trajectory twice": ("trajectory", file("t.json", trajectory(joints=["a", "a"]))),
+    "trajectory hurried": ("trajectory", file("t.json", trajectory([0.0, 1e-3], [0.0, 1.0]))),
+    "trajectory nan": ("trajectory", file("t.json", trajectory([0.0, 1.0], [0.0, float("nan")]))),
+    "trajectory many angles": ("trajectory", planned_with(lambda d: d["points"][1].update(positions=[0.0] * 10**6))),
+    "trajectory many points": ("trajectory", planned_with(lambda d: d.update(points=d["points"][:1] * 50_000))),
+    "moved limits": ("moved", planned_with(bend(2, 50.0))),
+    "moved touch": ("moved", planned_with(bend(-1, 0.1))),
+    "moved hand": ("moved", planned_with(lambda d: d.update(hand="other"))),
+    "moved joints": ("moved", planned_with(lambda d: d["joints"].reverse())),
+    "moved joint": ("moved", planned_with(lambda d: d["joints"].__setitem__(0, "toe\x1b[31m"))),
+    "examples deep": ("examples", file("e.json", LISTS)),
+    "examples device": ("examples", link("e.json", "/dev/zero")),
+    "examples record": (
+        "examples",
+        file("e.json", json.dumps({"schema": "clench.examples/1", "record": "/dev/zero", "pairs": []})),
+    ),
+    "examples long record": (
+        "examples",
+        file("e.json", json.dumps({"schema": "clench.examples/1", "record": "a" * 5000, "pairs": []})),
+    ),
+    "executed long names": ("execute", solution_with(lambda d: d.update(hand_model="a/" * 5000 + "b.xml"))),
+    "executed long object": ("execute", solution_with(lambda d: d.update(object_model="a" * 5000 + ".stl"))),
+    "examples nan": ("examples", file("e.json", '{"schema": "clench.examples/1", "x": NaN}')),
     "calibration deep": ("calibration", file("weights.toml", "x = " + LISTS)),
     "calibration deep keys": ("calibration", file("weights.toml", f"{TOML_KEYS} = 1")),
     "calibration endless": ("calibration", endless_file("weights.toml")),

@@ -222,6 +222,9 @@ REFUSED: dict[str, Writer] = {
     "glb file address": far_buffer("file:///etc/passwd"),
     "glb bad data": far_buffer("data:application/octet-stream;base64,!!!!"),
     "glb lengths": file("thing.glb", struct.pack("<IIIII", 0x46546C67, 2, 2**32 - 1, 2**32 - 1, GLB_JSON) + b"{}"),
+    "gltf elsewhere": file(
+        "thing.gltf", '{"asset": {"version": "2.0"}, "buffers": [{"uri": "../../../etc/passwd", "byteLength": 64}]}'
+    ),
     "glb zipped": file("thing.glb", zipped("thing.glb", "a.stl", 1 << 20)),
 }
 

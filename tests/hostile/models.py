@@ -1,5 +1,6 @@
 """Hand models that were made to do harm, by name: each writes its files into a folder and returns the one to load."""
 
+import os
 import struct
 import zlib
 from collections.abc import Callable
@@ -73,6 +74,25 @@ def linked_to_a_device(folder: Path) -> Path:
     path = mjcf()(folder)
     (folder / "link.stl").unlink()
     (folder / "link.stl").symlink_to("/dev/zero")
+    return path
+
+
+def linked_mesh(target: str, named: str = "link.stl") -> Writer:
+    """Return a writer of a URDF whose mesh is a symbolic link."""
+
+    def write(folder: Path) -> Path:
+        path = urdf("link.stl", named)(folder)
+        (folder / "link.stl").unlink()
+        (folder / "link.stl").symlink_to(target)
+        return path
+
+    return write
+
+
+def mesh_from_a_pipe(folder: Path) -> Path:
+    path = urdf("link.stl", "package://hand/link.stl")(folder)
+    (folder / "link.stl").unlink()
+    os.mkfifo(folder / "link.stl")
     return path
 
 
@@ -292,6 +312,25 @@ REFUSED: dict[str, Writer] = {
     "urdf damping": urdf('<limit lower="-0.2"', '<dynamics damping="nan" friction="inf"/><limit lower="-0.2"'),
     "urdf far mesh": urdf("link.stl", "http://127.0.0.1:9/link.stl"),
     "urdf package of the system": urdf("link.stl", "package://etc/passwd"),
+    "urdf package of a device": urdf("link.stl", "package://hand/../../../../../../../../dev/zero"),
+    "urdf package of a linked device": linked_mesh("/dev/zero", "package://hand/link.stl"),
+    "urdf package of a pipe": mesh_from_a_pipe,
+    "urdf package climbing": urdf("link.stl", "package://../../../../../../../../etc/passwd"),
+    "urdf package of nothing": urdf("link.stl", "package://"),
+    "urdf package of long names": urdf("link.stl", "package://" + "a/" * 100_000 + "b.stl"),
+    "urdf linked device": linked_mesh("/dev/zero"),
+    "urdf linked to itself": linked_mesh("link.stl"),
+    "urdf linked to a text": linked_mesh("/etc/passwd"),
+    "urdf linked to a folder": linked_mesh("/"),
+    "urdf file of a device": urdf("link.stl", "file:///dev/zero"),
+    "urdf long name": urdf("link.stl", "a" * 5000 + ".stl"),
+    "mjcf long name": mjcf("link.stl", "a" * 5000 + ".stl"),
+    "includes a long name": mjcf(head=f'<include file="{"a" * 5000}.xml"/>'),
+    "urdf gltf elsewhere": with_file(
+        urdf("link.stl", "l.gltf"),
+        "l.gltf",
+        b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "/etc/passwd", "byteLength": 64}]}',
+    ),
     "urdf 3mf": with_file(urdf("link.stl", "l.3mf"), "l.3mf", b"PK\x03\x04" + bytes(60)),
     "urdf archive": with_file(urdf("link.stl", "l.dae"), "l.dae", b"PK\x03\x04" + bytes(60)),
     "urdf laughing mesh": with_file(

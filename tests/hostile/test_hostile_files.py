@@ -2,13 +2,14 @@
 
 import pytest
 
-from . import data, meshes, models
+from . import archives, data, meshes, models
 from .apart import Outcome, read_apart
 
 SOURCES = {
     "models": {name: ("hand", write) for name, write in models.REFUSED.items()},
     "meshes": {name: ("thing", write) for name, write in meshes.REFUSED.items()},
     "data": data.REFUSED,
+    "archives": archives.REFUSED,
     "harmless": {
         **{name: ("hand", write) for name, write in models.HARMLESS.items()},
         **{name: ("thing", write) for name, write in meshes.HARMLESS.items()},
@@ -35,7 +36,7 @@ def outcomes(tmp_path_factory):
     return of
 
 
-REFUSED = [(source, name) for source in ("models", "meshes", "data") for name in SOURCES[source]]
+REFUSED = [(source, name) for source in ("models", "meshes", "data", "archives") for name in SOURCES[source]]
 
 
 @pytest.mark.parametrize(("source", "name"), REFUSED, ids=[" ".join(pair) for pair in REFUSED])

@@ -75,6 +75,30 @@ def test_a_damaged_part_is_solved_again(asked, tmp_path, monkeypatch):
     assert ended.read_bytes() == whole.read_bytes()
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"joint_angles": np.zeros((2, 99))},
+        {"status_codes": np.array([100, 100], dtype=np.int8)},
+        {"contact_link": np.array([9999])},
+        {"contact_first": np.array([0, 10**9, 0])},
+        {"certified": np.array(["yes", "no"])},
+        {"planes": None},
+    ],
+    ids=["angles", "status", "contacts", "places", "text", "missing"],
+)
+def test_a_part_whose_arrays_do_not_fit_is_solved_again(asked, tmp_path, monkeypatch, changed):
+    whole, ended = tmp_path / "whole.npz", tmp_path / "ended.npz"
+    clench.solve_batch(*asked, PLANES, chunk=2, out=whole)
+    begin(asked, ended, monkeypatch)
+    first = min(parts_folder(ended).glob("*.npz"))
+    with np.load(first) as found:
+        arrays = {**found, **changed}
+    np.savez(first, **{name: array for name, array in arrays.items() if array is not None})
+    clench.solve_batch(*asked, PLANES, chunk=2, out=ended)
+    assert ended.read_bytes() == whole.read_bytes()
+
+
 def test_parts_of_another_batch_are_refused(asked, tmp_path, monkeypatch):
     out = tmp_path / "grasps.npz"
     hand, obj, poses = asked

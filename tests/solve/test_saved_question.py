@@ -34,7 +34,7 @@ def test_files_that_are_no_batches(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="no such file"):
         SavedBatch(tmp_path / "absent.npz")
     (tmp_path / "b.npz").write_text("no")
-    with pytest.raises(FileError, match="not a batch"):
+    with pytest.raises(FileError, match="not a NumPy archive"):
         SavedBatch(tmp_path / "b.npz")
     np.savez(tmp_path / "b.npz", schema="clench.batch/1", status=np.array(["grasp"]))
     with pytest.raises(FileError, match=r"command: missing; the batch was saved without what it was asked"):

@@ -21,8 +21,10 @@ JSON_BYTES: Final = 16 * _MB
 TOML_BYTES: Final = 1 * _MB
 #: A YAML file of grasps [bytes].
 YAML_BYTES: Final = 8 * _MB
-#: An npy file of poses [bytes].
+#: An npy file of poses, or the arrays of an npz file, unpacked [bytes].
 ARRAY_BYTES: Final = 1024 * _MB
+#: The list of names at the end of an npz file [bytes].
+ARCHIVE_LIST_BYTES: Final = 1 * _MB
 #: An npy file with a pickled dictionary of grasps [bytes].
 PICKLE_BYTES: Final = 8 * _MB
 

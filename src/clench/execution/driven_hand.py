@@ -30,6 +30,7 @@ from .joint_map import JointMap, MappedJoint
 from .report import ExecutionReport
 from .supervision import Event, ExecutionRefusedError, State, Supervision, supervision_of
 from .trajectory import Trajectory
+from .trajectory_checks import check_for_hand
 
 #: How often a stop looks whether a command on its way has arrived [s].
 WAITING = 0.005
@@ -153,12 +154,12 @@ class DrivenHand:
         Nothing is sent, and the report says why, when a stop is in force or the driver is in use.
 
         Raises:
-            CommandError: the solution or the joint map does not fit the hand. UnknownNameError: the controller lacks
-                a joint. KeyboardInterrupt: and whatever else is no error of the driver; the hand was stopped before,
-                and `last_report` says what was sent.
+            CommandError: the solution, the trajectory or the joint map does not fit the hand. UnknownNameError: the
+                controller lacks a joint. KeyboardInterrupt: and whatever else is no error of the driver; the hand was
+                stopped before, and `last_report` says what was sent.
         """
         done = Done(self.joint_map.of(self.hand), obj=self.obj)
-        posture(solution.joint_angles, self.hand, "joint_angles")
+        check_for_hand(trajectory, solution, self.hand)
         session = DriverSession(self.driver)
         raised: BaseException | None = None
         try:

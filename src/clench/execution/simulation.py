@@ -26,6 +26,7 @@ from .scene import TIMESTEP, Scene, body_pose, build_scene
 from .stepping import Stepper
 from .touching import TouchWatch
 from .trajectory import Trajectory
+from .trajectory_checks import check_for_hand
 
 #: How long the hand stands still after the motion [s], so that the servos settle.
 SETTLING = 0.4
@@ -86,9 +87,10 @@ class SimulatedHand:
         """Open, follow the trajectory, stand still for a moment, compare with the solution; test the hold if asked.
 
         Raises:
-            HandError: the hand cannot be simulated. ObjectError: the object cannot. CommandError: the solution is
-                of another hand.
+            HandError: the hand cannot be simulated. ObjectError: the object cannot. CommandError: the solution or
+                the trajectory does not fit the hand.
         """
+        check_for_hand(trajectory, solution, self.hand)
         computed = posture(solution.joint_angles, self.hand, "joint_angles")
         obj = self.obj.posed(solution.object_pose)
         start = trajectory.positions[0]

@@ -20,7 +20,7 @@ from .landing import CLEARANCE
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
 from .step_check import refuse_after
 from .timing import ACCELERATION
-from .trajectory_checks import check_points, check_rates
+from .trajectory_checks import check_joints, check_points, check_rates, check_velocities
 from .way_to_touch import WayFinder, refuse_way
 
 SCHEMA = "clench.trajectory/1"
@@ -240,6 +240,7 @@ def _read(data: Any, source: str) -> Trajectory:
         raise FileError(source, f"{str(error).replace('`', chr(39))}.") from None
     check_rates(source, form.speed, form.acceleration, form.velocity_limits)
     check_points(source, [(p.time, p.positions) for p in form.points])
+    check_joints(source, form.joints)
     count = len(form.joints)
     if not form.points:
         raise FileError(source, "points: expected at least one.")
@@ -252,6 +253,7 @@ def _read(data: Any, source: str) -> Trajectory:
             raise FileError(source, f"points[{i}].time: expected more than {form.points[i - 1].time} s.")
     times = np.array([p.time for p in form.points])
     positions = np.array([p.positions for p in form.points]).reshape(len(form.points), count)
+    check_velocities(source, form.joints, times, positions, np.array(form.velocity_limits))
     phases = [(p.phase, p.step) for p in form.points]
     last = next((i for i, (phase, _) in enumerate(phases) if phase in AFTER_TOUCH), len(phases)) - 1
     if last < 0:

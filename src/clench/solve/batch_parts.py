@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -11,16 +10,19 @@ from typing import Any, Final
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
+from clench.base.array_files import read_arrays
 from clench.base.errors import FileError
 from clench.base.fingerprint import fingerprint
 from clench.base.json_files import check_folder, check_writable, read_json, write_json
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.calibration import calibration_of
 
-from .grasp_batch import PER_POSE, BatchContacts, GraspBatch, Question
+from .grasp_batch import FINGER_STATUSES, PER_POSE, STATUSES, BatchContacts, GraspBatch, Question
 
 SCHEMA: Final = "clench.batch_parts/1"
+_OF_CONTACTS: Final = tuple(f"contact_{f.name}" for f in fields(BatchContacts))
 #: What of a hand plays no part in a solve.
 _UNUSED: Final = frozenset({"path", "findings", "spec_xml", "assets"})
 
@@ -100,14 +102,14 @@ class BatchParts:
     def _read(self, number: int, names: Mapping[str, Any], rows: FloatArray) -> GraspBatch | None:
         """Return a part that is there and whole, or None."""
         try:
-            with np.load(self._part(number), allow_pickle=False) as data:
-                columns = {name: data[name] for name in PER_POSE}
-                contacts = {f.name: data[f"contact_{f.name}"] for f in fields(BatchContacts)}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            found = read_arrays(self._part(number), (*PER_POSE, *_OF_CONTACTS))
+        except FileError:
             return None
-        if not np.array_equal(columns["hand_poses"], rows):
+        if not _is_whole(found, names, rows):
             return None
-        return GraspBatch(**names, **columns, contacts=BatchContacts(**contacts))
+        contacts = BatchContacts(**{f.name: found[f"contact_{f.name}"] for f in fields(BatchContacts)})
+        columns: dict[str, Any] = {name: found[name] for name in PER_POSE}
+        return GraspBatch(**names, **columns, contacts=contacts)
 
     @property
     def _question(self) -> Path:
@@ -137,6 +139,42 @@ class BatchParts:
                 f"poses, command or version differ; {advice}",
             )
         return note
+
+
+def _is_whole(found: Mapping[str, NDArray[Any]], names: Mapping[str, Any], rows: FloatArray) -> bool:
+    """Return whether arrays are those of a part: all of them, of these poses, and with numbers that mean something."""
+    if found.keys() != {*PER_POSE, *_OF_CONTACTS} or not np.array_equal(found["hand_poses"], rows):
+        return False
+    poses, joints, fingers = len(rows), len(names["joint_names"]), len(names["finger_names"])
+    contacts = found["contact_finger"].size
+    shapes = {
+        **dict.fromkeys(_OF_CONTACTS, (contacts,)),
+        **dict.fromkeys(PER_POSE, (poses,)),
+        "contact_first": (poses + 1,),
+        "contact_position": (contacts, 3),
+        "contact_normal": (contacts, 3),
+        "hand_poses": (poses, 7),
+        "object_poses": (poses, 7),
+        "joint_angles": (poses, joints),
+        "finger_codes": (poses, fingers),
+        "planes": (poses, fingers),
+    }
+    if any(found[key].shape != shape or found[key].dtype.kind == "U" for key, shape in shapes.items()):
+        return False
+    counts = {
+        "status_codes": len(STATUSES),
+        "finger_codes": len(FINGER_STATUSES),
+        "contact_finger": fingers,
+        "contact_link": len(names["link_names"]),
+        "contact_joint": joints,
+        "contact_body": len(names["body_names"]),
+    }
+    first = found["contact_first"]
+    return (
+        all(found[key].max(initial=0) < count for key, count in counts.items())
+        and (first[0], first[-1]) == (0, contacts)
+        and bool((np.diff(first) >= 0).all())
+    )
 
 
 def parts_folder(path: str | Path) -> Path:

@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,7 +142,7 @@ def solve_scores(solution: GraspSolution) -> dict[str, float]:
 
 
 def _existing(path: Path) -> Record:
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise FileError(path, "no such record.")
     return Record(path)
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from clench.base.array_files import read_arrays
 from clench.base.errors import CommandError, FileError
+from clench.base.json_files import parse_json
 from clench.base.pose import Pose
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ _KEYS: Final = (
     *("schema", "command", "hand_model", "object_model", "object_scale", "object_collision_source", "preshape_joints"),
     *("preshape_angles", "status", "hand_poses", "object_poses", "joint_names", "joint_angles"),
 )
+_NUMBERS: Final = ("object_scale", "preshape_angles", "hand_poses", "object_poses", "joint_angles")
+_TEXTS: Final = frozenset(_KEYS) - frozenset(_NUMBERS)
 
 
 def question_arrays(question: Question) -> dict[str, np.ndarray[Any, Any]]:
@@ -55,30 +57,48 @@ class SavedBatch:
         path: the file.
 
     Raises:
-        FileError: missing, no such file, or one that was saved without its command.
+        FileError: missing, no batch, arrays that do not fit each other, or saved without its command.
     """
 
     def __init__(self, path: str | Path) -> None:
         from .grasp_batch import SCHEMA
 
         self.path = Path(path)
-        try:
-            with np.load(self.path, allow_pickle=False) as data:
-                self._arrays = {key: data[key] for key in _KEYS if key in data.files}
-        except FileNotFoundError:
-            raise FileError(path, "no such file.") from None
-        except (OSError, ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
-            raise FileError(path, f"not a batch ({error}).") from None
+        self._arrays = read_arrays(self.path, _KEYS)
         if str(self._arrays.get("schema")) != SCHEMA:
             raise FileError(path, f"schema: expected '{SCHEMA}', got '{self._arrays.get('schema')}'.")
         missing = next((key for key in _KEYS if key not in self._arrays), None)
         if missing is not None:
             raise FileError(path, f"{missing}: missing; the batch was saved without what it was asked. Solve it again.")
-
+        self._check_shapes()
+        self._document = parse_json(str(self._arrays["command"]).encode(), f"{path}: command")
+        if not isinstance(self._document, dict):
+            raise FileError(path, "command: expected a JSON object.")
         self.hand_model = str(self._arrays["hand_model"])
         self.object_model = str(self._arrays["object_model"])
         self.object_scale = float(self._arrays["object_scale"])
         self.object_collision_source = str(self._arrays["object_collision_source"])
+
+    def _check_shapes(self) -> None:
+        """Check that the arrays fit each other, and that text is text."""
+        poses, joints, fixed = (self._arrays[key].size for key in ("status", "joint_names", "preshape_joints"))
+        shapes = {
+            "status": (poses,),
+            "joint_names": (joints,),
+            "preshape_joints": (fixed,),
+            "hand_poses": (poses, 7),
+            "object_poses": (poses, 7),
+            "joint_angles": (poses, joints),
+        }
+        # Without posture joints of their own, batches have an array without rows.
+        shapes["preshape_angles"] = (fixed, poses) if fixed else (0,)
+        for key, array in self._arrays.items():
+            expected = shapes.get(key, ())
+            if array.shape != expected:
+                raise FileError(self.path, f"{key}: expected an array of shape {expected}, got {array.shape}.")
+            if (array.dtype.kind == "U") != (key in _TEXTS):
+                what = "text" if key in _TEXTS else "numbers"
+                raise FileError(self.path, f"{key}: expected {what}, got {array.dtype.name}.")
 
     def solutions(self, hand: Hand, obj: GraspObject) -> Iterator[GraspSolution]:
         """Yield the poses that are grasps, solved again.
@@ -92,7 +112,7 @@ class SavedBatch:
         from .solution import SolutionStatus
 
         arrays = self._arrays
-        document = json.loads(str(arrays["command"]))
+        document = self._document
         for i in np.flatnonzero(arrays["status"] == SolutionStatus.GRASP.value):
             try:
                 postures = dict(zip(arrays["preshape_joints"].tolist(), arrays["preshape_angles"], strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -60,9 +61,9 @@ def object_folder(solution: GraspSolution) -> str:
     It is empty for an object that was not read from a file.
     """
     model = Path(solution.object_model)
-    if not (model.is_file() or len(model.parts) > 1):
+    if not (os.path.isfile(model) or len(model.parts) > 1):
         return ""
-    return str(next((folder for folder in model.parents if (folder / _MARK).is_file()), model.parent))
+    return str(next((folder for folder in model.parents if os.path.isfile(folder / _MARK)), model.parent))
 
 
 def read_dexgraspbench(path: str | Path) -> list[GraspPosture]:

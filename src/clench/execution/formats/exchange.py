@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -126,7 +127,7 @@ def export_grasps(
 
 def _files(path: Path, count: int) -> tuple[Path, ...]:
     """Return the files of so many grasps, one each; make their folder."""
-    if path.suffix and not path.is_dir():
+    if path.suffix and not os.path.isdir(path):
         if count > 1:
             raise CommandError(
                 f"dexgraspbench: one file holds one grasp; {count} solutions were given for '{path}'. "
@@ -162,7 +163,7 @@ def _format(path: str | Path, given: GraspFormat | str | None) -> GraspFormat:
         if given not in list(GraspFormat):
             raise UnknownNameError("format", str(given), "clench", [f.value for f in GraspFormat])
         return GraspFormat(given)
-    if not Path(path).suffix or Path(path).is_dir():
+    if not Path(path).suffix or os.path.isdir(path):
         return GraspFormat.DEXGRASPBENCH
     ending = Path(path).suffix.lower()
     if ending not in _ENDINGS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Iterable
@@ -44,7 +45,7 @@ class MeshStore:
             FileError: none exists, or it cannot be converted.
         """
         places = list(candidates)
-        file = next((p for p in places if p.is_file()), None)
+        file = next((p for p in places if os.path.isfile(p)), None)
         if file is None:
             looked = ", ".join(str(p) for p in places[:3])
             kind = "mesh" if is_mesh else "file"

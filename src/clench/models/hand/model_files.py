@@ -202,7 +202,7 @@ def _expand_includes(root: ET.Element, main: Path, sizes: dict[Path, int]) -> No
 
 def _included(named: str, main: Path, sizes: dict[Path, int]) -> ET.Element:
     file = main.parent / named
-    if not file.is_file():
+    if not os.path.isfile(file):  # a name from a file may be one that no file can have
         raise FileError(main, f"included file '{named}' is missing; looked for {file}.")
     if file.resolve() in sizes:
         raise FileError(main, f"file '{named}' is included twice; MuJoCo allows each file once.")
