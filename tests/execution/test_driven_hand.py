@@ -372,7 +372,8 @@ def test_the_squeeze_of_a_tendon_driven_hand(pincer: Hand, solution: GraspSoluti
         assert not hasattr(driver, "pulled")
         assert driver.stops == 0
     plain = FakeDriver(OPEN)
-    assert not any("tendons" in note for note in run(plain, hand, planned).notes)  # a driver without tendons is asked nothing
+    asked_nothing = run(plain, hand, planned)  # a driver without tendons
+    assert not any("tendons" in note for note in asked_nothing.notes)
 
 
 def test_after_a_stop_no_tendon_is_pulled(
