@@ -7,7 +7,8 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,23 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_FILE_LINES = 400
 MAX_BODY_LINES = 60
 
-in_every_file = pytest.mark.parametrize("path", FILES, ids=[str(f.relative_to(PACKAGE)) for f in FILES])
+
+def shown(path: Path) -> str:
+    """Return a path as messages name it: from the root of the project."""
+    return str(path.relative_to(ROOT))
+
+
+def expect_none(wrong: Iterable[str]) -> None:
+    """Fail with every finding, one per line. Each finding names its file."""
+    found = list(wrong)
+    assert not found, "\n" + "\n".join(found)
+
+
+def findings(check: Callable[[str, Path], list[str]], paths: Iterable[Path] = FILES) -> list[str]:
+    """Return what a check finds in all files; a check takes the source and the path of one file."""
+    paths = list(paths)
+    assert len(paths) > 50, "the files of the package were not found"
+    return [finding for path in paths for finding in check(path.read_text(encoding="utf-8"), path)]
 
 
 def module_name(path: Path) -> str:
@@ -60,7 +77,7 @@ def upward_imports(source: str, path: Path) -> list[str]:
             targets = [n for n in names if n != "__version__"] or ([] if names else ["clench itself"])
         else:
             targets = [module.split(".")[1]]
-        wrong += [f"{path.name}:{line} imports {t}" for t in targets if t not in LAYERS or LAYERS.index(t) > own]
+        wrong += [f"{shown(path)}:{line} imports {t}" for t in targets if t not in LAYERS or LAYERS.index(t) > own]
     return wrong
 
 
@@ -87,7 +104,7 @@ def heavy_imports(source: str, path: Path) -> list[str]:
     for line, module in module_level_imports(ast.parse(source)):
         root = module.split(".")[0]
         if (root in HEAVY and root not in allowed) or (module.startswith("clench.kernels") and not in_kernels):
-            wrong.append(f"{path.name}:{line} imports {module}")
+            wrong.append(f"{shown(path)}:{line} imports {module}")
     return wrong
 
 
@@ -99,36 +116,45 @@ def long_bodies(source: str, path: Path) -> list[str]:
         body = node.body[1:] if ast.get_docstring(node, clean=False) is not None else node.body
         lines = body[-1].end_lineno - body[0].lineno + 1 if body else 0
         if lines > MAX_BODY_LINES:
-            wrong.append(f"{path.name}:{node.lineno} {node.name} has {lines} lines")
+            wrong.append(f"{shown(path)}:{node.lineno} the body of {node.name} has {lines} lines")
     return wrong
 
 
-@in_every_file
-def test_imports_point_down(path: Path) -> None:
-    assert upward_imports(path.read_text(), path) == []
+def long_files(source: str, path: Path) -> list[str]:
+    lines = len(source.splitlines())
+    return [f"{shown(path)} has {lines} lines"] if lines > MAX_FILE_LINES else []
 
 
-@in_every_file
-def test_heavy_packages_are_imported_where_used(path: Path) -> None:
-    assert heavy_imports(path.read_text(), path) == []
+def vague_names(_source: str, path: Path) -> list[str]:
+    return [f"{shown(path)} has the vague name {name}" for name in sorted(VAGUE & set(module_name(path).split(".")))]
 
 
-@in_every_file
-def test_sizes(path: Path) -> None:
-    source = path.read_text()
-    assert len(source.splitlines()) <= MAX_FILE_LINES
-    assert long_bodies(source, path) == []
+def test_imports_point_down() -> None:
+    expect_none(findings(upward_imports))
 
 
-@in_every_file
-def test_names_say_something(path: Path) -> None:
-    assert not VAGUE & set(module_name(path).split("."))
+def test_heavy_packages_are_imported_where_used() -> None:
+    expect_none(findings(heavy_imports))
+
+
+def test_files_are_short() -> None:
+    expect_none(findings(long_files))
+
+
+def test_function_bodies_are_short() -> None:
+    expect_none(findings(long_bodies))
+
+
+def test_names_say_something() -> None:
+    expect_none(findings(vague_names))
 
 
 def test_every_folder_is_a_layer() -> None:
-    folders = {p.name for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"}
-    assert folders <= set(LAYERS)
-    assert {p.name for p in PACKAGE.glob("*.py")} == {"__init__.py"}
+    folders = {p for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"}
+    expect_none(f"{shown(p)} is not a layer" for p in sorted(folders) if p.name not in LAYERS)
+    modules = set(PACKAGE.glob("*.py"))
+    assert PACKAGE / "__init__.py" in modules
+    expect_none(f"{shown(p)} is in no layer" for p in sorted(modules - {PACKAGE / "__init__.py"}))
 
 
 @pytest.mark.parametrize(
@@ -173,17 +199,25 @@ def test_the_other_checks_see_what_they_look_for() -> None:
     long = "def f():\n    '''Doc.'''\n" + "    x = 1\n" * MAX_BODY_LINES
     assert not long_bodies(long, path)
     assert long_bodies(long + "    x = 1\n", path)
+    assert not long_files("x = 1\n" * MAX_FILE_LINES, path)
+    assert long_files("x = 1\n" * (MAX_FILE_LINES + 1), path)
+    assert not vague_names("", path)
+    assert vague_names("", PACKAGE / "grasp" / "utils.py")
+    assert vague_names("", PACKAGE / "common" / "x.py")
 
 
 #: Compiled without counts of references.
 PLAIN_KERNELS = {"kernel", "inner_kernel"}
 
 
-def kernels(*decorators: str) -> dict[str, ast.FunctionDef]:
-    """Return the kernels with one of some decorators, by name."""
+Kernel = tuple[Path, ast.FunctionDef]
+
+
+def kernels(*decorators: str) -> dict[str, Kernel]:
+    """Return file and definition of the kernels with one of some decorators, by name."""
     return {
-        node.name: node
-        for path in (PACKAGE / "kernels").glob("*.py")
+        node.name: (path, node)
+        for path in sorted((PACKAGE / "kernels").glob("*.py"))
         for node in ast.parse(path.read_text(encoding="utf-8")).body
         if isinstance(node, ast.FunctionDef) and {ast.unparse(d) for d in node.decorator_list} & set(decorators)
     }
@@ -208,36 +242,44 @@ def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
     plain, counting = kernels(*PLAIN_KERNELS), kernels("allocating_kernel", "inner_allocating_kernel")
     assert len(plain) > 100
 
-    def with_arrays(functions: dict[str, ast.FunctionDef]) -> set[str]:
-        returned = {name: ast.unparse(node.returns or ast.Constant(None)) for name, node in functions.items()}
+    def with_arrays(functions: dict[str, Kernel]) -> set[str]:
+        returned = {name: ast.unparse(node.returns or ast.Constant(None)) for name, (_, node) in functions.items()}
         return {name for name, text in returned.items() if not set(re.findall(r"\w+", text)) <= numbers}
 
     # One that takes rows of what it is handed is for those alone that do not count either.
     rows, arrays = with_arrays(plain), with_arrays(counting)
     assert "mesh_of" in rows
     assert "make_work" in arrays
-    assert rows <= set(kernels("inner_kernel"))
+    inner = kernels("inner_kernel")
+    wrong = [f"{shown(plain[name][0])}: {name} returns arrays, and Python can call it" for name in rows - set(inner)]
     for functions, barred in ((plain, arrays), (counting, rows)):
-        for name, node in functions.items():
+        for name, (path, node) in functions.items():
             called = {c.func.id for c in ast.walk(node) if isinstance(c, ast.Call) and isinstance(c.func, ast.Name)}
-            assert not called & barred, f"{name} calls {called & barred}"
+            wrong += [f"{shown(path)}: {name} calls {other}" for other in sorted(called & barred)]
+    expect_none(wrong)
 
 
 def test_no_two_test_files_have_one_name() -> None:
-    # pytest collects only one of two modules of the same name, where their folders are no packages.
-    names = [path.name for path in Path(__file__).parent.rglob("test_*.py")]
-    assert sorted(set(names)) == sorted(names)
+    # Test folders are not packages, so pytest collects only one of two modules of the same name.
+    paths = sorted(Path(__file__).parent.rglob("test_*.py"))
+    count = Counter(path.name for path in paths)
+    expect_none(
+        f"{shown(path)} has a name that occurs {count[path.name]} times" for path in paths if count[path.name] > 1
+    )
 
 
 def test_python_never_imports_a_kernel_without_an_entry() -> None:
-    # Calling one from Python ends the process without a word.
+    # A call of such a kernel from Python ends the process without a message.
     inner = set(kernels("inner_kernel", "inner_allocating_kernel"))
     assert "close_group" in inner
     callers = [p for p in PACKAGE.rglob("*.py") if p.parent.name != "kernels"]
+    wrong = []
     for path in [*callers, *Path(__file__).parent.rglob("*.py")]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clench.kernels"):
-                assert not inner & {alias.name for alias in node.names}, path
+                names = sorted(inner & {alias.name for alias in node.names})
+                wrong += [f"{shown(path)}:{node.lineno} imports {name}" for name in names]
+    expect_none(wrong)
 
 
 #: What makes an array; a kernel without counts of references cannot, and says so only when its cache is empty.
@@ -256,9 +298,11 @@ def makers_of_arrays(source: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", sorted((PACKAGE / "kernels").glob("*.py")), ids=lambda p: p.stem)
-def test_kernels_that_allocate_are_marked(path: Path) -> None:
-    assert not makers_of_arrays(path.read_text(encoding="utf-8"))
+def test_kernels_that_allocate_are_marked() -> None:
+    paths = (PACKAGE / "kernels").glob("*.py")
+    expect_none(
+        findings(lambda source, path: [f"{shown(path)}: {n} allocates" for n in makers_of_arrays(source)], paths)
+    )
 
 
 def test_a_kernel_that_allocates_unmarked_is_found() -> None:
