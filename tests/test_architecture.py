@@ -66,6 +66,8 @@ def upward_imports(source: str, path: Path) -> list[str]:
     parts = module_name(path).split(".")
     if len(parts) < 2:
         return []
+    if parts[1] not in LAYERS:
+        return [f"{shown(path)} is in no layer"]
     own = LAYERS.index(parts[1])
     wrong = []
     for line, module, names in imported_modules(ast.parse(source), path):
