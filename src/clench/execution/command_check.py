@@ -37,7 +37,7 @@ class NotFollowingError(RefusedCommandError):
 
 @dataclass(frozen=True)
 class CommandLimits:
-    """Hold what a joint of a controller may be told, in its own units.
+    """Limits of the commands to one joint, in the controller's units.
 
     Args:
         lower, upper: lowest and highest. velocity: largest speed [per second]. scale: units per radian, above 0.

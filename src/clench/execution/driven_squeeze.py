@@ -27,7 +27,7 @@ _POINTS: Final = 9
 
 @dataclass(frozen=True, eq=False)
 class DrivenSqueeze:
-    """Hold a squeeze as a controller is told it.
+    """The squeeze, in the form in which it goes to a controller.
 
     Args:
         text: a sentence about it, empty without one. offsets: angles beyond the touch that are told [rad], by joint.

@@ -25,7 +25,7 @@ from .supervision import Event
 
 @dataclass(frozen=True, eq=False)
 class DrivenStep:
-    """Hold a next step as a controller is told it.
+    """A next step, in the form in which it goes to a controller.
 
     Args:
         number: its index. targets: of the joints that it moves and the controller knows [rad]. plan: the way there.

@@ -25,7 +25,7 @@ from .way_to_touch import Way, WayFinder
 
 @dataclass(frozen=True, eq=False)
 class DrivenWay:
-    """Hold the whole motion to the touch as a controller is told it.
+    """The whole motion to the touch, in the form in which it goes to a controller.
 
     Args:
         plan: in the controller's names and units. text: a sentence about the way to the trajectory's start.

@@ -24,7 +24,7 @@ class RefusedCommandError(DriverError):
 
 @dataclass(frozen=True)
 class HandState:
-    """Hold what a controller said last, in its own names and units.
+    """The last state that a controller reported, in its own names and units.
 
     Args:
         positions: of its joints. ages: how long ago each was measured, as far as known here [s]; joints that are left
@@ -41,7 +41,9 @@ class HandState:
 
 @dataclass(frozen=True, eq=False)
 class JointPath:
-    """Hold where joints shall be at times from now on; between two points they move at constant speed.
+    """The path that a driver sends: targets of joints at future times.
+
+    Between two points the joints move at constant speed.
 
     Args:
         joints: the controller's names. times: from now [s], shape (N,), rising, above 0.
@@ -61,7 +63,9 @@ class JointPath:
 
 @dataclass(frozen=True)
 class DriverLimits:
-    """Hold what the controller itself allows, in its own names and units; joints that are left out have no limit.
+    """Limits that the controller itself sets, in its own names and units.
+
+    A joint that is left out has no limit.
 
     Args:
         positions: lowest and highest. velocities: largest, per second.

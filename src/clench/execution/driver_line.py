@@ -20,7 +20,7 @@ LEAVING_LIMIT: Final = 5.0
 #: How long a stop waits for a call that an interrupt left alone [s]: two messages on one line would mix.
 SHORTLY: Final = 0.1
 
-#: Calls after whose failure nobody knows what the hand does.
+#: Calls whose failure leaves the motion of the hand unknown.
 MOVING_CALLS: Final = ("read", "command", "pull", "stop")
 
 #: What is called when an abandoned call returns after all, where that is not `stop` alone.
@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 @dataclass(eq=False)
 class Call:
-    """Hold a call of a driver, and what came of it once it has returned.
+    """One call of a driver, and its outcome once it has returned.
 
     Args:
         what: name of the driver's method. function: what is run. returned: whether it has returned.

@@ -78,7 +78,7 @@ class DriverSession:
 
     @property
     def failed(self) -> bool:
-        """Whether the driver failed in a way after which nobody knows what the hand does."""
+        """Whether the driver failed in a way that leaves the motion of the hand unknown."""
         return self._line.failed
 
     def connect(self, timeout: float) -> None:

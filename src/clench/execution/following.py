@@ -34,7 +34,9 @@ CLOSEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class TimedPlan:
-    """Hold way-points in a controller's names and units; between two of them joints move at constant speed.
+    """A timed motion for a controller to follow: way-points in its own names and units.
+
+    Between two way-points the joints move at constant speed.
 
     Args:
         joints: the controller's names. times: shape (N,), rising from 0 [s]. positions: shape (N, J).
@@ -108,7 +110,7 @@ class Followed:
 class _Progress:
     """Keep how far along a plan a hand is, by what it was told last and when.
 
-    A controller goes along a path from when it has it, which is somewhen while it is told.
+    A controller starts on a path when it receives it, at some time during the call that sends it.
 
     Args:
         ahead: how far the hand goes on along one path [s]. begin: moment of the plan at which the last path begins [s].
@@ -127,14 +129,15 @@ class _Progress:
     def span(self, first: float, last: float) -> tuple[float, float]:
         """Return between which moments of the plan [s] the hand was at a time between two [s].
 
-        It may not yet have made up for a path that came up to a period late, or be where the next one begins already.
+        The hand may still lag behind by a path that came up to a period late, or already be at the start of the
+        next one.
         """
         return self.begin + self._gone(first - self.after, -math.inf) - PERIOD, self.moment(last) + PERIOD
 
     @property
     def due(self) -> float:
         """When the next path is to be told [s]."""
-        # Where telling took long, nobody knows how far along its path the hand is: it comes to its end.
+        # After a slow call the place of the hand on its path is unknown, so it goes to the end of the path.
         return self.before + PERIOD if self.after - self.before <= PERIOD else self.after + self.ahead
 
     def _gone(self, since: float, least: float) -> float:

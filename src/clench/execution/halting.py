@@ -22,7 +22,7 @@ _LOOK: Final = 2.0 * PERIOD
 
 @dataclass(frozen=True)
 class Halted:
-    """Hold what came of a stop.
+    """The outcome of a stop: whether the hand was told, and whether it stands still.
 
     Args:
         untold: why the driver could not tell the hand to stop, empty when it did.

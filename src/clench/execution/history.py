@@ -11,7 +11,7 @@ from clench.base.pose import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ExecutionHistory:
-    """Hold samples of an execution.
+    """Commanded and measured angles of an execution over time.
 
     Args:
         joints: names of the joints that were read. times: from the first command [s], shape (N,).

@@ -94,7 +94,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class ObjectMotion:
-    """Hold how far an object moved: its centre of mass [m], and its rotation [rad]."""
+    """How far an object moved: its centre of mass [m], and its rotation [rad]."""
 
     distance: float
     angle: float
@@ -106,7 +106,7 @@ class ObjectMotion:
 
 @dataclass(frozen=True)
 class Pulled:
-    """Hold what one pull, or the lift, did.
+    """The outcome of one pull, or of the lift.
 
     Args:
         held: the object stayed within the limits. motion: at the end, or when it was dropped.
@@ -130,12 +130,12 @@ class FingerForce:
 
 @dataclass(frozen=True, eq=False)
 class HoldReport:
-    """Hold what came of a hold test.
+    """The result of a hold test: whether the hand kept the object, and how far it moved.
 
     Args:
         held: the object was held in every direction. reason: one sentence.
         settings: of the test. plan: what the squeeze plan says of the mass.
-        planned: whether that plan is feasible; else what there is of it is applied.
+        planned: whether that plan is feasible; if not, the forces that it found are applied.
         torques: told to the joints beyond the touch [Nm], by name. angles: of the joints after the squeeze [rad].
         first_touch: when each finger first touched the free object [s], None when it did not; from the pregrasp on.
         closed: motion from the pregrasp to the touch. squeezed: motion from there by the squeeze.

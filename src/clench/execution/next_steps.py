@@ -29,7 +29,9 @@ BUILDING_UP: Final = 0.4
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """Hold a motion after the touch, as joints are told it; between two way-points they move at constant speed.
+    """A commanded motion after the touch: the squeeze, or one next step.
+
+    Between two way-points the joints move at constant speed.
 
     Args:
         name: "squeeze" or "next step". times: from its own start [s], shape (N,), rising from 0.

@@ -39,7 +39,7 @@ DIRECTIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Hold where an object is: its centre of mass [m], shape (3,), and its rotation, shape (3, 3)."""
+    """The place of an object: its centre of mass [m], shape (3,), and its rotation, shape (3, 3)."""
 
     center: FloatArray
     rotation: FloatArray
@@ -59,7 +59,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Hold a state in which the hand holds a free object: squeezed, or lifted.
+    """The simulated state in which the hand holds a free object, squeezed or lifted. Next steps start from it.
 
     Args:
         scene, data: the simulation. told: where the joints are told to be [rad], shape (J,).

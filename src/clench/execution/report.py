@@ -54,7 +54,7 @@ class ContactReached:
 
 @dataclass(frozen=True)
 class NextStepReached:
-    """Hold what came of one of the solution's next steps, in their order.
+    """The outcome of one next step: which joints arrived, what touches, and whether the object is held.
 
     Args:
         joints: every joint that it moves, with where it should go. reached: all are there, up to the report's angle
@@ -123,7 +123,7 @@ def notes_on_steps(solution: GraspSolution, steps: Sequence[NextStepReached]) ->
 
 @dataclass(frozen=True)
 class ExecutionReport:
-    """Hold what was reached when a solution was carried out.
+    """The result of an execution: angles and contacts that were reached, against those computed.
 
     Args:
         actuator: what carried it out. success: see `reason`. reason: one sentence.

@@ -40,7 +40,7 @@ _ALL_BITS = 0x7FFFFFFF
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Hold a compiled scene and where things are in it.
+    """A compiled simulation of hand and object, with the addresses of their parts.
 
     Args:
         model: the compiled `mujoco.MjModel`.

@@ -25,7 +25,9 @@ SAMPLE: Final = 0.02
 
 @dataclass(frozen=True, eq=False)
 class TimedPath:
-    """Hold a path of straight lines in joint space, each gone through from rest to rest, as fast as limits allow.
+    """A timed path of straight lines in joint space.
+
+    The joints go through each line from rest to rest, as fast as the limits allow.
 
     Args:
         corners: ends of the lines [rad], shape (N, J). times: when they are reached [s], shape (N,), from 0.

@@ -30,7 +30,9 @@ SLOWEST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Hold way-points of all joints; between two of them joints move at constant speed.
+    """A timed motion of all joints from the open hand to the touch.
+
+    Between two way-points the joints move at constant speed.
 
     Args:
         hand, object: names.

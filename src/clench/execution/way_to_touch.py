@@ -56,7 +56,7 @@ class FingerPlan:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Hold a path from the open hand to the touch.
+    """A path from the open hand to the touch, and what it meets on the way.
 
     Args:
         times: [s], shape (N,), from 0. positions: [rad], shape (N, J).

@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, init=False, eq=False)
 class TriangleMesh:
-    """Hold vertices [m], shape (V, 3), and triangles, shape (T, 3), counter-clockwise seen from outside."""
+    """A triangle mesh: vertices [m], shape (V, 3), and triangles, shape (T, 3), counter-clockwise from outside."""
 
     vertices: FloatArray
     triangles: IntArray

@@ -28,7 +28,7 @@ Groups = list[list[FingerCandidate]]
 
 
 class ClosedSets(NamedTuple):
-    """Hold what closing gave: the kernels' answer, what overlaps at the start per entry, and the sets per item."""
+    """The result of closing: the kernels' answer, overlaps at the start per entry, and sets per item."""
 
     closed: ClosedHand
     overlaps: list[LinkDepth | None]
@@ -96,7 +96,7 @@ def decided(problem: Problem, calibration: Calibration) -> Planned | None:
 
 @dataclass(eq=False)
 class Alternatives:
-    """Hold the sets that every finger has, and the choice among them; both are made when they are first read.
+    """The alternative sets of every finger, and the choice among them. Both are computed when first read.
 
     Args:
         problem, calibration, setting: what the sets are chosen by. close: returns the sets.

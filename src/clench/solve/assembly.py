@@ -51,7 +51,7 @@ _OPPOSED = -1e-9
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Hold what was computed and chosen.
+    """Everything computed and chosen that a solution is built from.
 
     Args:
         sets: returns the candidates of a finger that closes, by number, as closed without the other fingers.

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class BatchSolver:
-    """Hold a command, checked and packed, to be solved at any poses.
+    """A solver for one command at many poses. It checks and packs the command once.
 
     Args:
         hand, obj, command: as for `clench.solve`; the command's `hand_pose` plays no part.

@@ -27,10 +27,11 @@ _FLOATS: Final = frozenset({float, np.float64})
 
 @dataclass(frozen=True, eq=False)
 class CheckedCommand:
-    """Hold a command that fits a hand.
+    """A command that was checked against its hand.
 
     Args:
-        command: which no later change of a list or mapping that was given reaches; its poses are those it first had.
+        command: a copy, which later changes of the caller's lists and mappings do not reach. Its poses are those of
+            the first command that was checked with these values.
         start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
     """
 

@@ -79,7 +79,7 @@ def solve_directly(
 
 @dataclass(frozen=True, eq=False)
 class _Direct:
-    """Hold what the kernels gave, and make of it what a solution says."""
+    """A builder that makes a solution from the kernels' answer."""
 
     problem: Problem
     calibration: Calibration

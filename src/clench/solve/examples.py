@@ -56,7 +56,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class ScoredExamples:
-    """Hold examples as scores by criterion.
+    """Examples for a calibration, as scores by criterion.
 
     Args:
         pairs: better and worse. outcomes: scores, and whether it was held.

@@ -39,7 +39,9 @@ PER_POSE: Final = (
 
 @dataclass(frozen=True, eq=False)
 class BatchContacts:
-    """Hold the contacts of all poses one after another, C in all; those of pose i are `first[i]` to `first[i + 1]`.
+    """The contacts of a batch, one pose after another, C in all.
+
+    The contacts of pose i are the rows from `first[i]` up to `first[i + 1]`.
 
     Args:
         first: shape (N + 1,). finger, link, body, joint: indices into the batch's names, shape (C,): the touching
@@ -85,7 +87,7 @@ class BatchContacts:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Hold what a batch was asked, so that one of its poses can be solved by itself."""
+    """The inputs of a batch, so that one of its poses can be solved by itself."""
 
     hand: Hand
     obj: GraspObject
@@ -95,7 +97,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class GraspBatch(LateFields):
-    """Hold the answers of `clench.solve_batch` for N poses; F fingers, J joints.
+    """The answers of `clench.solve_batch` for N poses, as arrays; F fingers, J joints.
 
     Args:
         question: what was asked. joint_names, finger_names, link_names, body_names: what the columns are.

@@ -29,7 +29,7 @@ from .solution import Contact, GraspSolution
 
 @dataclass(frozen=True, eq=False)
 class HeldSolution:
-    """Hold a solution as mechanics sees it.
+    """The contacts, frames and centre of mass of a solution, as mechanics needs them.
 
     Args:
         held: contacts in the palm frame. contacts: the solution's contacts, in the same order, each place once.

@@ -35,7 +35,7 @@ _BEST_FIRST: Final = (
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Hold the solution of one order and how it is judged.
+    """The solution of one closing order, and its scores.
 
     Args:
         order, solution: what was solved. scores: by criterion. worth: what each adds to the weighted sum [-].

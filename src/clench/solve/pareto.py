@@ -18,7 +18,7 @@ MOST: Final = 400
 
 @dataclass(frozen=True)
 class HandSets:
-    """Hold one set per finger.
+    """One set per finger, with the scores of this combination.
 
     Args:
         sets: index of the set by finger. scores: sums over the fingers by criterion. total: weighted sum [-].

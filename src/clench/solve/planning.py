@@ -35,7 +35,7 @@ KEPT_PLANS: Final = 64
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """Hold the plan of a hand and what its exact sweeps need.
+    """The plan of a hand for closing, and the inputs of its exact sweeps.
 
     Args:
         start: posture before closing, shape (J,) [rad]. source: geometry of the hand. plan, exact: of its fingers.

@@ -23,7 +23,7 @@ from .solution import GraspSolution, SolutionStatus
 
 @dataclass(frozen=True, eq=False)
 class PoseErrorCorner:
-    """Hold what comes of one corner of the error.
+    """The answer at one corner of the pose error, compared with the answer without error.
 
     Args:
         error: shift along [m] and turn about [rad] the world's axes, shape (6,).
@@ -40,7 +40,7 @@ class PoseErrorCorner:
 
 @dataclass(frozen=True, eq=False)
 class PoseErrorReport:
-    """Hold how an error of the object's pose changes angles and touching links.
+    """The effect of an error of the object's pose on angles and touching links.
 
     Args:
         translation, rotation: the object is off by up to this along [m] and about [rad] each of the world's axes.

@@ -27,7 +27,7 @@ UNTIL_REST = 1000
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Hold the three inputs, checked and brought together.
+    """One problem to solve: hand, object and command, checked and at their poses.
 
     Args:
         checked: the command, wherever hand and object are. command: the same at the poses asked for.

@@ -22,7 +22,7 @@ from .solution import GraspSolution
 
 @dataclass(frozen=True, eq=False)
 class GraspQuality:
-    """Hold numbers about a grasp, with the conventions without which none compares.
+    """Numbers that say how good a grasp is, with the conventions that a comparison needs.
 
     Args:
         grasp: the contacts, friction, centre of mass and length scale that were used.

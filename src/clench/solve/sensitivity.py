@@ -26,7 +26,7 @@ from .solution import FingerStatus, GraspSolution
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Hold the change of every joint angle per change of the object's pose; the hand stays where it is.
+    """The change of every joint angle per change of the object's pose, with the hand where it is.
 
     An entry is infinite where no such number exists; `reasons` says why. Joints that stopped at a limit, and joints
     that do not close, have 0.

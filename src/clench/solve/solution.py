@@ -97,7 +97,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Candidate:
-    """Hold one alternative set of a finger: contacts and joint angles on one plane, or over the full width.
+    """One alternative set of a finger: contacts and joint angles on one plane, or over the full width.
 
     Args:
         plane: index of the curl plane, None for the full width; offset: its place [m].
@@ -124,7 +124,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class FingerResult(LateFields):
-    """Hold a finger's alternatives and the chosen one.
+    """A finger's answer: how it ended, its alternative sets, and the chosen one.
 
     Args:
         name: of the finger. status, reason: how it ended. chosen: index of the chosen candidate.
@@ -166,7 +166,7 @@ class FingerResult(LateFields):
 
 @dataclass(frozen=True)
 class GraspSolution(LateFields):
-    """Hold the answer of `clench.solve`; `to_dict` gives the documented JSON form.
+    """The answer of `clench.solve`; `to_dict` gives the documented JSON form.
 
     Args:
         hand, object: names. hand_model, object_model: what to load to execute it again (path or built-in name).

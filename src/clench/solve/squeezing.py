@@ -42,7 +42,7 @@ _LEAST_DISTURBANCE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class SqueezePlan:
-    """Hold a squeeze, or why there is none.
+    """A plan of forces, torques and offsets that holds a mass, or the reason why there is none.
 
     Args:
         feasible: whether every mass is held at all; text: sentences that say so, or which limit binds.

@@ -90,7 +90,7 @@ class OrcaDriver:
             self._hand.set_joint_positions(path.at(path.period))
 
     def stop(self) -> None:
-        """Hold where the joints are.
+        """Stop the joints where they are.
 
         Raises:
             DriverError: the motors do not say where they are; they stand still at the last target.

@@ -46,7 +46,7 @@ class RosInterface(StrEnum):
 
 @dataclass(frozen=True)
 class JointStates:
-    """Hold one message of joint states.
+    """One message of joint states.
 
     Args:
         positions: by joint, in rad. stamp: the sender's time [ns], 0 when it gave none.

@@ -46,7 +46,7 @@ _ENDINGS = {
 
 @dataclass(frozen=True)
 class ExportReport:
-    """Hold what was written.
+    """The outcome of an export: the files, and what they lack.
 
     Args:
         files: in order. confidences: of the grasps, see `export_grasps`.

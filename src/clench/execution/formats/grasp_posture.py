@@ -19,7 +19,7 @@ BASE: Final = "world"
 
 @dataclass(frozen=True)
 class GraspPosture:
-    """Hold a grasp that another program computed.
+    """A grasp that another program computed, as read from its file.
 
     Args:
         name: in the file. hand_pose: of the link `root` in the world. object_pose: `T_world_object`.

@@ -56,7 +56,7 @@ class ExportSettings:
 
 @dataclass(frozen=True, eq=False)
 class OutgoingGrasp:
-    """Hold a grasp as it is written.
+    """A grasp with everything that an export format writes.
 
     Args:
         solution: with all that could be planned. object_name: of the object.

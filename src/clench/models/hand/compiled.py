@@ -17,7 +17,7 @@ from .model_files import ModelText
 
 @dataclass(frozen=True)
 class StatedJoints:
-    """Hold what a model states of its joints and MuJoCo corrects or ignores without a word, by joint name.
+    """Statements of a model about its joints that MuJoCo corrects or ignores silently, by joint name.
 
     Args:
         reversed: limits whose lower one is above the upper one [rad]; they are swapped before compiling.
@@ -31,7 +31,7 @@ class StatedJoints:
 
 @dataclass(frozen=True)
 class CompiledModel:
-    """Hold MuJoCo's spec and compiled model of a hand, and the text that gives it.
+    """A hand that MuJoCo has compiled: its spec, its model, and the text that they come from.
 
     Args:
         spec: `mujoco.MjSpec`. model: `mujoco.MjModel`.

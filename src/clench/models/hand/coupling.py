@@ -34,7 +34,7 @@ class Relation:
 
 @dataclass(frozen=True)
 class FoundCouplings:
-    """Hold couplings between joints, joints held at one angle [rad], and what was found."""
+    """Couplings that a model states: between joints, to one angle [rad], and findings about them."""
 
     couplings: tuple[Coupling, ...]
     held: Mapping[int, float]

@@ -22,7 +22,7 @@ _TIP_PART = 0.85
 
 @dataclass(frozen=True)
 class FingerLine:
-    """Hold the axes of a finger's own joints and its tip, in the palm frame, at one posture.
+    """The axes of a finger's own joints and its tip, in the palm frame, at one posture.
 
     Args:
         axes: unit, shape (n, 3). anchors: [m], shape (n, 3). tip: [m], shape (3,).

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class JointArrays(NamedTuple):
-    """Hold what turning the joints of a hand needs; J joints.
+    """Constants for the forward kinematics of a hand; J joints.
 
     Args:
         reference: angles at which the links' own poses hold [rad], (J,). anchor: points on the axes [m], (J, 3).

@@ -150,7 +150,7 @@ class Finger:
 
 @dataclass(frozen=True)
 class Hand:
-    """Hold a hand that was read from a model file and understood.
+    """A robot hand, as read from a model file: links, joints, couplings, and the fingers found in them.
 
     Links are sorted so that parents come first. Palm-frame quantities are at the reference posture.
 

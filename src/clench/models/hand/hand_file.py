@@ -50,7 +50,7 @@ class LinkOverride:
 
 @dataclass(frozen=True)
 class HandFile:
-    """Hold what a hand file says; empty when there is none.
+    """The overrides of a hand file; empty when there is none.
 
     Args:
         path: the file, or None.

@@ -31,7 +31,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Hold the kinematics of a hand.
+    """The links and joints of a hand, with their numbers in MuJoCo's model.
 
     Args:
         frames: links, parents first. Bodies with several joints are preceded by links without geometry.

@@ -25,7 +25,7 @@ _KEPT_HANDS: Final = 16
 
 @dataclass(frozen=True, eq=False)
 class LinkMesh:
-    """Hold the triangles of one link in its frame.
+    """The triangles of one link, in the link's frame.
 
     Args:
         link: index of the link in the hand.

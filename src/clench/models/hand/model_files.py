@@ -29,7 +29,7 @@ _FILES = {
 
 @dataclass(frozen=True)
 class ModelText:
-    """Hold a model that needs no other file.
+    """The text of a hand model with all its assets, so that it needs no other file.
 
     Args:
         name: of the model.

@@ -24,7 +24,7 @@ _DRAWS = 16
 
 
 class Overlaps(NamedTuple):
-    """Hold the pairs of link indices that overlap when the hand is open and the model does not exclude them.
+    """Pairs of link indices that overlap when the hand is open, without those that the model excludes.
 
     Args:
         always: those that overlap in every posture that was looked at.

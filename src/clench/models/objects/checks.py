@@ -31,7 +31,7 @@ NO_VOLUME: Final = 1e-12
 
 @dataclass(frozen=True)
 class CheckedMesh:
-    """Hold a mesh that is fit to use, whether it is closed and wound outwards, and what was found."""
+    """A mesh that is fit to use: whether it is closed and wound outwards, and warnings about it."""
 
     mesh: TriangleMesh
     closed: bool

@@ -70,7 +70,7 @@ class MeshPart(NamedTuple):
 
 @dataclass(frozen=True)
 class GraspObject:
-    """Hold an object to grasp, with its obstacles.
+    """An object to grasp, with its obstacles.
 
     Args:
         name: for messages and records.

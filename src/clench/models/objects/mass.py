@@ -15,7 +15,7 @@ from .grasp_object import Body, BodyRole, GraspObject
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Hold what a uniform density says about an object; obstacles are left out.
+    """Mass properties of an object of uniform density, without its obstacles.
 
     Args:
         center: centre of mass in the object's frame [m], shape (3,).
