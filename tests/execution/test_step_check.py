@@ -83,7 +83,7 @@ def collisions(hand: Hand, phases: tuple[Phase, ...]) -> dict[frozenset[str], fl
 
 def test_a_thumb_that_closes_into_a_finger_is_found(hand: Hand) -> None:
     phases = planned(hand, {}, ACROSS)
-    said = step_overlap(hand, phases, CollisionSource.ENGINE)
+    said = step_overlap(stepping(hand), hand, phases)
     names = re.fullmatch(r"In next step 2, '(.*)' would overlap '(.*)' by at least .* mm\.", said or "")
     assert names is not None, said
     assert collisions(hand, phases)[frozenset(names.groups())] > DEEP
@@ -91,9 +91,9 @@ def test_a_thumb_that_closes_into_a_finger_is_found(hand: Hand) -> None:
 
 def test_a_fist_is_none(hand: Hand) -> None:
     phases = planned(hand, FIST)
-    assert step_overlap(hand, phases, CollisionSource.ENGINE) is None
+    assert step_overlap(stepping(hand), hand, phases) is None
     assert max(collisions(hand, phases).values(), default=0.0) <= 1e-5
-    assert step_overlap(hand, (), CollisionSource.ENGINE) is None
+    assert step_overlap(stepping(hand), hand, ()) is None
 
 
 def test_a_squeeze_is_checked_but_for_fingers_that_the_object_holds(hand: Hand) -> None:

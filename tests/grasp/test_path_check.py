@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 import clench
 from chain_hands import HandBuilder, along_x, mount, turned
 from clench.base.pose import FloatArray, Pose
-from clench.grasp.path_check import PlacedObject, find_path_overlap
-from clench.grasp.scene import pack_object
+from clench.grasp.path_check import find_path_overlap, place_object
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes, overlap_depth
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
@@ -95,7 +94,7 @@ def test_a_thin_thing_is_not_stepped_over() -> None:
     needle = clench.GraspObject.from_shape(
         Shape(ShapeKind.BOX, (5e-5, 0.1, 5e-5), Pose([0.03, 0.0, 0.0])), name="needle"
     )
-    around = PlacedObject(pack_object(needle), np.eye(4))
+    around = place_object(needle, np.eye(4))
     found = find_path_overlap(hand, np.array([[-1.0], [1.0]]), SOURCE, around)
     assert found is not None
     assert (found.link, found.other, found.with_object) == ("a_link_0", "needle", True)

@@ -9,7 +9,6 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
@@ -57,7 +56,7 @@ def plan_driven_steps(
     """
     steps = []
     phases = plan_next_steps(solution, hand, told, pace)
-    overlap = step_overlap(hand, phases, CollisionSource(solution.collision_source))
+    overlap = step_overlap(solution, hand, phases)
     if overlap is not None:
         raise RefusedCommandError(overlap)
     for phase in phases:

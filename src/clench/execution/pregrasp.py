@@ -9,12 +9,15 @@ import numpy as np
 
 from clench.base.errors import CommandError, MotionError
 from clench.base.pose import FloatArray, invert
+from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.shapes import CollisionSource
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
 from .landing import CLEARANCE
+from .step_check import placed_object
 from .trajectory import Trajectory, plan_trajectory
 
 #: Steps in which the closing path is walked back, and halvings that find the place within a step.
@@ -28,10 +31,11 @@ def plan_pregrasp(
     """Return the posture in which every touching finger stands off by a clearance [rad].
 
     With the object it is the one that `plan_trajectory` goes through: from it, all contacts are reached at once on a
-    straight line that is clear. Without the object, or where no such posture is clear, every finger is backed off along
-    its closing path. There the clearance is measured at the contacts: every point of a link that touches is that far
-    off the object's tangent plane, which for a convex object is at most its distance from it. A finger that does not
-    get so far is taken back to where it starts; one that does not touch stays where the solution has it.
+    straight line that is free. Without the object, or where there is no such posture, every finger is backed off along
+    its closing path; where the straight line from there is not free, the pregrasp is the open hand. The clearance is
+    then measured at the contacts: every point of a link that touches is that far off the object's tangent plane, which
+    for a convex object is at most its distance from it. A finger that does not get so far is taken back to where it
+    starts; one that does not touch stays where the solution has it.
 
     Args:
         solution: the solution. hand, obj: what it was computed for. clearance: [m].
@@ -78,6 +82,11 @@ def plan_pregrasp(
 
         back = _latest_clear(gap, trajectory, clearance)
         q[own] = trajectory.at(back)[own]
+    touch, source = trajectory.positions[-1], CollisionSource(solution.collision_source)
+    around = None if obj is None else placed_object(solution, obj)
+    for before in (q, trajectory.positions[0]):
+        if find_path_overlap(hand, np.array([touch, before]), source, around) is None:
+            return dict(zip(hand.joint_names, before.tolist(), strict=True))
     return dict(zip(hand.joint_names, q.tolist(), strict=True))
 
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from clench.base.errors import MotionError
 from clench.base.pose import FloatArray, invert
-from clench.grasp.path_check import PlacedObject, find_path_overlap
-from clench.grasp.scene import pack_object
+from clench.grasp.path_check import PlacedObject, find_path_overlap, place_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
@@ -28,9 +27,7 @@ def refuse_after(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -
     Raises:
         MotionError: the sentence names the step and the links.
     """
-    sentence = squeeze_overlap(solution, hand, squeeze_offsets(solution, hand)) or step_overlap(
-        hand, phases, CollisionSource(solution.collision_source)
-    )
+    sentence = squeeze_overlap(solution, hand, squeeze_offsets(solution, hand)) or step_overlap(solution, hand, phases)
     if sentence is not None:
         raise MotionError(sentence)
 
@@ -46,11 +43,8 @@ def squeeze_overlap(solution: GraspSolution, hand: Hand, offsets: FloatArray) ->
     """
     if not offsets.any():
         return None
-    touching = {c.finger for c in solution.contacts if not c.passed}
     moved = offsets.copy()
-    for finger in hand.fingers:
-        if finger.name in touching:
-            moved[list(finger.joints)] = 0.0
+    moved[_touching_joints(solution, hand)] = 0.0
     q = posture(solution.joint_angles, hand, "joint_angles")
     found = find_path_overlap(hand, np.array([q, q + moved]), CollisionSource(solution.collision_source))
     return None if found is None else f"In the squeeze, {found.sentence}."
@@ -75,26 +69,33 @@ def told_overlap(
     before = np.array([pregrasp.get(name, angle) for name, angle in zip(hand.joint_names, q, strict=True)])
     after = np.array([squeezed.get(name, angle) for name, angle in zip(hand.joint_names, q, strict=True)])
     around = None if obj is None else placed_object(solution, obj)
-    found = find_path_overlap(hand, np.array([before, q]), CollisionSource(solution.collision_source), around)
+    # From the grasp on, which is free: links that overlap where a path begins would be let apart.
+    found = find_path_overlap(hand, np.array([q, before]), CollisionSource(solution.collision_source), around)
     if found is not None:
         return f"On the straight line from the pregrasp to the grasp, {found.sentence}."
     return squeeze_overlap(solution, hand, after - q)
 
 
-def step_overlap(hand: Hand, phases: Sequence[Phase], source: CollisionSource) -> str | None:
+def step_overlap(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -> str | None:
     """Return a sentence about the first two links that next steps drive into each other; None when there are none.
 
-    The object moves with the hand or stays behind, so only the hand is checked. Links that the squeeze presses into
-    each other may stay as deep as they are when the steps begin.
+    The object moves with the hand or stays behind, so only the hand is checked. Fingers that touch the object press on
+    it until a step moves them. So they are checked twice: where they are told to be, and where the object holds them.
+    Links that overlap when the steps begin may stay as deep as they are.
 
     Args:
-        hand: the hand. phases: what comes after the touch. source: geometry of the links.
+        solution: the solution. hand: what it was computed for. phases: what comes after the touch.
     """
     steps = [phase for phase in phases if phase.name == NEXT_STEP]
     if not steps:
         return None
-    path = np.vstack([steps[0].positions[:1], *(phase.positions[1:] for phase in steps)])
-    found = find_path_overlap(hand, path, source)
+    source = CollisionSource(solution.collision_source)
+    told = np.vstack([steps[0].positions[:1], *(phase.positions[1:] for phase in steps)])
+    held, touch = told.copy(), posture(solution.joint_angles, hand, "joint_angles")
+    for j in _touching_joints(solution, hand):
+        moved = np.flatnonzero(told[:, j] != told[0, j])
+        held[: moved[0] if len(moved) else len(told), j] = touch[j]
+    found = find_path_overlap(hand, told, source) or find_path_overlap(hand, held, source)
     if found is None:
         return None
     ends = np.cumsum([len(phase.positions) - 1 for phase in steps])
@@ -104,4 +105,10 @@ def step_overlap(hand: Hand, phases: Sequence[Phase], source: CollisionSource) -
 
 def placed_object(solution: GraspSolution, obj: GraspObject) -> PlacedObject:
     """Return the object of a solution where the palm sees it."""
-    return PlacedObject(pack_object(obj), invert(solution.hand_pose.matrix) @ solution.object_pose.matrix)
+    return place_object(obj, invert(solution.hand_pose.matrix) @ solution.object_pose.matrix)
+
+
+def _touching_joints(solution: GraspSolution, hand: Hand) -> list[int]:
+    """Return the joints of the fingers that touch the object."""
+    touching = {c.finger for c in solution.contacts if not c.passed}
+    return [j for finger in hand.fingers if finger.name in touching for j in finger.joints]

@@ -45,6 +45,8 @@ class Trajectory:
         speed: fraction of the velocity limits that was used [-]. acceleration: largest of every joint [rad/s²].
         turns: names of the fingers that move at the same time on the way to the pregrasp, or to the touch without one;
             fingers of a later turn wait for those before.
+        open_bodies: names of the object's bodies that are surfaces without an inside: a link that passes through one of
+            them does not overlap it.
     """
 
     hand: str
@@ -58,6 +60,7 @@ class Trajectory:
     speed: float = 1.0
     acceleration: float = ACCELERATION
     turns: tuple[tuple[str, ...], ...] = ()
+    open_bodies: tuple[str, ...] = ()
 
     @property
     def touches_at_once(self) -> bool:
@@ -73,6 +76,9 @@ class Trajectory:
             found.append(f"Fingers wait for each other, so that they do not meet: {order}.")
         if not self.touches_at_once:
             found.append("The path has no pregrasp: fingers may touch one after another, and push the object.")
+        if self.open_bodies:
+            names = ", ".join(f"'{name}'" for name in self.open_bodies)
+            found.append(f"Not proven: no link passes through {names}, which is a surface without an inside.")
         return tuple(found)
 
     @property
@@ -106,6 +112,7 @@ class Trajectory:
             "speed": self.speed,
             "acceleration": self.acceleration,
             "turns": [list(turn) for turn in self.turns],
+            "open_bodies": list(self.open_bodies),
             "pregrasp": pregrasp,
             "points": [
                 *(
@@ -205,6 +212,7 @@ def plan_trajectory(
         speed=float(speed),
         acceleration=float(acceleration),
         turns=way.turns,
+        open_bodies=() if obj is None else tuple(body.name for body in obj.bodies if not body.closed),
     )
 
 
@@ -228,6 +236,7 @@ class _Form(msgspec.Struct):
     speed: float = 1.0
     acceleration: float = ACCELERATION
     turns: list[list[str]] = []
+    open_bodies: list[str] = []
 
 
 def _read(data: Any, source: str) -> Trajectory:
@@ -272,4 +281,5 @@ def _read(data: Any, source: str) -> Trajectory:
         speed=form.speed,
         acceleration=form.acceleration,
         turns=tuple(tuple(turn) for turn in form.turns),
+        open_bodies=tuple(form.open_bodies),
     )

@@ -37,6 +37,8 @@ AT_ONCE_STEPS: Final = 32
 _CLEARANCES: Final = (1.0, 0.25)
 #: So many plans are checked for one pregrasp at most.
 _MOST_PLANS: Final = 24
+#: No more plans are tried where so many lead links deeper into each other that overlap where the hand is.
+_MOST_STUCK: Final = 3
 #: Times [s], shape (N,), and postures [rad], shape (N, J).
 _Part = tuple[FloatArray, FloatArray]
 
@@ -128,8 +130,9 @@ class WayFinder:
         if goal is None:
             return None
         slow = np.minimum(self.pace[0], np.abs(self.end - goal) * (LANDING_SPEED / clearance))
-        line = time_path([np.array([goal, self.end])], slow, self.pace[1])
-        return goal, _joined([line], self.end, [range(len(self.end))])
+        joints = range(len(goal))
+        line = time_path(self._line(joints, goal, self.end), slow, self.pace[1])
+        return goal, _joined([line], self.end, [joints])
 
     def _pregrasp(self, clearance: float) -> FloatArray | None:
         """Return a posture from which the straight line to the touch is free; a joint rests where that helps."""
@@ -139,7 +142,7 @@ class WayFinder:
             if goal is None:
                 continue
             # From the touch on, which is free: links that overlap where a path begins would be let apart.
-            overlap = self.overlap(np.array([self.end, goal]))
+            overlap = self.overlap(np.vstack(self._line(range(len(goal)), goal, self.end))[::-1])
             if overlap is None:
                 return goal
             if not resting:
@@ -158,8 +161,9 @@ class WayFinder:
 
     def straight(self, goal: FloatArray) -> Way:
         """Return the straight line in joint space to a posture, with its overlap where it is not free."""
-        line = time_path([np.array([self.start, goal])], *self.pace)
-        times, positions = _joined([line], goal, [range(len(goal))])
+        joints = range(len(goal))
+        line = time_path(self._line(joints, self.start, goal), *self.pace)
+        times, positions = _joined([line], goal, [joints])
         return Way(times, positions, None, (), self.overlap(positions))
 
     def search(self, goal: FloatArray, *, straight: bool = True, last: _Part | None = None) -> Way:
@@ -173,6 +177,7 @@ class WayFinder:
         plans = [FingerPlan((0,) * count, (straight,) * count)]
         seen, first = set(plans), None
         blocked: set[tuple[int, bool]] = set()
+        stuck = 0
         while plans and len(seen) <= _MOST_PLANS:
             plan = plans.pop(0)
             if any(way in blocked for way in enumerate(plan.straight)):
@@ -181,6 +186,9 @@ class WayFinder:
             if way.overlap is None:
                 return way
             first = first or way
+            stuck += way.overlap.from_start
+            if stuck >= _MOST_STUCK:
+                break
             met = self._fingers_of(way.overlap)
             if len(met) == 1:  # what it meets is there in every turn
                 blocked.add((met[0], plan.straight[met[0]]))
@@ -193,7 +201,6 @@ class WayFinder:
 
     def _checked(self, plan: FingerPlan, goal: FloatArray, last: _Part | None) -> Way:
         times, positions = self._timed(plan, goal)
-        overlap = self.overlap(positions)
         pregrasp = None
         if last is not None:
             pregrasp = len(times) - 1
@@ -201,6 +208,7 @@ class WayFinder:
             positions = np.vstack([positions[:-1], last[1]])
             # Where nothing touches, there is nothing to stand off.
             pregrasp = pregrasp if pregrasp < len(times) - 1 else None
+        overlap = self.overlap(positions)
         names = [f.name for f in self.hand.fingers]
         moved = [bool((self.start[f.own] != goal[f.own]).any()) for f in self.hand.fingers]
         turns = (
@@ -240,7 +248,7 @@ class WayFinder:
 
     def _timed(self, plan: FingerPlan, goal: FloatArray) -> _Part:
         """Return times and postures from the open hand to a posture."""
-        turned, opening = _preparation(self.hand, self.start, goal)
+        turned, opening = self._preparation(goal)
         parts = [_joined([time_path(opening, *self.pace)], turned, [range(len(goal))])]
         q = turned
         for turn in range(max(plan.turn, default=0) + 1):
@@ -259,6 +267,22 @@ class WayFinder:
             q = target
         return _concatenated(parts, goal)
 
+    def _preparation(self, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
+        """Return the first posture after everything but the closing joints has moved, and the path there."""
+        in_fingers = {j for finger in self.hand.fingers for j in finger.joints}
+        first = [
+            j
+            for j, joint in enumerate(self.hand.joints)
+            if abs(end[j] - self.start[j]) > STILL and (joint.role is not JointRole.CLOSING or j not in in_fingers)
+        ]
+        turned = self.start.copy()
+        turned[first] = end[first]
+        return turned, self._line(first, self.start, turned) if first else [self.start[None]]
+
+    def _line(self, joints: Sequence[int], start: FloatArray, end: FloatArray) -> list[FloatArray]:
+        """Return the straight line between two postures, with a corner where a follower starts or stops."""
+        return [closing_path(self.hand, joints, start, end, np.abs(end - start), 1), end[None]]
+
     def _stages(
         self, joints: tuple[int, ...], start: FloatArray, end: FloatArray, *, straight: bool
     ) -> list[FloatArray]:
@@ -266,7 +290,7 @@ class WayFinder:
         goal = start.copy()
         goal[list(joints)] = end[list(joints)]
         if straight:
-            return [np.array([start, goal])]
+            return self._line(joints, start, goal)
         if _closed_at_once(self.solution):
             return _path_at_once(self.solution, self.hand, joints, start, goal)
         return list(_closing_stages(self.hand, joints, start, goal))
@@ -286,8 +310,8 @@ def refuse_way(way: Way, hand: Hand) -> None:
     time = way.times[k] + (found.place - k) * (way.times[after] - way.times[k])
     raise MotionError(
         f"No free path to the touch was found for hand '{hand.name}': {found.sentence} "
-        f"{time:.2f} s after the start of the straight path; other orders of the fingers and paths joint by joint "
-        "failed, too."
+        f"{time:.2f} s after the start of the first path that was tried; other orders of the fingers and paths joint "
+        "by joint failed, too."
     )
 
 
@@ -319,19 +343,6 @@ def _joined(paths: list[TimedPath], end: FloatArray, joints: Sequence[Sequence[i
             positions[:, moved] = np.array([path.stretched_at(t, duration) for t in grid])[:, moved]
     positions[-1] = end
     return grid, positions
-
-
-def _preparation(hand: Hand, start: FloatArray, end: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
-    """Return the open posture after everything but the closing joints has moved, and the path there."""
-    in_fingers = {j for finger in hand.fingers for j in finger.joints}
-    first = [
-        j
-        for j, joint in enumerate(hand.joints)
-        if abs(end[j] - start[j]) > STILL and (joint.role is not JointRole.CLOSING or j not in in_fingers)
-    ]
-    turned = start.copy()
-    turned[first] = end[first]
-    return turned, [_eased(start, turned)] if first else [start[None]]
 
 
 def _closed_at_once(solution: GraspSolution) -> bool:

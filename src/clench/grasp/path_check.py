@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
 
 from .depths import hand_depths, link_mesh_arrays, object_mesh
 from .exact import link_bodies
 from .linkage import hand_frames
-from .scene import PackedObject
-from .surface import nearest_body
+from .scene import PackedObject, pack_object
 
 if TYPE_CHECKING:
     from clench.kernels.bodies import BodyArrays
@@ -30,14 +30,26 @@ STRAIGHT: Final = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PlacedObject:
-    """Name an object and its place beside the hand.
+    """An object, with its obstacles, at its place beside the hand.
 
     Args:
-        packed: the object, with its obstacles. T_palm_object: shape (4, 4).
+        bodies: the object's bodies, packed one by one. T_palm_object: shape (4, 4).
     """
 
-    packed: PackedObject
+    bodies: tuple[PackedObject, ...]
     T_palm_object: FloatArray
+
+
+def place_object(obj: GraspObject, T_palm_object: FloatArray) -> PlacedObject:
+    """Return an object at its place beside the hand.
+
+    Args:
+        obj: the object; its own pose plays no part. T_palm_object: shape (4, 4).
+    """
+    if len(obj.bodies) == 1:
+        return PlacedObject((pack_object(obj),), T_palm_object)
+    each = (replace(obj, bodies=(replace(body, role=BodyRole.GRASPABLE),)) for body in obj.bodies)
+    return PlacedObject(tuple(pack_object(one) for one in each), T_palm_object)
 
 
 @dataclass(frozen=True)
@@ -50,6 +62,7 @@ class PathOverlap:
         with_object: whether `other` is a body of the object.
         depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm.
         position: place in the palm's frame [m]; None where the overlap is too shallow to locate.
+        from_start: whether the two overlap where the path begins, and go deeper.
     """
 
     place: float
@@ -58,12 +71,16 @@ class PathOverlap:
     with_object: bool
     depth: float
     position: tuple[float, float, float] | None = None
+    from_start: bool = False
 
     @property
     def sentence(self) -> str:
         """One sentence without a full stop, e.g. "'thumb_tip' would overlap 'index_tip' by 3.2 mm"."""
-        what = "the object's " if self.with_object else ""
-        return f"'{self.link}' would overlap {what}'{self.other}' by at least {self.depth * 1e3:.2g} mm"
+        what = f"the object's '{self.other}'" if self.with_object else f"'{self.other}'"
+        depth = f"by at least {self.depth * 1e3:.2g} mm"
+        if self.from_start:
+            return f"'{self.link}' overlaps {what} where the path begins, and would go deeper, {depth}"
+        return f"'{self.link}' would overlap {what} {depth}"
 
 
 def find_path_overlap(
@@ -84,10 +101,31 @@ def find_path_overlap(
         hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.
         source: geometry of the links. around: the object; None checks the hand alone.
     """
-    from clench.kernels.path_overlap import first_overlap
-
     points, kept = _corners(np.ascontiguousarray(path, dtype=np.float64))
-    problem = _problem(hand, points, source, around)
+    lines = _Lines(path, points, kept)
+    if around is None:
+        return _first(hand, lines, source, None, around)
+    # Body by body: a link that is in one of them where the path begins must still stay out of the others.
+    found = [_first(hand, lines, source, number, around) for number in range(len(around.bodies))]
+    return min((overlap for overlap in found if overlap is not None), key=lambda o: o.place, default=None)
+
+
+class _Lines(NamedTuple):
+    """A path as straight lines: its way-points, the ends of the lines, and the numbers of the ends."""
+
+    path: FloatArray
+    points: FloatArray
+    kept: NDArray[np.int64]
+
+
+def _first(
+    hand: Hand, lines: _Lines, source: CollisionSource, number: int | None, around: PlacedObject | None
+) -> PathOverlap | None:
+    """Return the first overlap with one body of the object; with the first one, or without any, of the links, too."""
+    from clench.kernels.path_overlap import OVERLAP, first_overlap
+
+    path, points, kept = lines
+    problem = _problem(hand, points, source, number, around)
     out = np.zeros(2)
     found = first_overlap(problem, out)
     if found < 0:
@@ -99,24 +137,27 @@ def find_path_overlap(
     q = points[corner] + share * (points[after] - points[corner])
     place = _place(path[kept[corner] : kept[after] + 1], share) + float(kept[corner])
     name = hand.links[m].name
+    # A pair that is apart is found before it is much deeper than the tolerance.
+    from_start = bool(out[1] > problem.allowed[found] + 3.0 * OVERLAP)
     if r >= 0:
-        return PathOverlap(place, name, hand.links[r].name, False, float(out[1]))
+        return PathOverlap(place, name, hand.links[r].name, False, float(out[1]), from_start=from_start)
     assert around is not None
-    return _with_object(hand, q, m, source, around, place, float(out[1]))
+    assert number is not None
+    body, position = _where(hand, q, m, source, around.bodies[number], around.T_palm_object)
+    return PathOverlap(place, name, body, True, float(out[1]), position, from_start)
 
 
-def _with_object(
-    hand: Hand, q: FloatArray, link: int, source: CollisionSource, around: PlacedObject, place: float, depth: float
-) -> PathOverlap:
-    deepest = hand_depths(hand, q, around.packed, around.T_palm_object, source, links=[link])
+def _where(
+    hand: Hand, q: FloatArray, link: int, source: CollisionSource, packed: PackedObject, T_palm_object: FloatArray
+) -> tuple[str, tuple[float, float, float] | None]:
+    """Return the name of a body and the place in the palm's frame at which a link is deepest in it [m]."""
+    deepest = hand_depths(hand, q, packed, T_palm_object, source, links=[link])
     spot = next((d.place for d in deepest if d.place is not None), None)
-    names = around.packed.body_names
-    body, position = names[0] if names else "object", None
-    if spot is not None:
-        body = names[nearest_body(around.packed, spot)]
-        x, y, z = (around.T_palm_object @ np.append(spot, 1.0))[:3].tolist()
-        position = (x, y, z)
-    return PathOverlap(place, hand.links[link].name, body, True, depth, position)
+    name = packed.body_names[0] if packed.body_names else "object"
+    if spot is None:
+        return name, None
+    x, y, z = (T_palm_object @ np.append(spot, 1.0))[:3].tolist()
+    return name, (x, y, z)
 
 
 def _corners(path: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -147,7 +188,9 @@ def _place(line: FloatArray, share: float) -> float:
     return float(k + (share - shares[k]) / (shares[k + 1] - shares[k]))
 
 
-def _problem(hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None) -> PathProblem:
+def _problem(
+    hand: Hand, path: FloatArray, source: CollisionSource, number: int | None, around: PlacedObject | None
+) -> PathProblem:
     from clench.kernels.bodies import no_body
     from clench.kernels.link_meshes import ObjectMesh
     from clench.kernels.pair_motion import PathProblem
@@ -155,13 +198,13 @@ def _problem(hand: Hand, path: FloatArray, source: CollisionSource, around: Plac
 
     links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
     tables = _tables(hand, source)
-    if around is None:
+    if around is None or number is None:
         pairs, body, T = tables.between, no_body(), np.eye(4)
         none = build_tree(np.empty((0, 3)), np.empty((0, 3)))
         solid = ObjectMesh(none, np.empty(0, dtype=np.uint8), True, np.empty((0, 3)))
     else:
-        pairs, body, T = tables.all, around.packed.bodies, around.T_palm_object
-        solid = object_mesh(around.packed)
+        packed, T = around.bodies[number], around.T_palm_object
+        pairs, body, solid = tables.with_object if number else tables.all, packed.bodies, object_mesh(packed)
     pads = np.array([hand.links[m].pad_indentation if r < 0 else 0.0 for m, r in pairs.tolist()], dtype=np.float64)
     return PathProblem(
         frames=hand_frames(hand),
@@ -188,6 +231,7 @@ class _Tables:
     reach: FloatArray
     all: NDArray[np.int64]
     between: NDArray[np.int64]
+    with_object: NDArray[np.int64]
 
 
 @kept_by_identity(_KEPT_HANDS)
@@ -203,13 +247,12 @@ def _tables(hand: Hand, source: CollisionSource) -> _Tables:
             lineage[i] |= lineage[link.parent]
     solid = [i for i in hand.solid_links if links.root[i] >= 0]
     between = [(m, r) for m in solid for r in solid if r < m and (r, m) not in allowed]
-    all_pairs = [*between, *((m, -1) for m in solid)]
+    with_object = [(m, -1) for m in solid]
     return _Tables(
         mesh,
         lineage,
         _reach(hand, links, lineage),
-        np.array(all_pairs, dtype=np.int64).reshape(-1, 2),
-        np.array(between, dtype=np.int64).reshape(-1, 2),
+        *(np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in ([*between, *with_object], between, with_object)),
     )
 
 
