@@ -118,4 +118,4 @@ def test_a_surface_without_an_inside_is_not_proven() -> None:
     hand = facing_fingers()
     solution = replace(crossing(hand, 1.0, 1.2), hand_pose=Pose.identity(), object_pose=Pose((5.0, 0.0, 0.0)))
     notes = plan_trajectory(solution, hand, obj=sheet).notes
-    assert "Not proven: no link passes through 'sheet', which is a surface without an inside." in notes
+    assert "Not proven: no link passes through 'sheet[0]', which is a surface without an inside." in notes
