@@ -34,7 +34,7 @@ def case() -> PeerCase:
 
 
 def circle_angle(radius: float, x: float, z: float, thickness: float) -> float:
-    """Return where a straight link through the origin touches a circle (METHOD.md section 3)."""
+    """Return where a straight link through the origin touches a circle (docs/method.md section 3)."""
     return float(np.arctan2(z, x) - np.arcsin((radius + thickness) / np.hypot(x, z)))
 
 

@@ -91,7 +91,7 @@ def ball() -> GraspObject:
 
 
 def thumb_angle() -> float:
-    """Closed form: circle and straight link (METHOD.md section 3)."""
+    """Closed form: circle and straight link (docs/method.md section 3)."""
     distance = np.hypot(0.04, BALL_HEIGHT)
     return float(np.arctan2(0.04, BALL_HEIGHT) - np.arcsin((BALL_RADIUS + WIDTH) / distance))
 

@@ -1,4 +1,4 @@
-"""Curl planes lie where METHOD.md section 1 puts them, and a mirrored finger gets mirrored planes."""
+"""Curl planes lie where docs/method.md section 1 puts them, and a mirrored finger gets mirrored planes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""An oracle for the exact width: python-fcl's distances of cores, along the closing path (METHOD.md sections 5 and 8).
+"""An oracle for the exact width: python-fcl's distances along the closing path (docs/method.md sections 5 and 8).
 
 Nothing of the project's kernels: where the links are is forward kinematics of the hand, how far they are is the other
 engine's. Advancing by distance over speed passes nothing that is thicker than the smallest step.
@@ -21,7 +21,7 @@ from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 Floats = npt.NDArray[np.float64]
 
-#: Gaps up to this are touching, as METHOD.md section 4 states it [m].
+#: Gaps up to this are touching, as docs/method.md section 4 states it [m].
 TOUCHING = 1e-9
 #: The oracle's smallest step [rad]: where it is nearer to a contact than that, it looks at the end alone.
 _LEAST = 1e-5

@@ -1,4 +1,4 @@
-"""Whole solves against closed forms: circle, ellipse, box and tip (METHOD.md section 3), to 1e-9 rad."""
+"""Whole solves against closed forms: circle, ellipse, box and tip (docs/method.md section 3), to 1e-9 rad."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The patent's conditions hold for every side contact on smooth objects (METHOD.md section 3)."""
+"""The patent's conditions hold for every side contact on smooth objects (docs/method.md section 3)."""
 
 import numpy as np
 import pytest

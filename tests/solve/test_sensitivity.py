@@ -129,7 +129,7 @@ def test_shapes_that_are_swept_as_polyhedra(shape):
 
 
 def test_one_link_on_a_ball_in_closed_form():
-    """theta = gamma - asin((R + w) / D), METHOD.md section 3: its derivatives by the ball's place."""
+    """theta = gamma - asin((R + w) / D), docs/method.md section 3: its derivatives by the ball's place."""
     radius, w = 0.02, 0.008
     x, z = 0.05, 0.05
     hand, ball = one_link(w), GraspObject.load(f"sphere:r={radius}", pose=Pose([x, 0.0, z]))

@@ -1,4 +1,4 @@
-"""The tolerances of the method, with units and the section of METHOD.md that gives each."""
+"""The tolerances of the method, with units and the section of docs/method.md that gives each."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ TOUCH_FRACTION: Final = 1e-9
 SWEEP_FRACTION: Final = 1e-10
 #: Foot points count as inside up to this fraction of the feature's length [-] (section 3).
 FOOT_FRACTION: Final = 1e-12
-#: Axes closer than this share one family of curl planes [rad] (section 1, which says 1e-6: over a finger of 0.1 m that
-#: is off by 1e-7 m, a hundred times what a contact's gap may be).
+#: Axes closer than this share one family of curl planes [rad] (section 1). With 1e-6, a finger of 0.1 m would be off by
+#: 1e-7 m: a hundred times what a contact's gap may be.
 PARALLEL_ANGLE: Final = 1e-9
 #: Joints within this of the most distal joint's axis close the finger [rad] (section 1).
 CLOSING_ANGLE: Final = 0.08726646259971647  # 5 degrees

@@ -1,4 +1,4 @@
-"""The last piece of the way: from a posture off the object straight to all contacts at once (METHOD.md section 7)."""
+"""The last piece of the way: from off the object straight to all contacts at once (docs/method.md section 7)."""
 
 from __future__ import annotations
 

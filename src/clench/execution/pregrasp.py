@@ -1,4 +1,4 @@
-"""The pregrasp: every finger off the object by a clearance (METHOD.md section 7)."""
+"""The pregrasp: every finger off the object by a clearance (docs/method.md section 7)."""
 
 from __future__ import annotations
 

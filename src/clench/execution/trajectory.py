@@ -1,4 +1,4 @@
-"""Timed joint paths from the open hand to the touch, on which all fingers arrive together (METHOD.md section 7)."""
+"""Timed joint paths from the open hand to the touch; all fingers arrive together (docs/method.md section 7)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pack a problem, so that kernels solve it at many poses (METHOD.md sections 4 to 6)."""
+"""Pack a problem, so that kernels solve it at many poses (docs/method.md sections 4 to 6)."""
 
 from __future__ import annotations
 

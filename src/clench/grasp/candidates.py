@@ -1,4 +1,4 @@
-"""The alternative sets of a finger, read out of what the kernels computed (METHOD.md section 5)."""
+"""The alternative sets of a finger, read out of what the kernels computed (docs/method.md section 5)."""
 
 from __future__ import annotations
 

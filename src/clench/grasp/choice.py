@@ -1,4 +1,4 @@
-"""Choose the best set of every finger, and of all of them together (METHOD.md section 6)."""
+"""Choose the best set of every finger, and of all of them together (docs/method.md section 6)."""
 
 from __future__ import annotations
 

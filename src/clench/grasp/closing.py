@@ -1,4 +1,4 @@
-"""Close every candidate of every finger in one call of the kernels (METHOD.md sections 2-5)."""
+"""Close every candidate of every finger in one call of the kernels (docs/method.md sections 2-5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Search the combinations of one set per finger for the best (METHOD.md section 6).
+"""Search the combinations of one set per finger for the best (docs/method.md section 6).
 
 Criteria of the whole hand do not add up over the fingers, so the best of every finger need not be the best of all. The
 search goes best first: for every combination it knows a ceiling that its sum does not exceed, judges the one with the

@@ -1,4 +1,4 @@
-"""What a criterion is: a number for a set, with a unit, a direction and a source (METHOD.md section 6)."""
+"""What a criterion is: a number for a set, with a unit, a direction and a source (docs/method.md section 6)."""
 
 from __future__ import annotations
 

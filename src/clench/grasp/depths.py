@@ -57,7 +57,7 @@ def hand_depths(
     *,
     links: Collection[int] | None = None,
 ) -> tuple[LinkDepth, ...]:
-    """Return the depth of penetration of every link that has a shape (METHOD.md section 5).
+    """Return the depth of penetration of every link that has a shape (docs/method.md section 5).
 
     Round shapes are inscribed polyhedra, so their depth is too small by at most `TESSELLATION_DEVIATION` for each side.
     Depths up to the size of the link (the diameter of a ball around it) are exact. A link that is deeper gets that

@@ -1,4 +1,4 @@
-"""The criteria of one finger's set (METHOD.md section 6)."""
+"""The criteria of one finger's set (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class TouchingLinks:
 
     name: ClassVar[str] = "touching_links"
     unit: ClassVar[str] = "links"
-    source: ClassVar[str] = "METHOD.md section 6"
+    source: ClassVar[str] = "docs/method.md section 6"
     scale: ClassVar[float] = 1.0
     larger_is_better: ClassVar[bool] = True
 
@@ -59,7 +59,7 @@ class LimitDistance:
 
     name: ClassVar[str] = "limit_distance"
     unit: ClassVar[str] = "fraction of the range"
-    source: ClassVar[str] = "METHOD.md section 6"
+    source: ClassVar[str] = "docs/method.md section 6"
     scale: ClassVar[float] = 0.5
     larger_is_better: ClassVar[bool] = True
 
@@ -128,7 +128,7 @@ class Clearance:
 
     name: ClassVar[str] = "clearance"
     unit: ClassVar[str] = "m"
-    source: ClassVar[str] = "METHOD.md section 6"
+    source: ClassVar[str] = "docs/method.md section 6"
     scale: ClassVar[float] = 0.01
     larger_is_better: ClassVar[bool] = True
 
@@ -149,7 +149,7 @@ class PoseSensitivity:
 
     name: ClassVar[str] = "pose_sensitivity"
     unit: ClassVar[str] = "rad/m"
-    source: ClassVar[str] = "METHOD.md section 5: sensitivity"
+    source: ClassVar[str] = "docs/method.md section 5: sensitivity"
     scale: ClassVar[float] = 50.0
     larger_is_better: ClassVar[bool] = False
 
@@ -174,7 +174,7 @@ class PadIndentation:
 
     name: ClassVar[str] = "pad_indentation"
     unit: ClassVar[str] = "m"
-    source: ClassVar[str] = "METHOD.md section 5: pad allowance"
+    source: ClassVar[str] = "docs/method.md section 5: pad allowance"
     scale: ClassVar[float] = 1e-3
     larger_is_better: ClassVar[bool] = False
 

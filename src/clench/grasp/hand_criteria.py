@@ -1,4 +1,4 @@
-"""The criteria of all fingers together: what forces their contacts resist and need (METHOD.md section 6).
+"""The criteria of all fingers together: what forces their contacts resist and need (docs/method.md section 6).
 
 Contacts are those of the chosen sets that still touch, as points with friction. Forces are per newton of load, so no
 mass has to be known, and torque limits play no part; those of a task are in newtons, and inside the limits.

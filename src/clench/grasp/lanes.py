@@ -1,4 +1,4 @@
-"""Links that only move along curl planes which lie apart never meet (METHOD.md section 1)."""
+"""Links that only move along curl planes which lie apart never meet (docs/method.md section 1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Split the commanded motion: posture from the command, closing to be solved, alternatives (METHOD.md section 1)."""
+"""Split the commanded motion: posture as commanded, closing to be solved, alternatives (docs/method.md section 1)."""
 
 from __future__ import annotations
 

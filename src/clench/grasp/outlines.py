@@ -1,4 +1,4 @@
-"""Cut link shapes by curl planes: rounded outlines (METHOD.md section 2)."""
+"""Cut link shapes by curl planes: rounded outlines (docs/method.md section 2)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Find where a hand first overlaps itself, the object or an obstacle on a path in joint space (METHOD.md section 7)."""
+"""Find where a hand on a path first overlaps itself, the object or an obstacle (docs/method.md section 7)."""
 
 from __future__ import annotations
 

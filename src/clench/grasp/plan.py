@@ -1,4 +1,4 @@
-"""Plan how a finger closes at one posture: groups, families of curl planes, link outlines (METHOD.md sections 1-2).
+"""Plan how a finger closes at one posture: groups, families of planes, link outlines (docs/method.md sections 1-2).
 
 A plan depends on the hand and the posture alone; nothing in it knows the object.
 """

@@ -1,4 +1,4 @@
-"""Lay curl planes across a finger (METHOD.md section 1)."""
+"""Lay curl planes across a finger (docs/method.md section 1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the joint angles of a closed hand change with the object's pose, stage by stage (METHOD.md section 5)."""
+"""How the joint angles of a closed hand change with the object's pose, stage by stage (docs/method.md section 5)."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def nearest_link(
 ) -> tuple[float, int]:
     """Return the smallest gap between some links and a body [m], and the link that has it; infinite and -1 for none.
 
-    Exact but for cylinders and ellipsoids, which count as the polyhedra that are swept (METHOD.md section 5).
+    Exact but for cylinders and ellipsoids, which count as the polyhedra that are swept (docs/method.md section 5).
 
     Args:
         hand: the hand. q: angles of all its joints [rad], shape (J,). links: indices of those that count.

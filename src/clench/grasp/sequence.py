@@ -1,4 +1,4 @@
-"""Close the chosen sets again one finger after another, each with the others in its way (METHOD.md section 5)."""
+"""Close the chosen sets again one finger after another, each with the others in its way (docs/method.md section 5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fingers that move at the same time hold each other where they meet (METHOD.md sections 4 and 5, *together*)."""
+"""Fingers that move at the same time hold each other where they meet (docs/method.md sections 4 and 5, *together*)."""
 
 from __future__ import annotations
 

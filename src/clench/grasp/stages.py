@@ -1,4 +1,4 @@
-"""The stages in which a closed hand was reached, found again from its open and final postures (METHOD.md section 4)."""
+"""The stages in which a hand closed, found again from its open and final postures (docs/method.md section 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The first contact of a finger along one path segment, on some of its planes (METHOD.md sections 3 and 4)."""
+"""The first contact of a finger along one path segment, on some of its planes (docs/method.md sections 3 and 4)."""
 
 from __future__ import annotations
 

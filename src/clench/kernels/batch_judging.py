@@ -1,4 +1,4 @@
-"""Choose among the sets of every finger and judge the answer, for many poses of an object (METHOD.md sections 5, 6)."""
+"""Choose among the sets of every finger and judge the answer, for many poses (docs/method.md sections 5, 6)."""
 
 from __future__ import annotations
 

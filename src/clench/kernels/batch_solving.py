@@ -1,4 +1,4 @@
-"""Solve a packed problem at many poses of an object, one after another, in one call (METHOD.md sections 4 to 6)."""
+"""Solve a packed problem at many poses, one after another, in one call (docs/method.md sections 4 to 6)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long a moving core stays clear of the box around a node of a resting body (METHOD.md section 5).
+"""How long a moving core stays clear of the box around a node of a resting body (docs/method.md section 5).
 
 Small parts of a surface are flat: the boxes around them are thin, where capsules are as thick as they are wide. Of a
 moving node the core is the rectangle in the middle of its box.

@@ -1,4 +1,4 @@
-"""Closing a finger, one degree of freedom after another (METHOD.md section 4), for every candidate at once."""
+"""Closing a finger, one degree of freedom after another (docs/method.md section 4), for every candidate at once."""
 
 from __future__ import annotations
 
@@ -285,7 +285,7 @@ def close_items(
     together: bool,
     answer: ClosingArrays,
 ) -> None:
-    """Close every item of work (METHOD.md section 4).
+    """Close every item of work (docs/method.md section 4).
 
     Args:
         hand: the fingers. exact: what the exact sweeps need.

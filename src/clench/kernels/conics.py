@@ -1,4 +1,4 @@
-"""First contact with an ellipse of the object, whole or cut by two caps (METHOD.md section 3).
+"""First contact with an ellipse of the object, whole or cut by two caps (docs/method.md section 3).
 
 The distance to a convex region is convex, so along a motion with acceleration at most M the gap bends down by at
 most M: the safe step of `coupled` holds here too. Sides use the support function of the ellipse.

@@ -1,4 +1,4 @@
-"""Sharp features that touch at the start, and whether they block (METHOD.md section 3).
+"""Sharp features that touch at the start, and whether they block (docs/method.md section 3).
 
 The gap of one vertex and one line decides alone where the touch lies inside the line's segment. Where two corners
 meet, the line of either side is only one of several that separate them: the motion is blocked when it closes the gap

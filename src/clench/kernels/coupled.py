@@ -1,4 +1,4 @@
-"""First contact when several joints turn at once (METHOD.md section 4).
+"""First contact when several joints turn at once (docs/method.md section 4).
 
 Along one path segment every joint turns at its own constant rate, so a point of a link moves as
 `p(s) = P + Σ R(Ω_i s) e_i`, and every gap of section 3 is a sum `C + Σ A_i cos(ω_i s) + B_i sin(ω_i s)`.

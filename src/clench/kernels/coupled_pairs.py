@@ -1,4 +1,4 @@
-"""All feature pairs of one link outline and one object feature, under several turning joints (METHOD.md section 4)."""
+"""All feature pairs of one link outline and one object feature, under several joints (docs/method.md section 4)."""
 
 from __future__ import annotations
 

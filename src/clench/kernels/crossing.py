@@ -1,4 +1,4 @@
-"""Whether two sharp faces that meet cut into each other, or only touch (METHOD.md section 5)."""
+"""Whether two sharp faces that meet cut into each other, or only touch (docs/method.md section 5)."""
 
 from __future__ import annotations
 

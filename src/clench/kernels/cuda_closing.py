@@ -1,4 +1,4 @@
-"""Close the fingers for many poses on a CUDA device, by the functions that do it on the CPU (METHOD.md section 4).
+"""Close the fingers for many poses on a CUDA device, by the functions that do it on the CPU (docs/method.md section 4).
 
 One thread cuts the object by the planes of one pose, one thread closes one item. Everything is double precision, as on
 the CPU; only the last bits may differ, as the device's sine, cosine and fused products do.

@@ -1,4 +1,4 @@
-"""How deep two meshes overlap (METHOD.md section 5): the surface point of one that is deepest inside the other."""
+"""How deep two meshes overlap (docs/method.md section 5): the surface point of one that is deepest inside the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bounds from below on when parts of a moving body can meet parts of a resting one (METHOD.md section 5)."""
+"""Bounds from below on when parts of a moving body can meet parts of a resting one (docs/method.md section 5)."""
 
 from __future__ import annotations
 

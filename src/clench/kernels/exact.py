@@ -1,4 +1,4 @@
-"""The exact width: where the links are, what overlaps, and how a pair touches (METHOD.md section 5)."""
+"""The exact width: where the links are, what overlaps, and how a pair touches (docs/method.md section 5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The object's sections with the curl planes of a family: triangles and round primitives (METHOD.md section 2)."""
+"""The object's sections with the curl planes of a family: triangles and round primitives (docs/method.md section 2)."""
 
 from __future__ import annotations
 

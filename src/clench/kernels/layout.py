@@ -1,4 +1,4 @@
-"""Layout of the arrays that kernels read and write (METHOD.md sections 1 and 2).
+"""Layout of the arrays that kernels read and write (docs/method.md sections 1 and 2).
 
 A *family* is a set of parallel curl planes shared by consecutive joints of a finger. Its frame has y along the
 planes' normal, so in-plane coordinates are (x, z) and a positive turn takes x towards z. Everything in `FingerArrays`

@@ -1,4 +1,4 @@
-"""Whether two convex cores that touch may move on, and how far (METHOD.md section 3, touching at the start).
+"""Whether two convex cores that touch may move on, and how far (docs/method.md section 3, touching at the start).
 
 They may when a plane separates them now and goes on to do so. Planes that rest are looked at first: those of faces and
 those along two edges. A core that tilts off a corner, or rolls off an edge, takes its plane along; that is probed by
@@ -19,8 +19,8 @@ from .vectors import Vector
 
 #: Below this fraction of the touch tolerance a gap has no direction of its own [-].
 FLAT = 1.0 / 256.0
-#: A pair that overlaps by up to this many touch tolerances at the start touches: METHOD.md section 3 says 1e-9 of the
-#: finger's length [-].
+#: A pair that overlaps by up to this many touch tolerances at the start touches: docs/method.md section 3 says 1e-9 of
+#: the finger's length [-].
 OVERLAPPING = 10.0
 #: Answers for a touching pair: no plane permits the motion; no plane separates it.
 BLOCKED, OVERLAP = 0.0, -1.0

@@ -1,4 +1,4 @@
-"""The meshes of a hand's links in one piece, and what lies how deep in what (METHOD.md sections 3 and 5)."""
+"""The meshes of a hand's links in one piece, and what lies how deep in what (docs/method.md sections 3 and 5)."""
 
 from __future__ import annotations
 

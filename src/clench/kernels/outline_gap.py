@@ -1,4 +1,4 @@
-"""How far an outline is from the object's section at one posture (METHOD.md section 4)."""
+"""How far an outline is from the object's section at one posture (docs/method.md section 4)."""
 
 from __future__ import annotations
 

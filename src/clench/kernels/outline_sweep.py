@@ -1,4 +1,4 @@
-"""The first contact of a moving outline with a section: what can meet it, the nearest first (METHOD.md section 3)."""
+"""The first contact of a moving outline with a section, the nearest segments first (docs/method.md section 3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a finger overlaps the object before anything moves (METHOD.md section 3)."""
+"""Whether a finger overlaps the object before anything moves (docs/method.md section 3)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How two bodies of a hand move relative to each other while its joints move on straight lines (METHOD.md section 7).
+"""How two bodies of a hand move relative to each other while its joints move on lines (docs/method.md section 7).
 
 Joints that move both bodies leave their gap as it is. So only the joints that move one of them count.
 """

@@ -1,4 +1,4 @@
-"""Planes that keep two bodies of a hand apart while its joints move on straight lines (METHOD.md section 7).
+"""Planes that keep two bodies of a hand apart while its joints move on straight lines (docs/method.md section 7).
 
 Two bodies that slide along each other touch all the way. A plane between the two shows that they do no more than that.
 """

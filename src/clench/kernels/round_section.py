@@ -1,4 +1,4 @@
-"""Exact sections of round primitives: circles, ellipses and straight edges (METHOD.md section 2)."""
+"""Exact sections of round primitives: circles, ellipses and straight edges (docs/method.md section 2)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cut a triangle mesh by a curl plane: the object's perimeter curve as segments (METHOD.md section 2)."""
+"""Cut a triangle mesh by a curl plane: the object's perimeter curve as segments (docs/method.md section 2)."""
 
 from __future__ import annotations
 

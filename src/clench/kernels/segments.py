@@ -1,4 +1,4 @@
-"""What moves next while a finger closes: the path segments of every order (METHOD.md section 4)."""
+"""What moves next while a finger closes: the path segments of every order (docs/method.md section 4)."""
 
 from __future__ import annotations
 

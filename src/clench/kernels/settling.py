@@ -1,4 +1,4 @@
-"""The contacts of a finger at its final posture: where later motions left them (METHOD.md section 4)."""
+"""The contacts of a finger at its final posture: where later motions left them (docs/method.md section 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How points move that joints turn about axes which are not parallel (METHOD.md section 4, several joints at once).
+"""How joints about axes that are not parallel move points (docs/method.md section 4, *several joints at once*).
 
 A chain of such joints has rows (rate, a_x, a_y, a_z, e_x, e_y, e_z): turn per travel, unit axis, and the way to the
 next pivot [m], all where the motion begins. What it moves is given relative to the last pivot, and the answer is

@@ -1,4 +1,4 @@
-"""The exact width of one path segment: moving links against object and resting links (METHOD.md section 5).
+"""The exact width of one path segment: moving links against object and resting links (docs/method.md section 5).
 
 A link that joints of one family move turns about parallel axes, in the family's frame. One that joints of several
 families move at once is seen in the palm frame, with a chain that has an axis per joint.

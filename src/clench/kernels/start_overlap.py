@@ -1,4 +1,4 @@
-"""Whether fingers overlap the object before anything moves (METHOD.md section 3, *overlap at the start*)."""
+"""Whether fingers overlap the object before anything moves (docs/method.md section 3, *overlap at the start*)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pairs of parts of two bodies, through their trees: the scratch space, gaps and overlaps (METHOD.md section 5)."""
+"""Pairs of parts of two bodies, through their trees: scratch space, gaps and overlaps (docs/method.md section 5)."""
 
 from __future__ import annotations
 

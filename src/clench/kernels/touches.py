@@ -1,4 +1,4 @@
-"""Read the contacts of closed fingers: link, joint, place and normal in the palm frame (METHOD.md section 4)."""
+"""Read the contacts of closed fingers: link, joint, place and normal in the palm frame (docs/method.md section 4)."""
 
 from __future__ import annotations
 

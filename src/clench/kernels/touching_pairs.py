@@ -1,4 +1,4 @@
-"""Which elements touch at given postures, and along which direction (METHOD.md section 5, *Sensitivity*)."""
+"""Which elements touch at given postures, and along which direction (docs/method.md section 5, *Sensitivity*)."""
 
 from __future__ import annotations
 

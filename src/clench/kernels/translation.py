@@ -1,4 +1,4 @@
-"""First contact of a mesh that moves along a straight line with a mesh at rest (METHOD.md section 4, *Approach*)."""
+"""First contact of a mesh that moves along a line with a mesh at rest (docs/method.md section 4, *Approach*)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""First contact under one rotation, in closed form (METHOD.md section 3).
+"""First contact under one rotation, in closed form (docs/method.md section 3).
 
 Everything lives in the plane of the joint: the pivot is the origin, the link turns counter-clockwise. A point that
 turns through a root of the table is found without trigonometry (`p*` below); only events whose foot is inside their

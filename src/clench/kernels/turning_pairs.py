@@ -1,4 +1,4 @@
-"""All feature pairs of one link outline and one object feature, under one turning joint (METHOD.md section 3)."""
+"""All feature pairs of one link outline and one object feature, under one turning joint (docs/method.md section 3)."""
 
 from __future__ import annotations
 

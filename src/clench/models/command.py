@@ -16,7 +16,7 @@ from .shapes import CollisionSource
 
 
 class ClosingOrder(StrEnum):
-    """Name the order in which joints close (METHOD.md section 4)."""
+    """Name the order in which joints close (docs/method.md section 4)."""
 
     PROXIMAL_FIRST = "proximal-first"
     """one degree of freedom after another, from the palm outwards (the patent)"""
@@ -90,7 +90,7 @@ class GraspCommand:
 
     @classmethod
     def from_posture(cls, hand: Hand, q: FloatArray | Mapping[str, float], hand_pose: Pose) -> GraspCommand:
-        """Decompose a whole posture: posture joints are kept, closing joints are solved anew (METHOD.md section 1).
+        """Decompose a whole posture: keep its posture joints, solve closing joints anew (docs/method.md section 1).
 
         Args:
             hand: the hand. q: all joint angles [rad], by name or in model order, shape (J,).

@@ -36,7 +36,7 @@ class ShapeKind(StrEnum):
 
 
 class CollisionSource(StrEnum):
-    """Name which geometry of a model is meant (METHOD.md section 2); results compare only for the same choice."""
+    """Name which geometry of a model is meant (docs/method.md section 2); results compare only for the same choice."""
 
     ENGINE = "engine"
     """what MuJoCo collides: primitives, and the convex hull of every mesh"""

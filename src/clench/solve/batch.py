@@ -1,4 +1,4 @@
-"""Solve one command at many poses, as arrays (METHOD.md sections 4 to 6)."""
+"""Solve one command at many poses, as arrays (docs/method.md sections 4 to 6)."""
 
 from __future__ import annotations
 

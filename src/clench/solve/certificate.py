@@ -1,4 +1,4 @@
-"""Say what is promised about a solution, and why, or why nothing is (METHOD.md section 5)."""
+"""Say what is promised about a solution, and why, or why nothing is (docs/method.md section 5)."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record | None = None) -> GraspSolution:
-    """Close a hand around an object and return the best set of contacts and joint angles (METHOD.md).
+    """Close a hand around an object and return the best set of contacts and joint angles (docs/method.md).
 
     Args:
         hand: see `Hand.load`. obj: see `GraspObject.load`.

@@ -103,7 +103,7 @@ class GraspBatch(LateFields):
         question: what was asked. joint_names, finger_names, link_names, body_names: what the columns are.
         hand_poses, object_poses: as asked, rows [w, x, y, z, X, Y, Z], shape (N, 7).
         status_codes: indices into `STATUSES`, shape (N,); `status` has their names.
-        certified: whether METHOD.md section 5 is promised, shape (N,).
+        certified: whether the certificate of docs/method.md section 5 holds, shape (N,).
         joint_angles: of every joint [rad], shape (N, J).
         finger_codes: indices into `FINGER_STATUSES`, shape (N, F); `finger_status` has their names.
         planes: index of the chosen plane of each finger, -1 for the full width, shape (N, F).

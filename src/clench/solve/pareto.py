@@ -1,4 +1,4 @@
-"""Combinations over all fingers that no other beats in every criterion (METHOD.md section 6)."""
+"""Combinations over all fingers that no other beats in every criterion (docs/method.md section 6)."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def pose_error(
     *,
     solution: GraspSolution | None = None,
 ) -> PoseErrorReport:
-    """Return what an error of the object's pose does to a grasp (METHOD.md section 5, *Sensitivity*).
+    """Return what an error of the object's pose does to a grasp (docs/method.md section 5, *Sensitivity*).
 
     Args:
         hand, obj, command: as for `clench.solve`.

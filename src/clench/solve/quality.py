@@ -1,4 +1,4 @@
-"""How good a solution's grasp is: steadiness, and the effort of holding (METHOD.md section 6)."""
+"""How good a solution's grasp is: steadiness, and the effort of holding (docs/method.md section 6)."""
 
 from __future__ import annotations
 

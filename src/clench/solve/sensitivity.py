@@ -1,4 +1,4 @@
-"""How the joint angles change when the object is not quite where it was thought to be (METHOD.md section 5)."""
+"""How the joint angles change when the object is not quite where it was thought to be (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Sensitivity:
 
 
 def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensitivity:
-    """Return how the joint angles of a solution change with the object's pose (METHOD.md section 5).
+    """Return how the joint angles of a solution change with the object's pose (docs/method.md section 5).
 
     A joint that a touch stopped stops where the gap is used up, and a gap changes by n·(velocity of the link's point -
     velocity of the object's point), whatever features touch. Joints before it, and fingers that closed earlier, are

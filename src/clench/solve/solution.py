@@ -175,8 +175,8 @@ class GraspSolution(LateFields):
         hand_pose: `T_world_palm`; object_pose: `T_world_object`.
         decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
         joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
-        certified, certificate: whether METHOD.md section 5 is promised, and ``"text"`` with what, or why not;
-            ``"deviation"`` of what is swept as polyhedra [m].
+        certified, certificate: whether the certificate of docs/method.md section 5 holds, and ``"text"`` with what is
+            promised, or why nothing is; ``"deviation"`` of what is swept as polyhedra [m].
         choice: why these sets: what counted, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the whole width and all links [m], None when not computed.
         speeds: how fast free joints closed relative to each other in an order where all move at once; 1 if not named.

@@ -1,4 +1,4 @@
-"""The squeeze plan of a solution: forces, torques, angle offsets and tensions (METHOD.md section 6)."""
+"""The squeeze plan of a solution: forces, torques, angle offsets and tensions (docs/method.md section 6)."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class GraspPosture:
     root: str | None = None
 
     def command(self, hand: Hand) -> GraspCommand:
-        """Return a command that keeps the posture joints and closes the others anew (METHOD.md section 1).
+        """Return a command that keeps the posture joints and closes the others anew (docs/method.md section 1).
 
         Raises:
             CommandError: angles that the hand's joints cannot have, or another number of them.

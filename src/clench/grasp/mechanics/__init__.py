@@ -1,1 +1,1 @@
-"""Contact mechanics: contacts and forces, what a grasp resists, and what it costs to hold (METHOD.md section 6)."""
+"""Contact mechanics: contacts, forces, what a grasp resists, what it costs to hold (docs/method.md section 6)."""

@@ -1,4 +1,4 @@
-"""Actuation force: the smallest worst joint torque, or tendon tension, that holds a load (METHOD.md section 6).
+"""Actuation force: the smallest worst joint torque, or tendon tension, that holds a load (docs/method.md section 6).
 
 A. Bicchi and V. Kumar, "Robotic grasping and contact: a review", ICRA 2000, give the problem: forces are not
 determined by the load alone; among those inside the cones the best are chosen. Friction cones are second-order cones.

@@ -1,4 +1,4 @@
-"""Contacts with their models: where fingers push, in which frames, and how far forces may lean (METHOD.md section 6).
+"""Contacts with their models: where fingers push, and how far forces may lean (docs/method.md section 6).
 
 Two models, after Murray, Li and Sastry (1994), chapter 5:
 

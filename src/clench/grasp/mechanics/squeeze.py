@@ -1,4 +1,4 @@
-"""The squeeze: contact forces that hold an object with a margin, before anything disturbs it (METHOD.md section 6).
+"""The squeeze: contact forces that hold an object with a margin against disturbances (docs/method.md section 6).
 
 Forces f balance the nominal load. A disturbance d changes them by the least that balances it, `-K d`, as equally stiff
 fingers do (torques of soft fingers count by gamma); the hand need not react. The margin is the largest s such that

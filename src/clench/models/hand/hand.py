@@ -28,7 +28,7 @@ DEFAULT_SPEED: Final = 2.0
 
 
 class JointRole(StrEnum):
-    """Name what a joint does in a grasp (METHOD.md section 1)."""
+    """Name what a joint does in a grasp (docs/method.md section 1)."""
 
     CLOSING = "closing"
     """moves its finger in curl planes; its angle is solved for"""

@@ -26,7 +26,7 @@ _DRAWS = 8
 
 
 def check_thumbs(hand: Hand) -> list[Finding]:
-    """Return a finding for every thumb that no finger meets, whatever its posture (METHOD.md section 1)."""
+    """Return a finding for every thumb that no finger meets, whatever its posture (docs/method.md section 1)."""
     others = [finger for finger in hand.fingers if not finger.is_thumb]
     reached = [_tips(hand, finger) for finger in others]
     found = []

@@ -1,4 +1,4 @@
-"""Decide what every joint does: role, closing direction, open value, each with its reason (METHOD.md section 1)."""
+"""Decide what every joint does: role, closing direction, open value, with reasons (docs/method.md section 1)."""
 
 from __future__ import annotations
 
