@@ -139,3 +139,16 @@ def test_way_points_on_a_straight_line_change_nothing() -> None:
 def test_a_path_of_one_posture() -> None:
     hand = two_chains()
     assert find_path_overlap(hand, np.zeros((1, 4)), SOURCE) is None
+
+
+def test_links_that_rub_against_each_other_for_long_end_the_proof() -> None:
+    """Two links overlap at their bases in every posture, and turn a hundred times: no proof goes on for ever."""
+    builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH])
+    base = mount((0.0, 1.5 * RADIUS, 0.0))
+    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=base, axes=[Y]).hand()
+    path = np.array([[0.0, 0.0], [0.0, 600.0]])
+    found = find_path_overlap(hand, path, SOURCE)
+    assert found is not None
+    assert np.isnan(found.depth)
+    assert 0.0 < found.place < 1.0
+    assert "cannot be proven that they stay apart" in found.sentence

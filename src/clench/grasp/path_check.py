@@ -60,7 +60,8 @@ class PathOverlap:
         place: number of the way-point before it, plus the share of the way to the next one.
         link: name of a link. other: name of the other link, or of the body of the object.
         with_object: whether `other` is a body of the object.
-        depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm.
+        depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm. Not
+            a number where they rub against each other for so long that the proof was given up.
         position: place in the palm's frame [m]; None where the overlap is too shallow to locate.
         from_start: whether the two overlap where the path begins, and go deeper.
     """
@@ -77,6 +78,8 @@ class PathOverlap:
     def sentence(self) -> str:
         """One sentence without a full stop, e.g. "'thumb_tip' would overlap 'index_tip' by 3.2 mm"."""
         what = f"the object's '{self.other}'" if self.with_object else f"'{self.other}'"
+        if np.isnan(self.depth):
+            return f"'{self.link}' moves along {what} for so long that it cannot be proven that they stay apart"
         depth = f"by at least {self.depth * 1e3:.2g} mm"
         if self.from_start:
             return f"'{self.link}' overlaps {what} where the path begins, and would go deeper, {depth}"

@@ -27,6 +27,8 @@ TOUCH: Final = 1e-6
 APART: Final = 1e-4
 #: Bodies that overlapped where the path began are looked at in steps of this motion until they are apart [m].
 EXEMPT_STEP: Final = 2e-4
+#: No pair is looked at more often on one path: bodies that rub against each other all the way are given up.
+MOST_LOOKS: Final = 3_000
 #: The gap between two balls is enough for a step if it is this share of the motion that is left [-].
 BALLS: Final = 0.25
 
@@ -102,6 +104,8 @@ def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: Pat
 def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tuple[float, float]:
     """Return the place at which a pair first overlaps, and how deep [m]; infinite and 0 where it does not.
 
+    The depth is not a number where `MOST_LOOKS` are not enough to prove that the pair stays apart.
+
     A pair that overlaps where the path begins may stay as deep as it was at any look since, until it is apart.
 
     Args:
@@ -109,7 +113,7 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
     """
     m, r, pad = problem.pairs[p, 0], problem.pairs[p, 1], problem.allowed[p]
     put_left(problem, m, r, work)
-    left, last, k, t, exempt = work.left, work.left.shape[0] - 1, 0, 0.0, 0.0
+    left, last, k, t, exempt, looks = work.left, work.left.shape[0] - 1, 0, 0.0, 0.0, 0
     for axis in range(3):
         work.normal[axis] = 0.0
     while k + t <= until:
@@ -123,6 +127,9 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
             if share * (left[k] - left[k + 1]) >= FOUND:
                 t += share
                 continue
+        looks += 1
+        if looks > MOST_LOOKS:
+            return k + t, math.nan
         gap = gap_between(problem, m, r, APART, work)
         depth = -gap - pad
         if k + t == 0.0 and depth > FOUND:
