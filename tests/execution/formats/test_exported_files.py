@@ -141,6 +141,38 @@ def test_confidence_says_what_is_known(grip: Grip, tmp_path: Path) -> None:
     assert confidence(solution, hold=clench.Hold(duration=0.2, squeeze=0.0)) == 0.0
 
 
+def test_a_note_says_why_the_confidence_is_zero(grip: Grip, tmp_path: Path) -> None:
+    hand, ball, solution = grip
+    alone = replace(solution, contacts=tuple(c for c in solution.contacts if c.finger == "thumb"))
+    report = clench.export_grasps(tmp_path / "g.json", alone, hand=hand, obj=ball)
+    assert report.confidences == (0.0,)
+    plan = clench.plan_squeeze(alone, hand, ball, gravity=None)
+    assert plan.text.startswith("No squeeze holds")
+    assert plan.text in report.notes
+    missed = replace(solution, status=clench.SolutionStatus.NO_CONTACT)
+    notes = clench.export_grasps(tmp_path / "g.json", missed, hand=hand, obj=ball).notes
+    assert any(note.startswith("The solution is not valid: ") for note in notes)
+
+
+def test_the_command_prints_the_confidence_of_every_file(
+    grip: Grip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    solution = grip[2]
+    alone = replace(solution, contacts=tuple(c for c in solution.contacts if c.finger == "thumb"))
+    Path("l.json").write_text(json.dumps([solution.to_dict(), alone.to_dict(), solution.to_dict()]))
+    assert main(["export", "l.json", "--out", "g.yaml"]) == 0
+    out = capsys.readouterr().out
+    assert "  g.yaml: confidence 0.5 (2 grasps), 0 (1 grasp)\n" in out
+    assert "note: No squeeze holds" in out
+    assert main(["export", "l.json", "--out", "many"]) == 0
+    out = capsys.readouterr().out
+    for i, confidence in enumerate(["0.5", "0", "0.5"]):
+        assert f"grasp_{i}.npy: confidence {confidence}\n" in out
+    assert main(["export", "l.json", "--out", "many", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["confidences"] == [0.5, 0.0, 0.5]
+
+
 def test_what_is_missing_is_planned_or_told(grip: Grip, tmp_path: Path) -> None:
     hand, ball, solution = grip
     file = tmp_path / "g.npy"
@@ -162,7 +194,11 @@ def test_what_is_missing_is_planned_or_told(grip: Grip, tmp_path: Path) -> None:
         assert offsets[name] == pytest.approx(offset, abs=1e-12)
     bare = replace(hand, joints=tuple(replace(j, stiffness=None) for j in hand.joints))
     (note,) = clench.export_grasps(tmp_path / "g.json", solution, hand=bare, obj=ball).notes
-    assert "no servo gain of" in note
+    pressing = [name for name, torque in anyhow.torques.items() if torque]
+    first = ", ".join(f"'{name}'" for name in pressing[:3])
+    assert len(pressing) > 4
+    assert note.startswith(f"The model gives no servo gain of {first} and {len(pressing) - 3} more joints: ")
+    assert note.endswith("Give the stiffness of the servos (--stiffness, stiffness=).")
     assert clench.export_grasps(tmp_path / "g.json", solution, hand=bare, obj=ball, stiffness=50.0).notes == ()
 
 

@@ -75,8 +75,9 @@ def export_grasps(
     """Write grasps in the format of another program (docs/exporting.md).
 
     With hand and object, a pregrasp and a squeeze for every direction of gravity are planned where a solution has none.
-    The confidence of a grasp is 1 where the hold test held, 0.5 where a squeeze is feasible, and 0 where none is, where
-    the test did not hold, and for a solution that is not valid.
+    The confidence of a grasp is 1 where the hold test held, and 0.5 where a squeeze is feasible. It is 0 where no
+    squeeze is feasible, where the test did not hold, where a straight line between the postures is not free, and for a
+    solution that is not valid. A note says why.
 
     Args:
         path: the file; for several grasps in the format dexgraspbench, a folder. Folders are made.
@@ -100,7 +101,7 @@ def export_grasps(
         hand, obj = hand or solutions.question.hand, obj or solutions.question.obj
         solutions = [solutions.solution(int(i)) for i in np.flatnonzero(solutions.status == SolutionStatus.GRASP)]
     several = [solutions] if isinstance(solutions, GraspSolution) else list(solutions)
-    chosen = _format(path, format)
+    chosen = format_of(path, format)
     bench = chosen is GraspFormat.DEXGRASPBENCH
     files = _files(Path(path), len(several)) if bench else (Path(path),)
     if bench and name is not None:
@@ -155,10 +156,15 @@ def import_grasps(path: str | Path, format: GraspFormat | str | None = None) -> 
         GraspFormat.DEXGRASPBENCH: read_dexgraspbench,
         GraspFormat.MOVEIT_GRASP: read_moveit_grasp,
     }
-    return readers[_format(path, format)](path)
+    return readers[format_of(path, format)](path)
 
 
-def _format(path: str | Path, given: GraspFormat | str | None) -> GraspFormat:
+def format_of(path: str | Path, given: GraspFormat | str | None = None) -> GraspFormat:
+    """Return the format of a file: the one that is given, else by the ending.
+
+    Raises:
+        FileError: the ending names no format. UnknownNameError: no such format.
+    """
     if given is not None:
         if given not in list(GraspFormat):
             raise UnknownNameError("format", str(given), "clench", [f.value for f in GraspFormat])

@@ -123,7 +123,7 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
         squeezed,
         joints,
         NEITHER if driven else _confidence(solution, held),
-        (*notes, *driven, *unplaced, *missing, *unpressed),
+        (*notes, *_doubts(solution), *driven, *unplaced, *missing, *unpressed),
     )
 
 
@@ -223,9 +223,11 @@ def _squeezed(
     notes = [*_beyond(solution, angles)]
     if not silent:
         return angles, tuple(notes)
-    named = f"{', '.join(silent[:3])} and {len(silent) - 3} more" if len(silent) > 4 else ", ".join(silent)
-    note = f"The model gives no servo gain of {named}: they are not told to squeeze. Give the stiffness of the servos."
-    return angles, (*notes, note)
+    first = silent[:3] if len(silent) > 4 else silent
+    named = ", ".join(f"'{name}'" for name in first)
+    more = f" and {len(silent) - len(first)} more joints" if len(silent) > len(first) else ""
+    note = f"The model gives no servo gain of {named}{more}: they are not told to squeeze."
+    return angles, (*notes, f"{note} Give the stiffness of the servos (--stiffness, stiffness=).")
 
 
 def _beyond(solution: GraspSolution, angles: Mapping[str, float]) -> Iterator[str]:
@@ -249,6 +251,15 @@ def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], 
         for j in dofs.motion[:, d].nonzero()[0] if name in torques else ():
             found[hand.joints[j].name] = float(dofs.motion[j, d] * torques[name] / gain)
     return found
+
+
+def _doubts(solution: GraspSolution) -> Iterator[str]:
+    """Yield what is wrong with a solution whose confidence is 0 without any test."""
+    if not solution.is_valid():
+        why = next(iter(solution.violations()), f"its status is '{solution.status.value}'")
+        yield f"The solution is not valid: {why.rstrip('.')}."
+    if solution.squeeze is not None and not solution.squeeze.get("feasible"):
+        yield str(solution.squeeze.get("text") or "The solution's squeeze plan is not feasible.")
 
 
 def _confidence(solution: GraspSolution, held: bool | None) -> float:
