@@ -230,6 +230,47 @@ def test_batches_and_lists_are_written(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["export", str(tmp_path / "l.json"), "--out", str(tmp_path / "g.json"), "--mass", "1", "2", "3"]) == 2
 
 
+def test_grasps_of_several_objects(
+    grip: Grip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hand, ball, solution = grip
+    larger = clench.GraspObject.load("sphere:r=0.031")
+    command = clench.GraspCommand(hand_pose=solution.hand_pose, object_pose=solution.object_pose)
+    other = clench.solve(hand, larger, command)
+    solution.save("a.json")
+    other.save("b.json")
+    assert main(["export", "a.json", "b.json", "--out", "g.json", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["confidences"]) == 2
+    assert not told["notes"]
+    touched = [grasp["allowed_touch_objects"] for grasp in moveit_grasps(Path("g.json"))]
+    assert touched == [["sphere:r=0.03"], ["sphere:r=0.031"]]
+    report = clench.export_grasps("g.json", [solution, other], hand=hand, obj=[ball, larger])
+    assert list(report.confidences) == told["confidences"]
+    assert main(["export", "a.json", "b.json", "--out", "many"]) == 0
+    assert sorted(file.name for file in Path("many").iterdir()) == ["grasp_0.npy", "grasp_1.npy"]
+    capsys.readouterr()
+    assert main(["export", "a.json", "b.json", "--out", "g.yaml"]) == 2
+    assert capsys.readouterr().err == (
+        "clench: error: isaac_grasp: one file holds grasps of one hand and one object; 'a.json' (robonaut2 on "
+        "sphere:r=0.03) and 'b.json' (robonaut2 on sphere:r=0.031) are of different ones. Export them separately.\n"
+    )
+    assert main(["export", "a.json", "b.json", "--out", "g.json", "--object", "sphere:r=0.03"]) == 2
+    assert capsys.readouterr().err.startswith("clench: error: b.json: geometry_hash: ")
+    with pytest.raises(CommandError, match=r"solution 0 is of robonaut2 on sphere:r=0.03, solution 1 is of .* separ"):
+        clench.export_grasps("g.yaml", [solution, other], hand=hand, obj=[ball, larger])
+    with pytest.raises(CommandError, match="obj: expected one object for each of 2 solutions, got 1"):
+        clench.export_grasps("g.json", [solution, other], hand=hand, obj=[ball])
+    replace(solution, hand="x", hand_model="x").save("c.json")
+    assert main(["export", "a.json", "c.json", "--out", "g.json"]) == 2
+    assert capsys.readouterr().err == (
+        "clench: error: c.json: the solution is for hand 'x', not for 'robonaut2'. 'a.json' and 'c.json' are of "
+        "different hands: export them separately.\n"
+    )
+    assert not Path("g.yaml").exists()
+
+
 def test_bad_requests(grip: Grip, tmp_path: Path) -> None:
     hand, ball, solution = grip
     with pytest.raises(UnknownNameError, match="Link 'hub' is not in hand 'robonaut2'"):

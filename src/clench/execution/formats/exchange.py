@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def export_grasps(
     format: GraspFormat | str | None = None,
     *,
     hand: Hand | None = None,
-    obj: GraspObject | None = None,
+    obj: GraspObject | Sequence[GraspObject | None] | None = None,
     root: str | None = None,
     name: str | None = None,
     hold: Hold | None = None,
@@ -83,7 +83,8 @@ def export_grasps(
         path: the file; for several grasps in the format dexgraspbench, a folder. Folders are made.
         solutions: one, several, or a batch, of which the poses that are grasps are solved again.
         format: see `GraspFormat`; None: by the file's ending. A path without an ending is a folder for dexgraspbench.
-        hand, obj: what the solutions were computed for; those of a batch unless given.
+        hand, obj: what the solutions were computed for; those of a batch unless given. Of several objects, a sequence
+            has one for each solution; isaac_grasp takes one object a file.
         root: the link whose pose is written, or "world": the frame of the hand's model file. None: "world" for
             dexgraspbench, which attaches the whole file there; else the palm.
         name: of the object, instead of its own.
@@ -109,8 +110,11 @@ def export_grasps(
     if not several:
         raise CommandError(f"{chosen}: expected at least one grasp, got none.")
     root = BASE if bench and root is None and hand is not None else root
-    settings = ExportSettings(hand, obj, root, name, hold, mass, friction, stiffness)
-    grasps = [outgoing(solution, settings) for solution in several]
+    objects = [obj] * len(several) if obj is None or isinstance(obj, GraspObject) else list(obj)
+    if len(objects) != len(several):
+        raise CommandError(f"obj: expected one object for each of {len(several)} solutions, got {len(objects)}.")
+    settings = ExportSettings(hand, None, root, name, hold, mass, friction, stiffness)
+    grasps = [outgoing(each, replace(settings, obj=of)) for each, of in zip(several, objects, strict=True)]
     notes = [note for grasp in grasps for note in grasp.notes]
     if chosen is GraspFormat.ISAAC_GRASP:
         write_isaac_grasp(path, grasps)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -270,11 +271,21 @@ def _confidence(solution: GraspSolution, held: bool | None) -> float:
     return FEASIBLE if (solution.squeeze or {}).get("feasible") else NEITHER
 
 
-def all_of_one(grasps: Sequence[OutgoingGrasp], format: str) -> None:
-    """Refuse grasps of several hands or objects in one file.
+def first_other(solutions: Sequence[GraspSolution]) -> int | None:
+    """Return the index of the first solution that is of another hand or object than the first, None without one."""
+    of = [(s.hand, s.object, os.path.realpath(s.object_model), s.object_scale) for s in solutions]
+    return next((i for i, each in enumerate(of) if each != of[0]), None)
+
+
+def all_of_one(solutions: Sequence[GraspSolution], format: str) -> None:
+    """Refuse solutions of several hands or objects in one file.
 
     Raises:
-        CommandError: there are several, or no grasps.
+        CommandError: there are several.
     """
-    if len({(g.solution.hand, g.solution.object) for g in grasps}) != 1:
-        raise CommandError(f"{format}: expected solutions of one hand and one object, got several or none.")
+    other = first_other(solutions)
+    if other is not None:
+        a, b = (f"solution {i} is of {solutions[i].hand} on {solutions[i].object}" for i in (0, other))
+        raise CommandError(
+            f"{format}: expected solutions of one hand and one object for a file; {a}, {b}. Export them separately."
+        )
