@@ -10,7 +10,7 @@ from typing import Any, Final
 from clench.base.defaults import MASS
 from clench.base.errors import CommandError
 from clench.base.pose import Pose, invert
-from clench.execution.executing import check_geometry
+from clench.execution.executing import check_angles, check_geometry
 from clench.execution.hold import Hold
 from clench.execution.piece_hold import hold_as_collided
 from clench.execution.pregrasp import plan_pregrasp
@@ -89,8 +89,9 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
     """Complete a solution for a file: plan what it lacks, test it if asked, place the frame, name what is missing.
 
     Raises:
-        CommandError: the solution is of another hand or object; a root without the hand; a test without both.
-        UnknownNameError: no such root link.
+        CommandError: the solution is of another hand or object, or its pregrasp is outside joints' limits; a root
+            without the hand; a test without both.
+        UnknownNameError: no such root link; the pregrasp or the squeeze is of a joint that the hand does not have.
     """
     hand, obj = settings.hand, settings.obj
     notes: list[str] = []
@@ -99,6 +100,7 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
         if solution.hand != hand.name:
             raise CommandError(f"The solution is for hand '{solution.hand}', not for '{hand.name}'.")
         check_geometry(solution, hand, obj)
+    check_angles(solution, hand)
     if hand is not None and obj is not None:
         obj = obj.posed(solution.object_pose)
         solution = _completed(solution, hand, obj, settings)
