@@ -132,8 +132,8 @@ def print_hand(report: HandReport) -> None:
     for finding in report.findings:
         label = "[yellow]warning[/yellow]" if finding.severity == "warning" else "note"
         console.print(f"{label} ({finding.code}): {_plain(finding.text)}", soft_wrap=True)
-        if finding.advice:
-            console.print(f"    -> {_plain(finding.advice)}", soft_wrap=True)
+        for number, line in enumerate(finding.advice.splitlines()):
+            console.print(f"{'       ' if number else '    -> '}{_plain(line)}", soft_wrap=True)
 
 
 def print_report(report: ExecutionReport) -> None:
