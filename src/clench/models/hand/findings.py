@@ -54,6 +54,8 @@ class FindingCode(StrEnum):
     """links overlap before anything closes, and must not"""
     OVERLAP_ALLOWED = "overlap_allowed"
     """links overlap before anything closes, and may, since they do so in the model's own posture"""
+    PAIRS_EXCLUDED = "pairs_excluded"
+    """the model excludes pairs of links of different fingers, which are never checked"""
     THUMB_OPPOSES_NOTHING = "thumb_opposes_nothing"
     """the thumb and the fingers never close towards each other"""
     NO_THUMB = "no_thumb"
