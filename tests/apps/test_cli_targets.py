@@ -26,6 +26,10 @@ CALLS = [
     (["demo", "--out", "old"], "old: cannot be made a folder"),
     (["demo", "--out", "broken"], "broken/record.sqlite: not a record of solves"),
     (["hand", "patent15", "--figure", "folder"], "folder: cannot be written (it is a folder)."),
+    (
+        ["hand", "patent15", "--figure", "a.txt"],
+        "a.txt: no figure has the ending '.txt'; expected .png, .pdf, .svg, .eps",
+    ),
     (["export", "solution.json", "--out", "none/a.yaml"], "none/a.yaml: cannot be written (no folder 'none')."),
     (
         ["export", "solution.json", "--out", "a.foo"],
@@ -38,6 +42,7 @@ CALLS = [
     ([*EXECUTE, "--stills", "old"], "old: cannot be made a folder"),
     ([*EXECUTE, "--actuator", "signal", "--to", "file:a", "--record", "old"], "old: not a record of solves"),
     (["bench", "steadiness", "--plot", "none/a.png"], "none/a.png: cannot be written (no folder 'none')."),
+    (["bench", "steadiness", "--plot", "a.txt"], "a.txt: no figure has the ending '.txt'; expected .png, .pdf"),
     (["bench", "hold", "--table", "folder"], "folder: cannot be written (it is a folder)."),
 ]
 

@@ -195,18 +195,20 @@ def hand(
         hand_file: TOML file that overrides what was found in the model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         collision_source: geometry to use.
-        figure: PNG file for a picture of the hand: joint axes, roles, closing directions, curl planes.
+        figure: file (.png, .pdf, .svg, …) for a picture of the hand: joint axes, roles, closing directions, curl
+            planes.
         json: print one JSON document on standard output.
     """
     import clench
-    from clench.base.json_files import check_writable
     from clench.models.hand.report import describe_hand
 
     from .printing import print_files, print_hand
     from .results import print_json
 
     if figure is not None:
-        check_writable(figure)
+        from clench.apps.figures.style import check_figure
+
+        check_figure(figure)
     loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
     report = describe_hand(loaded, clench.check_hand(loaded))
     if figure is not None:
