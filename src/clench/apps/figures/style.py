@@ -79,7 +79,7 @@ def save_figure(figure: Figure, path: Path) -> Path:
         FileError: the file cannot be written, or no figure has its ending.
     """
     format = format_of_figure(path)
-    options = {"pil_kwargs": {"compress_level": 1}} if format == "png" else {}
+    options: dict[str, Any] = {"pil_kwargs": {"compress_level": 1}} if format == "png" else {}
     try:
         figure.savefig(path, dpi=DPI, format=format, **options)
     except OSError as error:
