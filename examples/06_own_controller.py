@@ -1,4 +1,4 @@
-"""Move a hand with a controller of your own: a driver of seven members; checks and supervision come with DrivenHand."""
+"""Move a hand with a controller of your own: a driver of eight members; checks and supervision come with DrivenHand."""
 
 import math
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import clench
 from clench.apps.cli.commands import COMMANDS
+from clench.execution.driver import MEMBERS
 from clench.grasp import criterion_registry
 from clench.grasp.calibration import preset_names
 from clench.grasp.criterion_registry import criterion_names, find_criterion
@@ -38,6 +40,20 @@ def test_the_ten_lines_run_and_their_number_is_right() -> None:
     said = re.search(r'"index_proximal": ([\d.]+)', code)
     assert said is not None
     assert names["solution"].joint_angles["index_proximal"] == pytest.approx(float(said[1]), abs=0.005)
+
+
+def test_the_driver_on_the_page_works_and_its_members_are_all() -> None:
+    text = page("controllers.md")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(code, "controllers.md", "exec"), names)
+    assert names["report"].success, names["report"].reason
+    assert names["report"].sent.commands > 10
+    assert tuple(re.findall(r"^\| `(\w+)[:(]", text, re.MULTILINE)) == MEMBERS
+    for kind in (clench.HandState, clench.JointPath, clench.DriverLimits):
+        table = text[text.index(f"| `{kind.__name__}` |") :].split("\n\n")[0]
+        for field in fields(kind):
+            assert f"`{field.name}" in table
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[p.name for p in PAGES])

@@ -234,6 +234,38 @@ def test_export_and_import(
     assert "Grasp 'x' is not in" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", ["execute", "export", "export without the hand"])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"pregrasp": {"index_proximal": 99.0}}, "pregrasp.index_proximal: 99 rad is outside the joint's limits ["),
+        ({"pregrasp": {"index": 0.1}}, "Joint 'index' is not in hand 'robonaut2' (pregrasp of the solution). "),
+        (
+            {"squeeze": {"feasible": True, "offsets": {"index": 0.1}}},
+            "Joint 'index' is not in hand 'robonaut2' (squeeze.offsets of the solution). ",
+        ),
+    ],
+)
+def test_edited_angles_are_refused(
+    solution: GraspSolution,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+    change: dict,
+    message: str,
+) -> None:
+    document = solution.to_dict() | change
+    if "pregrasp" in change:
+        document["pregrasp"] = solution.joint_angles | change["pregrasp"]
+    if command == "export without the hand":
+        document["hand_model"] = ""
+    (tmp_path / "s.json").write_text(json.dumps(document))
+    more = [] if command == "execute" else ["--out", str(tmp_path / "g.yaml")]
+    assert main([command.split()[0], str(tmp_path / "s.json"), *more]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "g.yaml").exists()
+
+
 def test_names_that_lead_elsewhere_are_refused(
     solution: GraspSolution, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

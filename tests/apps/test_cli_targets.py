@@ -26,7 +26,15 @@ CALLS = [
     (["demo", "--out", "old"], "old: cannot be made a folder"),
     (["demo", "--out", "broken"], "broken/record.sqlite: not a record of solves"),
     (["hand", "patent15", "--figure", "folder"], "folder: cannot be written (it is a folder)."),
+    (
+        ["hand", "patent15", "--figure", "a.txt"],
+        "a.txt: no figure has the ending '.txt'; expected .png, .pdf, .svg, .eps",
+    ),
     (["export", "solution.json", "--out", "none/a.yaml"], "none/a.yaml: cannot be written (no folder 'none')."),
+    (
+        ["export", "solution.json", "--out", "a.foo"],
+        "a.foo: the ending names no format; expected .yaml, .yml, .npy, .json",
+    ),
     (["import", "grasps.yaml", "--hand", "patent15", "--out", "old"], "old: cannot be made a folder"),
     (["calibrate", "examples.json", "--out", "none/a.toml"], "none/a.toml: cannot be written (no folder 'none')."),
     ([*EXECUTE, "--out", "folder"], "folder: cannot be written (it is a folder)."),
@@ -34,6 +42,7 @@ CALLS = [
     ([*EXECUTE, "--stills", "old"], "old: cannot be made a folder"),
     ([*EXECUTE, "--actuator", "signal", "--to", "file:a", "--record", "old"], "old: not a record of solves"),
     (["bench", "steadiness", "--plot", "none/a.png"], "none/a.png: cannot be written (no folder 'none')."),
+    (["bench", "steadiness", "--plot", "a.txt"], "a.txt: no figure has the ending '.txt'; expected .png, .pdf"),
     (["bench", "hold", "--table", "folder"], "folder: cannot be written (it is a folder)."),
 ]
 
@@ -50,6 +59,9 @@ def test_a_bad_target_is_told_before_anything_is_done(call, sentence, tmp_path, 
     other.close()
     monkeypatch.setattr(clench.Hand, "load", lambda *args, **kwargs: pytest.fail("the hand was loaded first"))
     monkeypatch.setattr(clench.GraspSolution, "load", lambda *args: pytest.fail("the solution was loaded first"))
+    monkeypatch.setattr(
+        "clench.apps.cli.export_sources.read_grasps", lambda *args: pytest.fail("the solutions were read first")
+    )
     monkeypatch.setattr(
         "clench.solve.examples.read_examples", lambda *args: pytest.fail("the examples were read first")
     )

@@ -10,6 +10,7 @@ import pytest
 import clench
 from chain_hands import HandBuilder, along_x, mount, one_link, three_links
 from clench.apps.cli.main import main
+from clench.apps.figures import style
 from clench.apps.figures.hand_map import _map_finger, draw_hand_map
 from clench.models.hand.hand import JointRole
 
@@ -51,6 +52,34 @@ def test_a_builtin_hand(tmp_path) -> None:
 )
 def test_odd_hands_are_drawn_too(tmp_path, hand) -> None:
     assert picture(draw_hand_map(hand, tmp_path / "hand.png")).min() < 100
+
+
+#: How the files of each format begin.
+BEGINNINGS = {
+    ".png": b"\x89PNG",
+    "": b"\x89PNG",
+    ".PNG": b"\x89PNG",
+    ".pdf": b"%PDF",
+    ".svg": b"<?xml",
+    ".webp": b"RIFF",
+    ".eps": b"%!PS",
+    ".ps": b"%!PS",
+    ".jpg": b"\xff\xd8",
+    ".jpeg": b"\xff\xd8",
+    ".tif": b"II*",
+    ".tiff": b"II*",
+}
+
+
+def test_the_ending_says_the_format(tmp_path) -> None:
+    assert set(style.ENDINGS) <= set(BEGINNINGS)
+    figure = style.new_figure(40, 30)
+    for ending, beginning in BEGINNINGS.items():
+        path = style.save_figure(figure, tmp_path / f"hand{ending}")
+        assert path.read_bytes().startswith(beginning)
+    with pytest.raises(clench.FileError, match=r"no figure has the ending '\.txt'; expected \.png, "):
+        style.save_figure(figure, tmp_path / "hand.txt")
+    assert not (tmp_path / "hand.txt").exists()
 
 
 def test_the_command_writes_it_and_says_where(tmp_path, capsys) -> None:

@@ -17,7 +17,7 @@ from virtual_clock import VirtualClock
 from clench.base.errors import CommandError, UnknownNameError
 from clench.execution import driven_hand, executing
 from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver import DriverError, DriverLimits, JointPath
+from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
 from clench.execution.executing import execute
 from clench.execution.following import HORIZON, PERIOD, TimedPlan
 from clench.execution.joint_map import JointMap, MappedJoint
@@ -236,6 +236,76 @@ def test_drivers_may_raise_anything(pincer: Hand, solution: GraspSolution) -> No
     driver.connect = lambda _: {}["port"]  # type: ignore[method-assign]
     report = run(driver, pincer, solution)
     assert report.reason == "Not carried out: The driver failed (KeyError: 'port')."
+
+
+def test_a_driver_that_lacks_members_is_refused_at_once(pincer: Hand) -> None:
+    class Bare:
+        def connect(self, timeout: float) -> None: ...
+        def read(self) -> None: ...
+        def disconnect(self) -> None: ...
+
+    message = (
+        "driver: Bare lacks 'name', 'command', 'stop'; "
+        "a driver has name, joints, limits, connect, read, command, stop, disconnect."
+    )
+    with pytest.raises(CommandError, match=f"^{re.escape(message)}$"):
+        DrivenHand(pincer, Bare())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("member", "value", "message"),
+    [
+        ("joints", None, "joints of FakeDriver: expected names of joints once connected, got None."),
+        ("joints", "thumb", "joints of FakeDriver: expected names of joints once connected, got 'thumb'."),
+        ("limits", {}, "limits of FakeDriver: expected DriverLimits once connected, got {}."),
+        ("read", lambda: {"thumb": 0.0}, "read() of FakeDriver: expected a HandState, got {'thumb': 0.0}."),
+        ("read", lambda: None, "read() of FakeDriver: expected a HandState, got None."),
+    ],
+)
+def test_wrong_values_of_a_driver_are_told(
+    pincer: Hand, solution: GraspSolution, member: str, value: object, message: str
+) -> None:
+    driver = FakeDriver(OPEN)
+    setattr(driver, member, value)
+    report = run(driver, pincer, solution)
+    assert report.reason.startswith(f"Not carried out: {message}")
+    assert driver.commands == []
+    assert not driver.connected
+
+
+def test_members_that_come_with_the_connection(pincer: Hand, solution: GraspSolution) -> None:
+    driver = FakeDriver(OPEN)
+    del driver.joints, driver.limits
+
+    def connect(timeout: float) -> None:
+        driver.joints, driver.limits, driver.connected = tuple(OPEN), DriverLimits(), True
+
+    driver.connect = connect  # type: ignore[method-assign]
+    report = run(driver, pincer, solution)
+    assert report.success, report.reason
+
+
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ({"thumb": 0.0}, "expected a HandState, got {'thumb': 0.0}."),
+        (HandState([0.0, 0.0]), "positions: expected numbers by joint, got [0.0, 0.0]."),  # type: ignore[arg-type]
+        (HandState({"thumb": "0", "index": 0.0}), "positions of joint 'thumb': expected a number, got '0'."),  # type: ignore[dict-item]
+        (HandState(OPEN, {"thumb": None}), "ages of joint 'thumb': expected a number, got None."),  # type: ignore[dict-item]
+    ],
+)
+def test_a_wrong_state_on_the_way_stops_the_hand(
+    pincer: Hand, solution: GraspSolution, clock: VirtualClock, state: object, message: str
+) -> None:
+    driver = FakeDriver(OPEN)
+    read = driver.read
+    driver.read = lambda: read() if len(driver.commands) < 4 else state  # type: ignore[method-assign, assignment, return-value]
+    hand = DrivenHand(pincer, driver)
+    report = execute(solution, hand, speed=0.3)
+    assert not report.success
+    assert report.reason.startswith(f"read() of FakeDriver: {message} The hand was told to stop")
+    assert driver.stops >= 1
+    assert hand.state == "faulted"
 
 
 def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution, clock: VirtualClock) -> None:

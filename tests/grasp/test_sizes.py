@@ -1,5 +1,6 @@
 """An object far larger than the hand is told at once, and solved all the same."""
 
+import re
 import warnings
 
 import pytest
@@ -21,14 +22,23 @@ def test_the_size_of_a_hand(hand):
     assert 0.2 < hand_size(hand) < 0.4
 
 
-@pytest.mark.parametrize(("model", "scale"), [("sphere:r=3", 1.0), ("sphere:r=30", 1.0), ("mug", 1000.0)])
-def test_millimetres_taken_for_metres(model, scale, hand):
+@pytest.mark.parametrize(
+    ("model", "scale", "advised"),
+    [
+        ("sphere:r=3", 1.0, "if its lengths are in millimetres, load it with a scale of 0.001"),
+        ("sphere:r=30", 1.0, "if its lengths are in millimetres, load it with a scale of 0.001"),
+        ("mug", 1000.0, "if the scale of 1000 makes it a thousand times too large, load it with a scale of 1"),
+        ("mug", 40.0, "if the scale of 40 makes it a thousand times too large, load it with a scale of 0.04"),
+    ],
+)
+def test_millimetres_taken_for_metres(model, scale, advised, hand):
     obj = clench.GraspObject.load(model, scale=scale)
     with pytest.warns(UserWarning, match=f"^{model} is .* m across, .* times the size of the hand {hand.name}"):
         solution = clench.solve(hand, obj, INSIDE)
     assert solution.status == "blocked"
     assert solution.reason["link"] == "palm"
-    with pytest.warns(UserWarning, match=r"load it with a scale of 0\.001\.$"):
+    assert any(warning.endswith(f": {advised}.") for warning in obj.warnings)
+    with pytest.warns(UserWarning, match=f": {re.escape(advised)}.$"):
         clench.solve_batch(hand, obj, [clench.Pose([0.05, 0.02, 0.01])])
 
 
@@ -54,6 +64,8 @@ def test_the_command_line_says_it_once(tmp_path, capsys):
     (tmp_path / "c.json").write_text('{"hand_pose": {"position": [0.05, 0.02, 0.01], "wxyz": [1, 0, 0, 0]}}')
     call = ["--hand", "robonaut2", "--object", "sphere:r=3", "--command", str(tmp_path / "c.json")]
     assert main(["solve", *call]) == 1
-    told = capsys.readouterr().err.splitlines()
+    heard = capsys.readouterr()
+    assert " across" not in heard.out
+    told = heard.err.splitlines()
     assert [line for line in told if "times the size of the hand" in line] == told[:1]
     assert told[0].startswith("clench: warning: sphere:r=3 is 6 m across, ")

@@ -20,7 +20,7 @@ from .driven_report import Done, report_on
 from .driven_squeeze import DrivenSqueeze, plan_driven_squeeze, squeeze_by_driver
 from .driven_steps import DrivenStep, go_to_steps, plan_driven_steps
 from .driven_way import plan_driven_way
-from .driver import DriverError, HandDriver, RefusedCommandError, TendonDriver
+from .driver import DriverError, HandDriver, RefusedCommandError, TendonDriver, check_driver
 from .driver_line import CALL_LIMIT
 from .driver_session import STOP_TRIES, DriverSession
 from .following import CLOSEST, Follower
@@ -59,6 +59,9 @@ class DrivenHand:
             none [-]; a solution without a plan is not squeezed (see `clench.complete`).
         stay_connected: leave the driver connected at the end, for hands that let go when it leaves; call
             `driver.disconnect` later.
+
+    Raises:
+        CommandError: the driver lacks a member, or `squeeze` is out of range.
     """
 
     def __init__(
@@ -78,6 +81,7 @@ class DrivenHand:
     ) -> None:
         if not (np.isfinite(squeeze) and squeeze >= 0.0):
             raise CommandError(f"squeeze: expected a finite number of at least 0, got {squeeze!r}.")
+        check_driver(driver)
         self._hand = hand
         self._driver = driver
         self.joint_map = joint_map or JointMap()

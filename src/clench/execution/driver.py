@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from clench.base.errors import ClenchError
+from clench.base.errors import ClenchError, CommandError
+from clench.base.numbers import real_array
 from clench.base.pose import FloatArray
 
 
@@ -93,6 +94,68 @@ class OneTargetDriver(Protocol):
     @property
     def one_target(self) -> bool:
         """Whether, after a pause of this program, the hand stands at that target and not at the end of the path."""
+
+
+#: Members of every driver; joints and limits may come with the connection.
+MEMBERS: Final = ("name", "joints", "limits", "connect", "read", "command", "stop", "disconnect")
+_WHEN_CONNECTED: Final = ("joints", "limits")
+
+
+def check_driver(driver: object) -> None:
+    """Check that a driver has the members that it needs before it is connected.
+
+    Raises:
+        CommandError: with the driver's class and the members that are missing.
+    """
+    missing = [each for each in MEMBERS if each not in _WHEN_CONNECTED and not hasattr(driver, each)]
+    if missing:
+        listed = ", ".join(f"'{each}'" for each in missing)
+        raise CommandError(f"driver: {type(driver).__name__} lacks {listed}; a driver has {', '.join(MEMBERS)}.")
+
+
+def connected_joints(driver: HandDriver) -> tuple[str, ...]:
+    """Return the names of a connected driver's joints.
+
+    Raises:
+        DriverError: they are missing, or no names.
+    """
+    joints = getattr(driver, "joints", None)
+    if isinstance(joints, str) or not isinstance(joints, Iterable):
+        raise DriverError(
+            f"joints of {type(driver).__name__}: expected names of joints once connected, got {joints!r}."
+        )
+    return tuple(joints)
+
+
+def connected_limits(driver: HandDriver) -> DriverLimits:
+    """Return what a connected driver allows.
+
+    Raises:
+        DriverError: it is no `DriverLimits`.
+    """
+    limits = getattr(driver, "limits", None)
+    if not isinstance(limits, DriverLimits):
+        raise DriverError(f"limits of {type(driver).__name__}: expected DriverLimits once connected, got {limits!r}.")
+    return limits
+
+
+def read_state(driver: HandDriver) -> HandState:
+    """Return the state that a driver reads.
+
+    Raises:
+        DriverError: it is no `HandState` of numbers by joint.
+    """
+    state: object = driver.read()
+    source = f"read() of {type(driver).__name__}"
+    if not isinstance(state, HandState):
+        raise DriverError(f"{source}: expected a HandState, got {state!r}.")
+    for key, values in (("positions", state.positions), ("ages", state.ages)):
+        if not isinstance(values, Mapping):
+            raise DriverError(f"{source}: {key}: expected numbers by joint, got {values!r}.")
+        for name, value in values.items():
+            if np.ndim(value) or real_array(value) is None:
+                raise DriverError(f"{source}: {key} of joint '{name}': expected a number, got {value!r}.")
+    return state
 
 
 class HandDriver(Protocol):

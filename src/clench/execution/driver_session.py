@@ -8,7 +8,16 @@ from dataclasses import dataclass
 
 from clench.base.pose import FloatArray
 
-from .driver import DriverLimits, HandDriver, HandState, JointPath, TendonDriver
+from .driver import (
+    DriverLimits,
+    HandDriver,
+    HandState,
+    JointPath,
+    TendonDriver,
+    connected_joints,
+    connected_limits,
+    read_state,
+)
 from .driver_line import DriverLine
 from .supervision import Event, Supervision, supervision_of
 
@@ -88,15 +97,15 @@ class DriverSession:
 
     def joints(self) -> tuple[str, ...]:
         """Return the names of the joints that the controller has."""
-        return self._line.call("joints", lambda: tuple(self.driver.joints))
+        return self._line.call("joints", lambda: connected_joints(self.driver))
 
     def limits(self) -> DriverLimits:
         """Return what the controller allows."""
-        return self._line.call("limits", lambda: self.driver.limits)
+        return self._line.call("limits", lambda: connected_limits(self.driver))
 
     def read(self) -> HandState:
         """Return the newest state."""
-        return self._line.call("read", lambda: self.driver.read())
+        return self._line.call("read", lambda: read_state(self.driver))
 
     def enter(self, event: Event) -> None:
         """Go on to what comes next in the execution, unless a stop is in force."""

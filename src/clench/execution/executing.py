@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-from clench.base.errors import CommandError, MotionError
+import numpy as np
+
+from clench.base.errors import CommandError, MotionError, UnknownNameError
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -14,6 +16,7 @@ from clench.solve.solution import GraspSolution
 
 from .report import ExecutionReport
 from .trajectory import Trajectory, plan_trajectory
+from .trajectory_checks import ROUNDING
 
 
 class Actuator(Protocol):
@@ -51,15 +54,16 @@ def execute(
         next_steps: carry out its next steps, too, after the touch and the squeeze.
 
     Raises:
-        CommandError: the solution is for another hand or another geometry of hand or object, a next step is outside a
-            joint's limits, or `speed` is out of range.
-        UnknownNameError: a next step is of a joint that the hand does not have.
+        CommandError: the solution is for another hand or another geometry of hand or object, its pregrasp or a next
+            step is outside a joint's limits, or `speed` is out of range.
+        UnknownNameError: its pregrasp, squeeze or a next step is of a joint that the hand does not have.
     """
     if not next_steps:
         solution = replace(solution, next_steps=())
     if solution.hand != actuator.hand.name:
         raise CommandError(f"The solution is for hand '{solution.hand}', the actuator moves '{actuator.hand.name}'.")
     check_geometry(solution, actuator.hand, actuator.obj)
+    check_angles(solution, actuator.hand)
     try:
         trajectory = plan_trajectory(solution, actuator.hand, obj=actuator.obj, speed=speed, force=force)
         why = None
@@ -95,3 +99,29 @@ def check_geometry(solution: GraspSolution, hand: Hand, obj: GraspObject | None)
             f"geometry_hash: the solution was computed for another geometry of object '{obj.name}'; load the object "
             f"from the same model, with the same scale and obstacles, or solve again."
         )
+
+
+def check_angles(solution: GraspSolution, hand: Hand | None) -> None:
+    """Check the joints and limits of a solution's pregrasp, and the joints of its squeeze's offsets.
+
+    Args:
+        solution: may come from a file that was edited. hand: what it is for; None: it tells the limits itself.
+
+    Raises:
+        CommandError: an angle is outside its limits. UnknownNameError: a joint that the hand does not have.
+    """
+    limits = dict(solution.joint_limits) if hand is None else {j.name: (j.lower, j.upper) for j in hand.joints}
+    joints = tuple(solution.joint_angles if hand is None else hand.joint_names)
+    named = {"pregrasp": solution.pregrasp or {}, "squeeze.offsets": (solution.squeeze or {}).get("offsets") or {}}
+    for key, angles in named.items():
+        for name in angles:
+            if name not in joints:
+                raise UnknownNameError("joint", name, f"hand '{solution.hand}' ({key} of the solution)", joints)
+    for name, angle in named["pregrasp"].items():
+        low, high = limits.get(name, (-np.inf, np.inf))
+        margin = ROUNDING * (high - low)
+        # Written so that NaN fails.
+        if not low - margin <= angle <= high + margin:
+            raise CommandError(
+                f"pregrasp.{name}: {angle:.6g} rad is outside the joint's limits [{low:.6g}, {high:.6g}] rad."
+            )

@@ -10,6 +10,7 @@ import numpy as np
 from clench.base.keeping import kept_by_identity
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
+from clench.models.objects.checks import smaller
 from clench.models.objects.grasp_object import GraspObject
 
 from .scene import pack_object
@@ -19,15 +20,17 @@ FAR_LARGER: Final = 10.0
 _KEPT_HANDS: Final = 16
 
 
-def warn_of_size(hand: Hand, obj: GraspObject) -> None:
-    """Warn, once per object, when what is to be grasped is far larger than the hand."""
+def warn_of_size(hand: Hand, obj: GraspObject) -> bool:
+    """Warn, once per object, when what is to be grasped is far larger than the hand, and return whether it is."""
     across, size = 2.0 * pack_object(obj).size, hand_size(hand)
-    if across > FAR_LARGER * size > 0.0:
-        warnings.warn(
-            f"{obj.name} is {across:.3g} m across, {across / size:.0f} times the size of the hand {hand.name} "
-            f"({size:.2g} m): if its lengths are in millimetres, load it with a scale of 0.001.",
-            stacklevel=1,
-        )
+    if not across > FAR_LARGER * size > 0.0:
+        return False
+    warnings.warn(
+        f"{obj.name} is {across:.3g} m across, {across / size:.0f} times the size of the hand {hand.name} "
+        f"({size:.2g} m): {smaller(obj.scale)}.",
+        stacklevel=1,
+    )
+    return True
 
 
 @kept_by_identity(_KEPT_HANDS)

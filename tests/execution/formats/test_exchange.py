@@ -270,7 +270,7 @@ def test_a_posture_of_the_built_in_hand_is_closed_anew() -> None:
 
 
 def test_a_pregrasp_that_lacks_a_joint_of_the_grasp_is_refused(placed: GraspSolution, tmp_path: Path) -> None:
-    lacking = replace(placed, pregrasp={"thumb": 0.1})
+    lacking = replace(placed, pregrasp={"index_curl": 0.1})
     for ending in ("yaml", "npy", "json"):
         with pytest.raises(CommandError, match=r"pregrasp\.index_yaw: missing; every joint of joint_angles is needed"):
             export_grasps(tmp_path / f"g.{ending}", lacking)

@@ -141,6 +141,38 @@ def test_confidence_says_what_is_known(grip: Grip, tmp_path: Path) -> None:
     assert confidence(solution, hold=clench.Hold(duration=0.2, squeeze=0.0)) == 0.0
 
 
+def test_a_note_says_why_the_confidence_is_zero(grip: Grip, tmp_path: Path) -> None:
+    hand, ball, solution = grip
+    alone = replace(solution, contacts=tuple(c for c in solution.contacts if c.finger == "thumb"))
+    report = clench.export_grasps(tmp_path / "g.json", alone, hand=hand, obj=ball)
+    assert report.confidences == (0.0,)
+    plan = clench.plan_squeeze(alone, hand, ball, gravity=None)
+    assert plan.text.startswith("No squeeze holds")
+    assert plan.text in report.notes
+    missed = replace(solution, status=clench.SolutionStatus.NO_CONTACT)
+    notes = clench.export_grasps(tmp_path / "g.json", missed, hand=hand, obj=ball).notes
+    assert any(note.startswith("The solution is not valid: ") for note in notes)
+
+
+def test_the_command_prints_the_confidence_of_every_file(
+    grip: Grip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    solution = grip[2]
+    alone = replace(solution, contacts=tuple(c for c in solution.contacts if c.finger == "thumb"))
+    Path("l.json").write_text(json.dumps([solution.to_dict(), alone.to_dict(), solution.to_dict()]))
+    assert main(["export", "l.json", "--out", "g.yaml"]) == 0
+    out = capsys.readouterr().out
+    assert "  g.yaml: confidence 0.5 (2 grasps), 0 (1 grasp)\n" in out
+    assert "note: No squeeze holds" in out
+    assert main(["export", "l.json", "--out", "many"]) == 0
+    out = capsys.readouterr().out
+    for i, confidence in enumerate(["0.5", "0", "0.5"]):
+        assert f"grasp_{i}.npy: confidence {confidence}\n" in out
+    assert main(["export", "l.json", "--out", "many", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["confidences"] == [0.5, 0.0, 0.5]
+
+
 def test_what_is_missing_is_planned_or_told(grip: Grip, tmp_path: Path) -> None:
     hand, ball, solution = grip
     file = tmp_path / "g.npy"
@@ -162,7 +194,11 @@ def test_what_is_missing_is_planned_or_told(grip: Grip, tmp_path: Path) -> None:
         assert offsets[name] == pytest.approx(offset, abs=1e-12)
     bare = replace(hand, joints=tuple(replace(j, stiffness=None) for j in hand.joints))
     (note,) = clench.export_grasps(tmp_path / "g.json", solution, hand=bare, obj=ball).notes
-    assert "no servo gain of" in note
+    pressing = [name for name, torque in anyhow.torques.items() if torque]
+    first = ", ".join(f"'{name}'" for name in pressing[:3])
+    assert len(pressing) > 4
+    assert note.startswith(f"The model gives no servo gain of {first} and {len(pressing) - 3} more joints: ")
+    assert note.endswith("Give the stiffness of the servos (--stiffness, stiffness=).")
     assert clench.export_grasps(tmp_path / "g.json", solution, hand=bare, obj=ball, stiffness=50.0).notes == ()
 
 
@@ -192,6 +228,47 @@ def test_batches_and_lists_are_written(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["export", str(tmp_path / "l.json"), "--out", str(tmp_path / "g.npy")]) == 2
     assert "Give a folder" in capsys.readouterr().err
     assert main(["export", str(tmp_path / "l.json"), "--out", str(tmp_path / "g.json"), "--mass", "1", "2", "3"]) == 2
+
+
+def test_grasps_of_several_objects(
+    grip: Grip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hand, ball, solution = grip
+    larger = clench.GraspObject.load("sphere:r=0.031")
+    command = clench.GraspCommand(hand_pose=solution.hand_pose, object_pose=solution.object_pose)
+    other = clench.solve(hand, larger, command)
+    solution.save("a.json")
+    other.save("b.json")
+    assert main(["export", "a.json", "b.json", "--out", "g.json", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["confidences"]) == 2
+    assert not told["notes"]
+    touched = [grasp["allowed_touch_objects"] for grasp in moveit_grasps(Path("g.json"))]
+    assert touched == [["sphere:r=0.03"], ["sphere:r=0.031"]]
+    report = clench.export_grasps("g.json", [solution, other], hand=hand, obj=[ball, larger])
+    assert list(report.confidences) == told["confidences"]
+    assert main(["export", "a.json", "b.json", "--out", "many"]) == 0
+    assert sorted(file.name for file in Path("many").iterdir()) == ["grasp_0.npy", "grasp_1.npy"]
+    capsys.readouterr()
+    assert main(["export", "a.json", "b.json", "--out", "g.yaml"]) == 2
+    assert capsys.readouterr().err == (
+        "clench: error: isaac_grasp: one file holds grasps of one hand and one object; 'a.json' (robonaut2 on "
+        "sphere:r=0.03) and 'b.json' (robonaut2 on sphere:r=0.031) are of different ones. Export them separately.\n"
+    )
+    assert main(["export", "a.json", "b.json", "--out", "g.json", "--object", "sphere:r=0.03"]) == 2
+    assert capsys.readouterr().err.startswith("clench: error: b.json: geometry_hash: ")
+    with pytest.raises(CommandError, match=r"solution 0 is of robonaut2 on sphere:r=0.03, solution 1 is of .* separ"):
+        clench.export_grasps("g.yaml", [solution, other], hand=hand, obj=[ball, larger])
+    with pytest.raises(CommandError, match="obj: expected one object for each of 2 solutions, got 1"):
+        clench.export_grasps("g.json", [solution, other], hand=hand, obj=[ball])
+    replace(solution, hand="x", hand_model="x").save("c.json")
+    assert main(["export", "a.json", "c.json", "--out", "g.json"]) == 2
+    assert capsys.readouterr().err == (
+        "clench: error: c.json: the solution is for hand 'x', not for 'robonaut2'. 'a.json' and 'c.json' are of "
+        "different hands: export them separately.\n"
+    )
+    assert not Path("g.yaml").exists()
 
 
 def test_bad_requests(grip: Grip, tmp_path: Path) -> None:

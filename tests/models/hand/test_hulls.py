@@ -65,11 +65,16 @@ def test_a_convex_mesh_is_not_named(tmp_path) -> None:
     assert not [f for f in check_hand(read) if f.code == "hull_off_mesh"]
 
 
-@pytest.mark.parametrize(("gap", "recommended"), [(0.0016, False), (0.03, True)])
-def test_hulls_are_named_and_meshes_recommended_above_a_millimetre(tmp_path, gap: float, recommended: bool) -> None:
+@pytest.mark.parametrize(
+    ("gap", "recommended", "severity"), [(0.0016, False, "note"), (0.019, True, "note"), (0.03, True, "warning")]
+)
+def test_hulls_are_named_and_meshes_recommended_above_a_millimetre(
+    tmp_path, gap: float, recommended: bool, severity: str
+) -> None:
     read = palm_of(tmp_path, plates(gap))
     (found,) = [f for f in check_hand(read) if f.code == "hull_off_mesh"]
     assert found.links == ("palm",)
+    assert found.severity == severity
     assert found.numbers["palm_m"] == pytest.approx(gap / 2, rel=0.05)
     assert f"'palm' {found.numbers['palm_m'] * 1e3:.2g} mm" in found.text
     assert ('collision_source = "raw"' in found.advice) == recommended

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hand_models import finger, hand, written
 
+from clench.apps.cli.main import main
 from clench.models.hand.findings import Finding
 from clench.models.hand.hand import Hand
 
@@ -62,6 +63,20 @@ def test_the_advised_lines_add_the_coupling(
     assert (tied.joint_names[coupling.leader], tied.joint_names[coupling.follower]) == tuple(names)
     np.testing.assert_allclose([coupling.ratio, coupling.offset], [sign * ratio, sign * offset], rtol=1e-11)
     assert coupling.breakaway == breakaway
+
+
+def test_the_printed_lines_are_lines_of_a_hand_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = renamed(finger("f", limits=["0 1.6", "0 2.6"]), CASES["barrett"][0])
+    model = written(tmp_path, hand(one, finger("b", (0.03, 0, 0.05))))
+    assert main(["hand", str(model)]) == 0
+    printed = capsys.readouterr().out
+    assert "\\n" not in printed
+    begin = printed.index("    -> If it is this hand, write in the hand file:\n")
+    lines = printed[begin:].splitlines()[1:5]
+    (found,) = missing(Hand.load(model))
+    assert tomllib.loads("\n".join(lines)) == tomllib.loads(found.advice.split("\n", 1)[1])
+    model.with_suffix(".toml").write_text("\n".join(lines))
+    assert missing(Hand.load(model, hand_file=model.with_suffix(".toml"))) == []
 
 
 @pytest.mark.parametrize(

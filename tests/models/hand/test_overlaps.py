@@ -133,3 +133,49 @@ def test_hulls_of_real_hands_overlap_where_their_meshes_do_not(
 ) -> None:
     read = Hand.load(shared_data / model)
     assert {source: len(names(read, read.allowed_pairs_for(source))) for source in counts} == counts
+
+
+def excluded(*pairs: tuple[str, str]) -> str:
+    listed = "".join(f'<exclude body1="{a}" body2="{b}"/>' for a, b in pairs)
+    return f"<contact>{listed}</contact>"
+
+
+TWO = [finger(n, (x, 0.0, 0.05)) for n, x in (("index", 0.03), ("thumb", -0.03))]
+
+
+def test_excluded_pairs_of_two_fingers_are_counted_and_named(tmp_path) -> None:
+    one = ("index_link1", "thumb_link1")
+    same_finger, with_palm = ("index_link0", "index_link1"), ("palm", "thumb_link1")
+    read = Hand.load(written(tmp_path, hand(*TWO, extra=excluded(one, same_finger, with_palm))))
+    (found,) = [f for f in read.findings if f.code == "pairs_excluded"]
+    assert found.severity == "warning"
+    assert found.text == (
+        "One pair of links of different fingers is never checked against each other, because the model excludes them: "
+        "'index_link1' - 'thumb_link1'."
+    )
+    assert found.links == one
+    every = [(f"index_link{i}", f"thumb_link{k}") for i in range(2) for k in range(2)]
+    read = Hand.load(written(tmp_path, hand(*TWO, extra=excluded(*every))))
+    (found,) = [f for f in read.findings if f.code == "pairs_excluded"]
+    assert found.text.startswith("4 pairs of links of different fingers are never checked against each other, ")
+    assert found.text.endswith(
+        "'index_link0' - 'thumb_link0', 'index_link0' - 'thumb_link1', 'index_link1' - 'thumb_link0', …."
+    )
+    assert found.numbers == {"pairs": 4}
+
+
+def test_pairs_of_two_fingers_excluded_by_masks_are_counted(tmp_path) -> None:
+    apart = [
+        text.replace("<geom ", f'<geom contype="{m}" conaffinity="{m}" ') for text, m in zip(TWO, (1, 2), strict=True)
+    ]
+    palm = PALM.replace("<geom ", '<geom contype="3" conaffinity="3" ')
+    (found,) = [f for f in Hand.load(written(tmp_path, hand(*apart, palm=palm))).findings if f.code == "pairs_excluded"]
+    assert found.numbers == {"pairs": 4}
+
+
+def test_pairs_of_the_hand_file_are_not_the_models(tmp_path) -> None:
+    model = written(tmp_path, hand(*TWO))
+    model.with_suffix(".hand.toml").write_text('allowed_pairs = [["index_link1", "thumb_link1"]]')
+    read = Hand.load(model)
+    assert (read.link_index("index_link1"), read.link_index("thumb_link1")) in read.allowed_pairs
+    assert not [f for f in read.findings if f.code == "pairs_excluded"]

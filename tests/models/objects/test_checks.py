@@ -146,7 +146,7 @@ def test_far_from_the_origin_nothing_changes():
 
 
 @pytest.mark.parametrize(
-    ("extent", "words"), [(2.1, "scale=0.001"), (1.9, None), (1.1e-3, None), (0.9e-3, "another scale")]
+    ("extent", "words"), [(2.1, "a scale of 0.001"), (1.9, None), (1.1e-3, None), (0.9e-3, "another scale")]
 )
 def test_units(extent, words):
     found = unit_warnings(np.array([[0.0, 0.0, 0.0], [0.0, extent, 0.0]]), "m")

@@ -58,7 +58,7 @@ def test_a_scene_becomes_one_mesh_with_its_poses(tmp_path):
 
 def test_scale_pose_and_source(tmp_path):
     path = written(tmp_path / "box.stl", box(50.0))
-    assert "if its units are millimetres, load it with scale=0.001" in GraspObject.load(path).warnings[0]
+    assert "if its lengths are in millimetres, load it with a scale of 0.001" in GraspObject.load(path).warnings[0]
     pose = Pose([1.0, 0.0, 0.0])
     loaded = GraspObject.load(path, scale=0.001, pose=pose, collision_source="visual")
     assert loaded.warnings == ()
@@ -178,7 +178,7 @@ def test_malformed_shapes(text, error, words):
 
 
 def test_large_shapes_are_noticed_too():
-    assert "scale=0.001" in GraspObject.load("sphere:r=30").warnings[0]
+    assert "scale of 0.001" in GraspObject.load("sphere:r=30").warnings[0]
 
 
 @pytest.mark.parametrize(

@@ -140,14 +140,15 @@ def peers(
         passes: how often each is timed, all kinds in turn.
         seed: of the approach poses.
         simulate: also close in MuJoCo.
-        plot: file (PNG) for a picture of cost against accuracy, with steps of several sizes.
+        plot: file (.png, .pdf, .svg, …) for a picture of cost against accuracy, with steps of several sizes.
         table: file for a table (Markdown).
         json: print one JSON document on standard output.
     """
     from .peers import PeerBench, bench_peers
 
     _at_least(1, planes=planes, poses=poses, passes=passes)
-    _writable(plot, table)
+    _drawable(plot)
+    _writable(table)
     asked = PeerBench(planes, poses, passes, seed, simulate, show_progress=not json)
     return _print(bench_peers(hand, object, scale, asked, plot, table), json)
 
@@ -179,14 +180,15 @@ def scaling(
         batch: poses at once, at most.
         stream: how many poses are streamed.
         seed: of the approach poses.
-        plot: file (PNG) for a picture of every axis.
+        plot: file (.png, .pdf, .svg, …) for a picture of every axis.
         table: file for a table of every axis (Markdown).
         json: print one JSON document on standard output.
     """
     from .scaling import ScalingBench, bench_scaling
 
     _at_least(1, poses=poses, passes=passes, triangles=triangles, batch=batch, stream=stream)
-    _writable(plot, table)
+    _drawable(plot)
+    _writable(table)
     asked = ScalingBench(poses, passes, triangles, batch, stream, seed, show_progress=not json)
     return _print(bench_scaling(hand, object, scale, asked, plot, table), json)
 
@@ -234,14 +236,14 @@ def steadiness(
         grasps: how many.
         passes: how often each is timed.
         seed: of the grasps.
-        plot: file (PNG) for a picture of the lower bound against the exact value, for 3 contacts and more.
+        plot: file (.png, .pdf, .svg, …) for a picture of the lower bound and the exact value, for 3 contacts and more.
         json: print one JSON document on standard output.
     """
     from .steadiness import bench_steadiness
 
     _at_least(2, contacts=contacts)
     _at_least(1, grasps=grasps, passes=passes)
-    _writable(plot)
+    _drawable(plot)
     return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 
@@ -305,6 +307,13 @@ def _at_least(least: int, **counts: int) -> None:
     for key, count in counts.items():
         if count < least:
             raise CommandError(f"--{key}: expected at least {least}, got {count}.")
+
+
+def _drawable(plot: Path | None) -> None:
+    if plot is not None:
+        from clench.apps.figures.style import check_figure
+
+        check_figure(plot)
 
 
 def _writable(*files: Path | None) -> None:

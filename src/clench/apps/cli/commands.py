@@ -108,6 +108,7 @@ def solve(
     from clench.base.json_files import check_folder
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
+    from clench.models.objects.loading import size_warnings
     from clench.solve.orders import settled
     from clench.solve.pareto import hand_front
 
@@ -122,7 +123,7 @@ def solve(
         clench.Record.check(record)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
-    warn_of_size(the_hand, the_object)
+    told = size_warnings(the_object) if warn_of_size(the_hand, the_object) else ()
     given = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
     asked: dict[str, Any] = {} if planes is None else {"planes": planes}
     asked |= {} if criteria is None else {"criteria": criteria}
@@ -149,7 +150,8 @@ def solve(
             more["pareto_front"] = [entry.to_dict() for entry in hand_front(solution)]
         print_json(solution.to_dict() | more)
     else:
-        print_solution(solution, [*the_hand.warnings, *the_object.warnings], files)
+        untold = [warning for warning in the_object.warnings if warning not in told]
+        print_solution(solution, [*the_hand.warnings, *untold], files)
         if error is not None:
             print_pose_error(error)
         if explain:
@@ -195,18 +197,20 @@ def hand(
         hand_file: TOML file that overrides what was found in the model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         collision_source: geometry to use.
-        figure: PNG file for a picture of the hand: joint axes, roles, closing directions, curl planes.
+        figure: file (.png, .pdf, .svg, …) for a picture of the hand: joint axes, roles, closing directions, curl
+            planes.
         json: print one JSON document on standard output.
     """
     import clench
-    from clench.base.json_files import check_writable
     from clench.models.hand.report import describe_hand
 
     from .printing import print_files, print_hand
     from .results import print_json
 
     if figure is not None:
-        check_writable(figure)
+        from clench.apps.figures.style import check_figure
+
+        check_figure(figure)
     loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
     report = describe_hand(loaded, clench.check_hand(loaded))
     if figure is not None:

@@ -53,22 +53,27 @@ def export(
         json: print one JSON document on standard output.
     """
     import clench
-    from clench.base.json_files import check_writable
+    from clench.base.json_files import check_folder, check_writable
+    from clench.execution.formats.exchange import format_of
 
-    from .export_sources import make_test, read_grasps
-    from .printing import print_files, print_notes
+    from .export_sources import make_test, read_grasps, refuse_several
+    from .printing import print_exported
     from .results import print_json
 
-    check_writable(out)
+    chosen = format_of(out, format)
+    one_each = chosen == "dexgraspbench" and (out.is_dir() or not out.suffix)
+    (check_folder if one_each else check_writable)(out)
     planned = {"mass": as_range(mass, "--mass"), "friction": as_range(friction, "--friction")}
     tested = make_test(**planned) if hold else None
     read = read_grasps(solutions, hand, object, (hand_file, palm), scale)
+    if chosen == "isaac_grasp":
+        refuse_several(read, chosen)
     report = clench.export_grasps(
         out,
         read.solutions,
-        format,
+        chosen,
         hand=read.hand,
-        obj=read.obj,
+        obj=read.objects,
         root=root,
         name=name,
         hold=tested,
@@ -88,8 +93,7 @@ def export(
             }
         )
     else:
-        print_files(list(report.files))
-        print_notes(notes)
+        print_exported(report, notes)
     return 0
 
 

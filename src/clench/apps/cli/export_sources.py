@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +19,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReadGrasps:
-    """Hold solutions with the hand and the object that they are of, None where these cannot be loaded."""
+    """Hold solutions with the hand and the objects that they are of, None where these cannot be loaded.
+
+    Args:
+        solutions: of all files. hand: of all solutions. objects: by solution.
+        sources: the file of every solution, with its place in a list. notes: sentences about models that are missing.
+    """
 
     solutions: list[GraspSolution]
     hand: Hand | None
-    obj: GraspObject | None
+    objects: list[GraspObject | None]
+    sources: list[str]
     notes: tuple[str, ...]
 
 
@@ -50,53 +56,140 @@ def read_grasps(
     loaded_with: tuple[Path | None, str | None],
     scale: float | None,
 ) -> ReadGrasps:
-    """Read files of grasps.
+    """Read files of grasps, and load the models that they name: one hand, and as many objects as there are.
 
     Args:
         files: solutions, JSON lists of solutions, batches. hand, object: models; None: those that the files name.
-        loaded_with: hand file and palm of the hand. scale: of the object; None: what the files say.
+        loaded_with: hand file and palm of the hand. scale: of the objects; None: what the files say.
 
     Raises:
-        FileError: a file is missing or malformed; a model that was given cannot be read. CommandError: no grasp.
+        FileError: a file is missing or malformed; a model that was given cannot be read. CommandError: no grasp; a
+            grasp of another hand or object than what was given.
     """
     import clench
-    from clench.solve.saved_question import SavedBatch
 
-    batches = [SavedBatch(file) for file in files if file.suffix == ".npz"]
-    solutions = [s for file in files if file.suffix != ".npz" for s in _solutions(file)]
-    notes: list[str] = []
-    if not (batches or solutions):
+    read = [pair for file in files for pair in _contents(file)]
+    if not read:
         raise CommandError("solutions: expected at least one file with a solution.")
-    of = batches[0] if batches else solutions[0]
-    factor = of.object_scale if scale is None else scale
-    source = of.object_collision_source
+    notes: list[str] = []
     the_hand = _load(
-        lambda model: clench.Hand.load(model, hand_file=loaded_with[0], palm=loaded_with[1]), hand, of.hand_model, notes
-    )
-    obj = _load(
-        lambda model: clench.GraspObject.load(model, scale=factor, collision_source=source),
-        object,
-        of.object_model,
+        lambda model: clench.Hand.load(model, hand_file=loaded_with[0], palm=loaded_with[1]),
+        hand,
+        read[0][1].hand_model,
         notes,
     )
-    if object is None and scale is None and the_hand is not None and obj is not None:
-        for solution in solutions[:1]:
-            obj = _fitting(solution, the_hand, obj, notes)
-    for batch in batches:
-        solutions += _solved(batch, the_hand, obj)
-    if not solutions:
-        raise CommandError(f"No pose of {', '.join(str(b.path) for b in batches)} is a grasp: nothing is written.")
-    return ReadGrasps(solutions, the_hand, obj, tuple(notes))
+    objects = _Objects(object, scale, the_hand, notes)
+    found = ReadGrasps([], the_hand, [], [], ())
+    for source, each in read:
+        if isinstance(each, clench.GraspSolution):
+            _check_hand(each, the_hand, source, read[0][0])
+            solutions, obj = [each], objects.of_solution(each, source)
+        else:
+            obj = objects.of(each)
+            solutions = _solved(each, the_hand, obj)
+        found.solutions.extend(solutions)
+        found.objects.extend([obj] * len(solutions))
+        found.sources.extend([source] * len(solutions))
+    if not found.solutions:
+        raise CommandError(f"No pose of {', '.join(source for source, _ in read)} is a grasp: nothing is written.")
+    return replace(found, notes=tuple(dict.fromkeys(notes)))
 
 
-def _solutions(file: Path) -> list[GraspSolution]:
+def refuse_several(read: ReadGrasps, format: str) -> None:
+    """Refuse grasps of several hands or objects, for a format that has one of each in a file.
+
+    Raises:
+        CommandError: with two files that do not go together.
+    """
+    from clench.execution.formats.outgoing import first_other
+
+    other = first_other(read.solutions)
+    if other is not None:
+        a, b = (f"'{read.sources[i]}' ({read.solutions[i].hand} on {read.solutions[i].object})" for i in (0, other))
+        raise CommandError(
+            f"{format}: one file holds grasps of one hand and one object; {a} and {b} are of different ones. Export "
+            "them separately."
+        )
+
+
+class _Objects:
+    """Load objects, each once.
+
+    Args:
+        given: model of the object of all grasps; None: those that the files name. scale: of it; None: what the files
+            say. hand: of the grasps, None when it is not known. notes: collects sentences about what is missing.
+    """
+
+    def __init__(self, given: str | None, scale: float | None, hand: Hand | None, notes: list[str]) -> None:
+        self._given, self._scale, self._hand, self._notes = given, scale, hand, notes
+        self._loaded: dict[tuple[str, float, str], GraspObject | None] = {}
+
+    def of(self, named: GraspSolution | SavedBatch) -> GraspObject | None:
+        """Return the object that is named, or the one that was given; None, with a note, where it cannot be loaded."""
+        import clench
+
+        scale, source = named.object_scale if self._scale is None else self._scale, named.object_collision_source
+        key = (self._given or named.object_model, scale, source)
+        if key not in self._loaded:
+            self._loaded[key] = _load(
+                lambda model: clench.GraspObject.load(model, scale=scale, collision_source=source),
+                self._given,
+                named.object_model,
+                self._notes,
+            )
+        return self._loaded[key]
+
+    def of_solution(self, solution: GraspSolution, source: str) -> GraspObject | None:
+        """Return the object of a solution; None, with a note, where what it names has another geometry.
+
+        Raises:
+            CommandError: what was given has another geometry.
+        """
+        from clench.execution.executing import check_geometry
+
+        obj = self.of(solution)
+        if obj is None or self._hand is None:
+            return obj
+        try:
+            check_geometry(solution, self._hand, obj)
+        except CommandError as error:
+            if self._given is not None or self._scale is not None:
+                raise CommandError(f"{source}: {error}") from None
+            self._notes.append(f"Written without the object: {error}")
+            return None
+        return obj
+
+
+def _contents(file: Path) -> list[tuple[str, GraspSolution | SavedBatch]]:
+    """Return the solutions of a file, or the batch that it is, each with its name for messages."""
     import clench
     from clench.base.json_files import read_json
+    from clench.solve.saved_question import SavedBatch
 
+    if file.suffix == ".npz":
+        return [(str(file), SavedBatch(file))]
     data = read_json(file)
-    if isinstance(data, list):
-        return [clench.GraspSolution.from_dict(each, f"{file}[{i}]") for i, each in enumerate(data)]
-    return [clench.GraspSolution.from_dict(data, str(file))]
+    listed = [(f"{file}[{i}]", each) for i, each in enumerate(data)] if isinstance(data, list) else [(str(file), data)]
+    return [(source, clench.GraspSolution.from_dict(each, source)) for source, each in listed]
+
+
+def _check_hand(solution: GraspSolution, hand: Hand | None, source: str, first: str) -> None:
+    """Check that a solution is of the hand that was loaded.
+
+    Raises:
+        CommandError: it is of another one than the first grasp, or than what was given.
+    """
+    from clench.execution.executing import check_geometry
+
+    if hand is None:
+        return
+    other = "" if source == first else f" '{first}' and '{source}' are of different hands: export them separately."
+    if solution.hand != hand.name:
+        raise CommandError(f"{source}: the solution is for hand '{solution.hand}', not for '{hand.name}'.{other}")
+    try:
+        check_geometry(solution, hand, None)
+    except CommandError as error:
+        raise CommandError(f"{source}: {error}{other}") from None
 
 
 def _solved(batch: SavedBatch, hand: Hand | None, obj: GraspObject | None) -> list[GraspSolution]:
@@ -119,15 +212,3 @@ def _load(load: Any, given: str | None, named: str, notes: list[str]) -> Any:
     except (FileError, UnknownNameError) as error:
         notes.append(f"Written without the model that the solution names: {error}")
         return None
-
-
-def _fitting(solution: GraspSolution, hand: Hand, obj: GraspObject, notes: list[str]) -> GraspObject | None:
-    from clench.execution.executing import check_geometry
-
-    check_geometry(solution, hand, None)
-    try:
-        check_geometry(solution, hand, obj)
-    except CommandError as error:
-        notes.append(f"Written without the object: {error}")
-        return None
-    return obj

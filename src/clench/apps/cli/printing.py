@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from clench.execution.formats.exchange import ExportReport
     from clench.execution.hold import HoldReport
     from clench.execution.report import ExecutionReport, NextStepReached
     from clench.models.hand.report import HandReport
@@ -130,8 +132,8 @@ def print_hand(report: HandReport) -> None:
     for finding in report.findings:
         label = "[yellow]warning[/yellow]" if finding.severity == "warning" else "note"
         console.print(f"{label} ({finding.code}): {_plain(finding.text)}", soft_wrap=True)
-        if finding.advice:
-            console.print(f"    -> {_plain(finding.advice)}", soft_wrap=True)
+        for number, line in enumerate(finding.advice.splitlines()):
+            console.print(f"{'       ' if number else '    -> '}{_plain(line)}", soft_wrap=True)
 
 
 def print_report(report: ExecutionReport) -> None:
@@ -264,9 +266,15 @@ def print_weights(weights: Mapping[str, float], sentence: str) -> None:
     console.print(_plain(sentence))
 
 
-def print_notes(notes: Sequence[str]) -> None:
-    """Print sentences about what is missing."""
-    console = _console()
+def print_exported(report: ExportReport, notes: Sequence[str]) -> None:
+    """Print the files of an export with the confidence of their grasps, and sentences about what is missing."""
+    console, each = _console(), report.confidences
+    console.print("files:")
+    for i, file in enumerate(report.files):
+        said = Counter(each if len(report.files) == 1 else each[i : i + 1])
+        counted = [f"{c:g} ({n} grasp{'' if n == 1 else 's'})" for c, n in said.items()]
+        listed = ", ".join(counted) if len(each) > len(report.files) else f"{each[i]:g}"
+        console.print(f"  {_plain(file)}: confidence {listed}", soft_wrap=True)
     for note in notes:
         console.print(f"note: {_plain(note)}", soft_wrap=True)
 

@@ -6,12 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from clench.base.errors import FileError
+from clench.base.json_files import check_writable
 from clench.base.visible_text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI: Final = 100
+#: Endings of the files that a figure can be written to.
+ENDINGS: Final = (".png", ".pdf", ".svg", ".eps", ".ps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 INK: Final = "#222222"
 FAINT: Final = "#8a8a8a"
 PAPER: Final = "#ffffff"
@@ -47,14 +50,38 @@ def new_figure(width: int, height: int) -> Figure:
     return figure
 
 
-def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG and return its path.
+def check_figure(path: Path) -> None:
+    """Refuse a file to which no figure can be written, before anything is drawn.
 
     Raises:
-        FileError: the file cannot be written.
+        FileError: nothing can be written there, or no figure has its ending.
     """
+    check_writable(path)
+    format_of_figure(path)
+
+
+def format_of_figure(path: Path) -> str:
+    """Return the format of a figure's file by its ending, PNG without one.
+
+    Raises:
+        FileError: no figure can be written with this ending.
+    """
+    ending = path.suffix.lower()
+    if ending and ending not in ENDINGS:
+        raise FileError(path, f"no figure has the ending '{path.suffix}'; expected {', '.join(ENDINGS)}.")
+    return ending[1:] or "png"
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure in the format of the file's ending, PNG without one, and return its path.
+
+    Raises:
+        FileError: the file cannot be written, or no figure has its ending.
+    """
+    format = format_of_figure(path)
+    options: dict[str, Any] = {"pil_kwargs": {"compress_level": 1}} if format == "png" else {}
     try:
-        figure.savefig(path, dpi=DPI, format="png", pil_kwargs={"compress_level": 1})
+        figure.savefig(path, dpi=DPI, format=format, **options)
     except OSError as error:
         raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
     return path

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def export_grasps(
     format: GraspFormat | str | None = None,
     *,
     hand: Hand | None = None,
-    obj: GraspObject | None = None,
+    obj: GraspObject | Sequence[GraspObject | None] | None = None,
     root: str | None = None,
     name: str | None = None,
     hold: Hold | None = None,
@@ -75,14 +75,16 @@ def export_grasps(
     """Write grasps in the format of another program (docs/exporting.md).
 
     With hand and object, a pregrasp and a squeeze for every direction of gravity are planned where a solution has none.
-    The confidence of a grasp is 1 where the hold test held, 0.5 where a squeeze is feasible, and 0 where none is, where
-    the test did not hold, and for a solution that is not valid.
+    The confidence of a grasp is 1 where the hold test held, and 0.5 where a squeeze is feasible. It is 0 where no
+    squeeze is feasible, where the test did not hold, where a straight line between the postures is not free, and for a
+    solution that is not valid. A note says why.
 
     Args:
         path: the file; for several grasps in the format dexgraspbench, a folder. Folders are made.
         solutions: one, several, or a batch, of which the poses that are grasps are solved again.
         format: see `GraspFormat`; None: by the file's ending. A path without an ending is a folder for dexgraspbench.
-        hand, obj: what the solutions were computed for; those of a batch unless given.
+        hand, obj: what the solutions were computed for; those of a batch unless given. Of several objects, a sequence
+            has one for each solution; isaac_grasp takes one object a file.
         root: the link whose pose is written, or "world": the frame of the hand's model file. None: "world" for
             dexgraspbench, which attaches the whole file there; else the palm.
         name: of the object, instead of its own.
@@ -100,7 +102,7 @@ def export_grasps(
         hand, obj = hand or solutions.question.hand, obj or solutions.question.obj
         solutions = [solutions.solution(int(i)) for i in np.flatnonzero(solutions.status == SolutionStatus.GRASP)]
     several = [solutions] if isinstance(solutions, GraspSolution) else list(solutions)
-    chosen = _format(path, format)
+    chosen = format_of(path, format)
     bench = chosen is GraspFormat.DEXGRASPBENCH
     files = _files(Path(path), len(several)) if bench else (Path(path),)
     if bench and name is not None:
@@ -108,8 +110,11 @@ def export_grasps(
     if not several:
         raise CommandError(f"{chosen}: expected at least one grasp, got none.")
     root = BASE if bench and root is None and hand is not None else root
-    settings = ExportSettings(hand, obj, root, name, hold, mass, friction, stiffness)
-    grasps = [outgoing(solution, settings) for solution in several]
+    objects = [obj] * len(several) if obj is None or isinstance(obj, GraspObject) else list(obj)
+    if len(objects) != len(several):
+        raise CommandError(f"obj: expected one object for each of {len(several)} solutions, got {len(objects)}.")
+    settings = ExportSettings(hand, None, root, name, hold, mass, friction, stiffness)
+    grasps = [outgoing(each, replace(settings, obj=of)) for each, of in zip(several, objects, strict=True)]
     notes = [note for grasp in grasps for note in grasp.notes]
     if chosen is GraspFormat.ISAAC_GRASP:
         write_isaac_grasp(path, grasps)
@@ -155,10 +160,15 @@ def import_grasps(path: str | Path, format: GraspFormat | str | None = None) -> 
         GraspFormat.DEXGRASPBENCH: read_dexgraspbench,
         GraspFormat.MOVEIT_GRASP: read_moveit_grasp,
     }
-    return readers[_format(path, format)](path)
+    return readers[format_of(path, format)](path)
 
 
-def _format(path: str | Path, given: GraspFormat | str | None) -> GraspFormat:
+def format_of(path: str | Path, given: GraspFormat | str | None = None) -> GraspFormat:
+    """Return the format of a file: the one that is given, else by the ending.
+
+    Raises:
+        FileError: the ending names no format. UnknownNameError: no such format.
+    """
     if given is not None:
         if given not in list(GraspFormat):
             raise UnknownNameError("format", str(given), "clench", [f.value for f in GraspFormat])

@@ -30,7 +30,7 @@ def write_isaac_grasp(path: str | Path, grasps: Sequence[OutgoingGrasp]) -> None
     """
     import yaml
 
-    all_of_one(grasps, FORMAT)
+    all_of_one([grasp.solution for grasp in grasps], FORMAT)
     document = {
         "format": FORMAT,
         "format_version": VERSION,

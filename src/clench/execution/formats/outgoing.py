@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -9,7 +10,7 @@ from typing import Any, Final
 from clench.base.defaults import MASS
 from clench.base.errors import CommandError
 from clench.base.pose import Pose, invert
-from clench.execution.executing import check_geometry
+from clench.execution.executing import check_angles, check_geometry
 from clench.execution.hold import Hold
 from clench.execution.piece_hold import hold_as_collided
 from clench.execution.pregrasp import plan_pregrasp
@@ -88,8 +89,9 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
     """Complete a solution for a file: plan what it lacks, test it if asked, place the frame, name what is missing.
 
     Raises:
-        CommandError: the solution is of another hand or object; a root without the hand; a test without both.
-        UnknownNameError: no such root link.
+        CommandError: the solution is of another hand or object, or its pregrasp is outside joints' limits; a root
+            without the hand; a test without both.
+        UnknownNameError: no such root link; the pregrasp or the squeeze is of a joint that the hand does not have.
     """
     hand, obj = settings.hand, settings.obj
     notes: list[str] = []
@@ -98,6 +100,7 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
         if solution.hand != hand.name:
             raise CommandError(f"The solution is for hand '{solution.hand}', not for '{hand.name}'.")
         check_geometry(solution, hand, obj)
+    check_angles(solution, hand)
     if hand is not None and obj is not None:
         obj = obj.posed(solution.object_pose)
         solution = _completed(solution, hand, obj, settings)
@@ -123,7 +126,7 @@ def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp
         squeezed,
         joints,
         NEITHER if driven else _confidence(solution, held),
-        (*notes, *driven, *unplaced, *missing, *unpressed),
+        (*notes, *_doubts(solution), *driven, *unplaced, *missing, *unpressed),
     )
 
 
@@ -223,9 +226,11 @@ def _squeezed(
     notes = [*_beyond(solution, angles)]
     if not silent:
         return angles, tuple(notes)
-    named = f"{', '.join(silent[:3])} and {len(silent) - 3} more" if len(silent) > 4 else ", ".join(silent)
-    note = f"The model gives no servo gain of {named}: they are not told to squeeze. Give the stiffness of the servos."
-    return angles, (*notes, note)
+    first = silent[:3] if len(silent) > 4 else silent
+    named = ", ".join(f"'{name}'" for name in first)
+    more = f" and {len(silent) - len(first)} more joints" if len(silent) > len(first) else ""
+    note = f"The model gives no servo gain of {named}{more}: they are not told to squeeze."
+    return angles, (*notes, f"{note} Give the stiffness of the servos (--stiffness, stiffness=).")
 
 
 def _beyond(solution: GraspSolution, angles: Mapping[str, float]) -> Iterator[str]:
@@ -251,6 +256,15 @@ def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], 
     return found
 
 
+def _doubts(solution: GraspSolution) -> Iterator[str]:
+    """Yield what is wrong with a solution whose confidence is 0 without any test."""
+    if not solution.is_valid():
+        why = next(iter(solution.violations()), f"its status is '{solution.status.value}'")
+        yield f"The solution is not valid: {why.rstrip('.')}."
+    if solution.squeeze is not None and not solution.squeeze.get("feasible"):
+        yield str(solution.squeeze.get("text") or "The solution's squeeze plan is not feasible.")
+
+
 def _confidence(solution: GraspSolution, held: bool | None) -> float:
     if not solution.is_valid() or held is False:
         return NEITHER
@@ -259,11 +273,21 @@ def _confidence(solution: GraspSolution, held: bool | None) -> float:
     return FEASIBLE if (solution.squeeze or {}).get("feasible") else NEITHER
 
 
-def all_of_one(grasps: Sequence[OutgoingGrasp], format: str) -> None:
-    """Refuse grasps of several hands or objects in one file.
+def first_other(solutions: Sequence[GraspSolution]) -> int | None:
+    """Return the index of the first solution that is of another hand or object than the first, None without one."""
+    of = [(s.hand, s.object, os.path.realpath(s.object_model), s.object_scale) for s in solutions]
+    return next((i for i, each in enumerate(of) if each != of[0]), None)
+
+
+def all_of_one(solutions: Sequence[GraspSolution], format: str) -> None:
+    """Refuse solutions of several hands or objects in one file.
 
     Raises:
-        CommandError: there are several, or no grasps.
+        CommandError: there are several.
     """
-    if len({(g.solution.hand, g.solution.object) for g in grasps}) != 1:
-        raise CommandError(f"{format}: expected solutions of one hand and one object, got several or none.")
+    other = first_other(solutions)
+    if other is not None:
+        a, b = (f"solution {i} is of {solutions[i].hand} on {solutions[i].object}" for i in (0, other))
+        raise CommandError(
+            f"{format}: expected solutions of one hand and one object for a file; {a}, {b}. Export them separately."
+        )

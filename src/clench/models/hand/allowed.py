@@ -12,10 +12,14 @@ import numpy as np
 from clench.base.errors import UnknownNameError
 
 from .compiled import CompiledModel
+from .findings import Finding, FindingCode, quoted
 from .geometry import collides
 from .hand import Hand, Link
 from .hand_file import HandFile
 from .kinematics import Skeleton
+
+#: So many pairs of a finding are named.
+_NAMED = 3
 
 
 def allowed_pairs(compiled: CompiledModel, skeleton: Skeleton, links: tuple[Link, ...]) -> tuple[tuple[int, int], ...]:
@@ -42,6 +46,41 @@ def with_given_pairs(hand: Hand, overrides: HandFile) -> tuple[tuple[int, int], 
                 raise UnknownNameError("link", name, f"hand '{hand.name}' (allowed_pairs in {overrides.path})", names)
         pairs.add(_pair(*(names.index(name) for name in pair)))
     return tuple(sorted(pairs))
+
+
+def check_excluded(hand: Hand) -> list[Finding]:
+    """Return a finding that counts the pairs of links of different fingers that the model excludes.
+
+    Args:
+        hand: with fingers, and without the pairs of a hand file.
+    """
+    finger_of = {link: finger.name for finger in hand.fingers for link in finger.links}
+    solid = {i for i, link in enumerate(hand.links) if any(link.shapes.values())}
+    adjacent = adjacent_pairs(hand.links)
+    pairs = [
+        (hand.links[a].name, hand.links[b].name)
+        for a, b in hand.allowed_pairs
+        if {a, b} <= solid and (a, b) not in adjacent and len({finger_of.get(a), finger_of.get(b)} - {None}) == 2
+    ]
+    if not pairs:
+        return []
+    listed = ", ".join(f"{quoted((a,))} - {quoted((b,))}" for a, b in pairs[:_NAMED])
+    more = ", …" if len(pairs) > _NAMED else ""
+    count = (
+        "One pair of links of different fingers is"
+        if len(pairs) == 1
+        else f"{len(pairs)} pairs of links of different fingers are"
+    )
+    return [
+        Finding(
+            FindingCode.PAIRS_EXCLUDED,
+            f"{count} never checked against each other, because the model excludes them: {listed}{more}.",
+            "Nothing to do, if these links cannot meet. Else remove their <exclude> from the model, or give their "
+            "geoms contype and conaffinity that fit each other.",
+            links=tuple(dict.fromkeys(name for pair in pairs for name in pair)),
+            numbers={"pairs": len(pairs)},
+        )
+    ]
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:

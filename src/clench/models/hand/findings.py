@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from clench.base.visible_text import visible
+
 
 class Severity(StrEnum):
     """Name how much a finding matters."""
@@ -52,6 +54,8 @@ class FindingCode(StrEnum):
     """links overlap before anything closes, and must not"""
     OVERLAP_ALLOWED = "overlap_allowed"
     """links overlap before anything closes, and may, since they do so in the model's own posture"""
+    PAIRS_EXCLUDED = "pairs_excluded"
+    """the model excludes pairs of links of different fingers, which are never checked"""
     THUMB_OPPOSES_NOTHING = "thumb_opposes_nothing"
     """the thumb and the fingers never close towards each other"""
     NO_THUMB = "no_thumb"
@@ -102,10 +106,10 @@ def in_hand_file(table: str, name: str, line: str) -> str:
 
 def table_header(table: str, name: str) -> str:
     """Return the line that begins a table of the hand file, e.g. ``[joints.X]``."""
-    key = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{name}"'
+    key = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{visible(name)}"'
     return f"[{table}.{key}]"
 
 
 def quoted(names: tuple[str, ...] | list[str]) -> str:
-    """Return names in quotes, with commas between."""
-    return ", ".join(f"'{name}'" for name in names)
+    """Return names in quotes, each on one line, with commas between."""
+    return ", ".join(f"'{visible(name)}'" for name in names)

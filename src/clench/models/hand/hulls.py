@@ -22,6 +22,8 @@ _LOOKS: Final = 2000
 _AT_ONCE: Final = 64
 #: From this distance on the mesh itself is recommended [m].
 _LARGE: Final = 1e-3
+#: From this distance on, answers with the hulls are wrong for the links' real shapes [m].
+_WRONG: Final = 1e-2
 
 
 def check_hulls(hand: Hand) -> list[Finding]:
@@ -40,7 +42,8 @@ def check_hulls(hand: Hand) -> list[Finding]:
             "the command; it may be as fast). Simulations collide hulls in any case."
         )
     numbers = {f"{name}_m": distance for name, distance in found.items()}
-    return [Finding(FindingCode.HULL_OFF_MESH, text, advice, Severity.NOTE, links=links, numbers=numbers)]
+    severity = Severity.WARNING if worst > _WRONG else Severity.NOTE
+    return [Finding(FindingCode.HULL_OFF_MESH, text, advice, severity, links=links, numbers=numbers)]
 
 
 def hull_distances(hand: Hand) -> dict[str, float]:

@@ -13,7 +13,7 @@ from clench.base.errors import FileError, UnknownNameError
 from clench.base.pose import FloatArray
 from clench.models.shapes import CollisionSource
 
-from .allowed import allowed_pairs, with_given_pairs
+from .allowed import allowed_pairs, check_excluded, with_given_pairs
 from .checks import check_understood
 from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
 from .coupling import FoundCouplings, Relation, find_couplings, flatten
@@ -206,13 +206,14 @@ def _understood(hand: Hand, overrides: HandFile, held: Mapping[int, float]) -> H
         hand = assign_roles(replace(bare, fingers=known), overrides, held)
         bases, tips, stretch, closing = _directions(hand)
     hand = replace(hand, fingers=fingers, fixed_links=fixed_links(hand.links, fingers, hand.palm))
+    excluded = check_excluded(hand)
     hand = replace(
         hand,
         allowed_pairs=with_given_pairs(hand, overrides),
         palm_center=bases.mean(axis=0),
         palm_normal=_normal(hand, stretch, closing, gripper=not called),
     )
-    return replace(hand, findings=(*hand.findings, *check_understood(hand)))
+    return replace(hand, findings=(*hand.findings, *excluded, *check_understood(hand)))
 
 
 def _called_thumbs(fingers: Sequence[Finger], told: Sequence[bool], overrides: HandFile) -> set[str]:

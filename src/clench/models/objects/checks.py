@@ -20,6 +20,8 @@ from .topology import compact, components, edge_defects, parted, winding_number,
 
 #: Objects larger than this probably have units of millimetres [m]; smaller than `SMALL`, something else is wrong.
 LARGE: Final = 2.0
+#: What lengths in millimetres are multiplied by.
+MILLIMETRE: Final = 1e-3
 SMALL: Final = 1e-3
 #: Coordinates of meshes are below this before they are scaled to metres, whatever their units are [-].
 LARGEST_COORDINATE: Final = 1e15
@@ -64,14 +66,26 @@ def check_mesh(vertices: ArrayLike, triangles: ArrayLike, name: str) -> CheckedM
     return CheckedMesh(TriangleMesh(points[used], faces), closed, tuple(warnings))
 
 
-def unit_warnings(vertices: FloatArray, name: str) -> tuple[str, ...]:
-    """Return a sentence when the size of an object, shape (V, 3) [m], looks as if its units were others than metres."""
+def unit_warnings(vertices: FloatArray, name: str, scale: float = 1.0) -> tuple[str, ...]:
+    """Return a sentence when the size of an object looks as if its units were others than metres.
+
+    Args:
+        vertices: [m], shape (V, 3). name: for messages. scale: that it was loaded with [-].
+    """
     extent = float(np.ptp(vertices, axis=0).max())
     if extent > LARGE:
-        return (f"{name} is {extent:.4g} m across: if its units are millimetres, load it with scale=0.001.",)
+        return (f"{name} is {extent:.4g} m across: {smaller(scale)}.",)
     if extent < SMALL:
         return (f"{name} is only {extent:.4g} m across: if its units are not metres, load it with another scale.",)
     return ()
+
+
+def smaller(scale: float) -> str:
+    """Return the advice for an object that is too large, by the scale that it was loaded with [-]."""
+    advised = f"load it with a scale of {MILLIMETRE * scale:g}"
+    if scale == 1.0:
+        return f"if its lengths are in millimetres, {advised}"
+    return f"if the scale of {scale:g} makes it a thousand times too large, {advised}"
 
 
 def check_size(shape: Shape, name: str) -> None:

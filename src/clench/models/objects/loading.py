@@ -83,9 +83,14 @@ def load_object(
     body = scaled_body(body, factor)
     for shape in body.shapes:
         check_size(shape, path.name if path else name)
-    body = in_source(body, source)
-    warnings += unit_warnings(_body_points(body), path.name if path else name)
-    return GraspObject(name, (body,), pose or Pose.identity(), source, warnings, path, factor)
+    read = GraspObject(name, (in_source(body, source),), pose or Pose.identity(), source, warnings, path, factor)
+    return replace(read, warnings=(*warnings, *size_warnings(read)))
+
+
+def size_warnings(obj: GraspObject) -> tuple[str, ...]:
+    """Return those of the warnings of an object read by `load_object` that are about its size."""
+    label = obj.path.name if obj.path else obj.name
+    return unit_warnings(np.vstack([_body_points(body) for body in obj.bodies]), label, obj.scale)
 
 
 def object_from_shape(
