@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 from clench.base.tolerances import ALLOWED_PENETRATION
+from clench.base.visible_text import visible
 from clench.models.hand.allowed import adjacent_pairs
 from clench.models.hand.findings import Finding, FindingCode, Severity, in_hand_file
 from clench.models.hand.hand import Hand
@@ -68,7 +69,7 @@ def _overlaps(hand: Hand, source: CollisionSource) -> list[Finding]:
             )
             continue
         mover = _moving_joint(hand, a, b)
-        pair = f'allowed_pairs = [["{names[0]}", "{names[1]}"]]'
+        pair = f'allowed_pairs = [["{visible(names[0])}", "{visible(names[1])}"]]'
         lines = [pair] if mover is None else [pair, in_hand_file("joints", mover, "open = ...")]
         advice = (
             "Fingers that start so are solved but not certified. If the shapes are only coarse there, or the hand "

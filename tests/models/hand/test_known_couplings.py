@@ -79,6 +79,14 @@ def test_the_printed_lines_are_lines_of_a_hand_file(tmp_path: Path, capsys: pyte
     assert missing(Hand.load(model, hand_file=model.with_suffix(".toml"))) == []
 
 
+def test_a_line_break_in_a_name_begins_no_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = renamed(finger("f"), ["a&#10;[links]&#10;", "b"]).replace(' range="0 1.6"', "", 1)
+    assert main(["hand", str(written(tmp_path, hand(one, finger("g", (0.03, 0, 0.05)))))]) == 0
+    printed = capsys.readouterr().out
+    assert '[joints."a\\n[links]\\n"]' in printed
+    assert not [line for line in printed.splitlines() if line.strip().startswith("[links]")]
+
+
 @pytest.mark.parametrize(
     "names",
     [["FFJ2", "FFJ1", "FFJ0"], ["a_j0", "a_j1"], ["OFFJ2", "OFFJ1"], ["finger_1_med_joint", "finger_2_dist_joint"]],

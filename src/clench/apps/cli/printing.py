@@ -132,7 +132,7 @@ def print_hand(report: HandReport) -> None:
     for finding in report.findings:
         label = "[yellow]warning[/yellow]" if finding.severity == "warning" else "note"
         console.print(f"{label} ({finding.code}): {_plain(finding.text)}", soft_wrap=True)
-        for number, line in enumerate(finding.advice.splitlines()):
+        for number, line in enumerate(finding.advice.split("\n") if finding.advice else ()):
             console.print(f"{'       ' if number else '    -> '}{_plain(line)}", soft_wrap=True)
 
 

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from clench.base.tolerances import CLOSING_ANGLE, PARALLEL_ANGLE
+from clench.base.visible_text import visible
 from clench.models.shapes import CollisionSource
 
 from .findings import Finding, FindingCode, Severity, in_hand_file, quoted
@@ -120,7 +121,7 @@ def _bare_joints(hand: Hand, finger: Finger) -> list[Finding]:
         if hand.joints[j].role is JointRole.CLOSING and not any(any(hand.links[i].shapes.values()) for i in moved):
             name = hand.joints[j].name
             text = f"Joint '{name}' of finger '{finger.name}' moves nothing that has a shape; it cannot touch."
-            names = ", ".join(f'"{hand.joints[k].name}"' for k in finger.joints[:place])
+            names = ", ".join(f'"{visible(hand.joints[k].name)}"' for k in finger.joints[:place])
             line = in_hand_file("fingers", finger.name, f"joints = [{names}]")
             advice = f"Give its link a shape in the model, or leave the joint out in the hand file, {line}."
             found.append(Finding(FindingCode.NO_SHAPE, text, advice, joints=(name,)))

@@ -9,6 +9,7 @@ import numpy as np
 
 from clench.base.errors import FileError, HandError, UnknownNameError
 from clench.base.tolerances import CLOSING_ANGLE
+from clench.base.visible_text import visible
 
 from .closing_sense import FingerPlan, contradicting, decide_senses, note_limits
 from .findings import Finding, FindingCode, in_hand_file, quoted
@@ -239,7 +240,7 @@ def _follow(hand: Hand, joints: list[Joint], overrides: HandFile, findings: list
         if follower.role is JointRole.CLOSING:
             if direction != follower.direction and follower.name in overrides.joints:
                 text = f"Joint '{follower.name}' follows '{leader.name}'; its direction comes from there."
-                advice = f'Give the direction of "{leader.name}" in the hand file.'
+                advice = f'Give the direction of "{visible(leader.name)}" in the hand file.'
                 names = (follower.name, leader.name)
                 findings.append(Finding(FindingCode.DIRECTION_IGNORED, text, advice, joints=names))
             follower = replace(follower, direction=direction, direction_reason=f"follows '{leader.name}' ({c.reason})")
