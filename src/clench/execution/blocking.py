@@ -31,9 +31,8 @@ def modelled_blocker(
     """
     target = reached.copy()
     target[hand.joint_index(joint)] = told
-    followers = sorted(_with_followers(hand, hand.joint_index(joint)))
+    followers = list(hand.followers_of(hand.joint_index(joint)))
     target[followers] = hand.coupled(target)[followers]
-    target[hand.joint_index(joint)] = told
     around = None if obj is None else placed_object(solution, obj)
     found = find_path_overlap(hand, np.array([reached, target]), CollisionSource(solution.collision_source), around)
     if found is not None:
@@ -71,17 +70,9 @@ def simulated_blocker(scene: Scene, data: Any, hand: Hand, joint: str) -> str:
 
 def _links_moved_by(hand: Hand, joint: int) -> set[int]:
     """Return the links that a joint, or a joint that follows it, moves."""
-    joints = _with_followers(hand, joint)
+    joints = {joint, *hand.followers_of(joint)}
     moved: set[int] = set()
     for number, link in enumerate(hand.links):
         if link.joint in joints or link.parent in moved:
             moved.add(number)
     return moved
-
-
-def _with_followers(hand: Hand, joint: int) -> set[int]:
-    """Return a joint and all joints that follow it."""
-    joints = {joint}
-    for _ in hand.couplings:
-        joints |= {c.follower for c in hand.couplings if c.leader in joints}
-    return joints

@@ -8,19 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.models.shapes import CollisionSource
 from clench.solve.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
 from .driver import HandState, RefusedCommandError
 from .following import TimedPlan
 from .joint_map import MappedJoint
-from .step_check import placed_object
 from .trajectory import Trajectory
-from .way_to_touch import Way, WayFinder
+from .way_to_touch import Way, WayFinder, in_turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,8 @@ def plan_driven_way(
             what would overlap.
     """
     found = found_posture(hand, mapped, state.positions, trajectory.positions[0])
-    way = _way_to_start(WayFinder(solution, hand, obj, trajectory.pace, start=found), trajectory.positions[0])
+    finder = WayFinder(solution, hand, obj, trajectory.pace).begun_at(found)
+    way = _way_to_start(finder, trajectory.positions[0])
     if way.overlap is not None:
         raise RefusedCommandError(
             f"No free way was found from where the hand is to the trajectory's start: {way.overlap.sentence}. Move "
@@ -78,8 +76,7 @@ def plan_driven_way(
     plan = TimedPlan(names, times, positions[:, columns] * scale + offset)
     kept = plan.thinned()
     told = positions[np.searchsorted(times, kept.times)]
-    around = None if obj is None else placed_object(solution, obj)
-    overlap = find_path_overlap(hand, told, CollisionSource(solution.collision_source), around)
+    overlap = finder.overlap(told)
     if overlap is not None:
         raise RefusedCommandError(f"On the way to the touch, {overlap.sentence}.")
     return DrivenWay(kept, _said(way, found, trajectory.positions[0]))
@@ -125,6 +122,5 @@ def _said(way: Way, found: FloatArray, goal: FloatArray) -> str:
     far = float(np.abs(goal - found).max(initial=0.0))
     text = f"The way began with a part to the trajectory's start, {far:.3g} rad at most."
     if len(way.turns) > 1:
-        order = ", then ".join(" and ".join(f"'{name}'" for name in turn) for turn in way.turns)
-        text += f" There, fingers waited for each other: {order}."
+        text += f" There, fingers waited for each other: {in_turn(way.turns)}."
     return text

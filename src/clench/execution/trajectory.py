@@ -21,7 +21,7 @@ from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, poin
 from .step_check import refuse_after
 from .timing import ACCELERATION
 from .trajectory_checks import check_joints, check_points, check_rates, check_velocities
-from .way_to_touch import WayFinder, refuse_way
+from .way_to_touch import WayFinder, in_turn, refuse_way
 
 SCHEMA = "clench.trajectory/1"
 #: No smaller fraction of the velocity limits makes sense, or can be computed with [-].
@@ -72,8 +72,7 @@ class Trajectory:
         """Sentences about fingers that wait, and about fingers that do not touch at the same moment."""
         found = []
         if len(self.turns) > 1:
-            order = ", then ".join(" and ".join(f"'{name}'" for name in turn) for turn in self.turns)
-            found.append(f"Fingers wait for each other, so that they do not meet: {order}.")
+            found.append(f"Fingers wait for each other, so that they do not meet: {in_turn(self.turns)}.")
         if not self.touches_at_once:
             found.append("The path has no pregrasp: fingers may touch one after another, and push the object.")
         if self.open_bodies:

@@ -80,7 +80,6 @@ class WayFinder:
     Args:
         solution: the solution. hand, obj: what it was computed for; without the object only links are kept apart.
         pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
-        start: where the hand is [rad], shape (J,); None is the solution's open hand.
     """
 
     def __init__(
@@ -89,12 +88,11 @@ class WayFinder:
         hand: Hand,
         obj: GraspObject | None,
         pace: tuple[FloatArray, FloatArray],
-        start: FloatArray | None = None,
     ) -> None:
         self.solution, self.hand, self.pace = solution, hand, pace
         self.source = CollisionSource(solution.collision_source)
         self.around = None if obj is None else placed_object(solution, obj)
-        self.start = posture(solution.open_angles, hand, "open_angles") if start is None else start
+        self.start = posture(solution.open_angles, hand, "open_angles")
         self.end = posture(solution.joint_angles, hand, "joint_angles")
 
     def find(self, clearance: float) -> Way:
@@ -296,6 +294,11 @@ class WayFinder:
         return list(_closing_stages(self.hand, joints, start, goal))
 
 
+def in_turn(turns: Sequence[Sequence[str]]) -> str:
+    """Say which fingers move at the same time, and which wait, e.g. "'index' and 'middle', then 'thumb'"."""
+    return ", then ".join(" and ".join(f"'{name}'" for name in turn) for turn in turns)
+
+
 def refuse_way(way: Way, hand: Hand) -> None:
     """Raise an error that says why no path is free.
 
@@ -367,19 +370,11 @@ def _closing_stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end:
     for leader in joints:
         if leader in followers:
             continue
-        group = [leader, *(j for j in _followers(hand, leader) if j in joints)]
+        group = [leader, *(j for j in hand.followers_of(leader) if j in joints)]
         path = closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
         yield path
         q = path[-1].copy()
     yield _eased(q, end)
-
-
-def _followers(hand: Hand, leader: int) -> list[int]:
-    found: list[int] = []
-    for coupling in hand.couplings:
-        if coupling.leader == leader or coupling.leader in found:
-            found.append(coupling.follower)
-    return found
 
 
 def _eased(start: FloatArray, end: FloatArray) -> FloatArray:

@@ -334,6 +334,14 @@ class Hand:
             q[c.follower] = min(max(c.ratio * q[c.leader] + c.offset, j.lower), j.upper)
         return q
 
+    def followers_of(self, joint: int) -> tuple[int, ...]:
+        """Return the indices of the joints that follow a joint, directly or over others, in the order of couplings."""
+        found: list[int] = []
+        for c in self.couplings:
+            if c.leader == joint or c.leader in found:
+                found.append(c.follower)
+        return tuple(found)
+
     def link_poses(self, q: FloatArray) -> FloatArray:
         """Return `T_palm_link` of every link at a posture, shape (L, 4, 4).
 
