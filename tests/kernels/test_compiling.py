@@ -1,35 +1,78 @@
 """What is compiled is kept on disk for as long as nothing that went into it has changed."""
 
+import ast
 import importlib.util
 import shutil
 import sys
 from pathlib import Path
 
+import pytest
+
 from clench.kernels import compiling, warming
 
-
-def test_every_kernel_is_kept_by_the_source_of_all_kernels():
-    stamps = {compiling.index_of(kernel)._source_stamp for kernel in (*warming.HERE, *warming.THERE)}
-    assert stamps == {compiling.source_stamp()}
+KERNELS = Path(compiling.__file__).parent
 
 
-def test_a_change_of_any_kernel_changes_the_stamp(tmp_path, monkeypatch):
+def test_every_kernel_is_kept_by_the_sources_that_it_is_compiled_from():
+    for kernel in (*warming.HERE, *warming.THERE):
+        module = Path(sys.modules[kernel.py_func.__module__].__file__)
+        assert compiling.index_of(kernel)._source_stamp == compiling.source_stamp(module)
+
+
+@pytest.fixture
+def copied(tmp_path, monkeypatch):
+    """A copy of the decorators in a folder of its own, with three modules: the first one imports the second."""
     copy = shutil.copy(compiling.__file__, tmp_path)
+    Path(tmp_path, "handing.py").write_text("HANDED = 1\n")
     spec = importlib.util.spec_from_file_location("clench.kernels.copied", copy)
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, spec.name, module)
     spec.loader.exec_module(module)
+    Path(tmp_path, "caller.py").write_text("def late():\n    from .called import STEPS\n")
+    Path(tmp_path, "called.py").write_text("STEPS = 8\n")
+    Path(tmp_path, "other.py").write_text("STEPS = 8\n")
+    numbers = Path(tmp_path, "tolerances.py")
+    numbers.write_text("TOUCH = 1\n")
+    monkeypatch.setattr(module.tolerances, "__file__", str(numbers))
+    return module
 
-    def stamp() -> bytes:
-        module.source_stamp.cache_clear()
-        return module.source_stamp()
 
-    called = Path(tmp_path, "called.py")
-    called.write_text("STEPS = 8\n")
-    before = stamp()
-    called.write_text("STEPS = 9\n")
-    changed = stamp()
-    called.write_text("STEPS = 8\n")
-    assert changed != before == stamp()
-    monkeypatch.setattr(module.tolerances, "__file__", str(called))
-    assert stamp() != before  # the numbers that are compiled in count as well
+def stamps(module) -> dict[str, bytes]:
+    module.source_stamp.cache_clear()
+    module._read.cache_clear()
+    folder = Path(module.__file__).parent
+    return {name: module.source_stamp(folder / f"{name}.py") for name in ("caller", "called", "other")}
+
+
+def test_a_change_of_a_kernel_changes_its_stamp_and_those_of_its_callers_only(copied):
+    before = stamps(copied)
+    Path(copied.__file__).with_name("called.py").write_text("STEPS = 9\n")
+    after = stamps(copied)
+    assert after["called"] != before["called"]
+    assert after["caller"] != before["caller"]
+    assert after["other"] == before["other"]
+
+
+@pytest.mark.parametrize("name", ["compiling", "handing", "tolerances"])
+def test_a_change_of_the_decorators_or_of_the_numbers_changes_every_stamp(copied, name):
+    before = stamps(copied)
+    # The copy of the decorators counts under the name that it was loaded from.
+    with Path(copied.__file__).with_name(f"{name}.py").open("a") as file:
+        file.write("# changed\n")
+    after = stamps(copied)
+    assert all(after[module] != before[module] for module in before)
+
+
+def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expects():
+    outside = set()
+    for path in sorted(KERNELS.glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                outside |= {alias.name for alias in node.names if alias.name.startswith("clench")}
+            elif isinstance(node, ast.ImportFrom) and node.level:
+                assert node.level == 1, path
+                assert node.module in compiling._read(path)[1], path
+            elif isinstance(node, ast.ImportFrom) and node.module.startswith("clench"):
+                outside.add(node.module)
+    # Only numbers of `tolerances` are compiled in; `memory` is called by functions that Python runs.
+    assert outside == {"clench.base", "clench.base.tolerances", "clench.base.memory"}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 from numba import njit
 
@@ -15,6 +16,9 @@ from clench.base import tolerances
 from .handing import handed
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+#: How modules of kernels import each other; a test holds that there is no other way.
+_IMPORTED: Final = re.compile(r"^\s*from \.(\w+) import ", re.MULTILINE)
 
 
 def kernel(function: Kernel) -> Kernel:
@@ -45,16 +49,30 @@ def inner_allocating_kernel(function: Kernel) -> Kernel:
 
 
 @cache
-def source_stamp() -> bytes:
-    """Return a digest of the source of all kernels, and of the numbers that are compiled into them.
+def source_stamp(module: Path) -> bytes:
+    """Return a digest of the sources that a module's kernels are compiled from, and of the numbers in them.
 
-    What is kept on disk is good for as long as it is the same. Numba asks no other file than the kernel's own, while
-    every kernel has those that it calls inside: after an update old ones would stay in use.
+    A kernel on disk is good for as long as this digest is the same. Numba looks at the kernel's own file only, while a
+    kernel contains the kernels that it calls. So the digest covers the modules that the module imports, directly or
+    over others, and these decorators.
+
+    Args:
+        module: file of the module, in the folder of the kernels.
     """
-    digest = hashlib.sha256()
-    for path in [*sorted(Path(__file__).parent.glob("*.py")), Path(tolerances.__file__)]:
-        digest.update(path.read_bytes())
-    return digest.digest()
+    found, waiting = set[Path](), [module, Path(__file__), Path(tolerances.__file__)]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += [path.with_name(f"{name}.py") for name in _read(path)[1]]
+    return hashlib.sha256(b"".join(_read(path)[0] for path in sorted(found))).digest()
+
+
+@cache
+def _read(path: Path) -> tuple[bytes, tuple[str, ...]]:
+    """Return the digest of a file, and the modules of its folder that it imports."""
+    content = path.read_bytes()
+    return hashlib.sha256(content).digest(), tuple(_IMPORTED.findall(content.decode()))
 
 
 def index_of(dispatcher: Any) -> Any:
@@ -76,7 +94,7 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
     dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
-    index_of(dispatcher)._source_stamp = source_stamp()
+    index_of(dispatcher)._source_stamp = source_stamp(Path(function.__code__.co_filename))
     choose = dispatcher.get_call_template
 
     def choose_handed(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
