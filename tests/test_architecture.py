@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
-LAYERS = ["base", "kernels", "models", "grasp", "solve", "execution", "apps"]
+LAYERS = ["base", "kernels", "models", "grasp", "solve", "execution", "planner", "apps"]
 HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = sorted(PACKAGE.rglob("*.py"))

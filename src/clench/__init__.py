@@ -41,6 +41,11 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
     from clench.models.shapes import CollisionSource, ShapeKind
+    from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
+    from clench.planner.options import GraspKind
+    from clench.planner.plan_grasps import iter_grasps, plan_grasps
+    from clench.planner.regions import Region
+    from clench.planner.search import GraspSearch
     from clench.solve.batch import solve_batch, solve_stream
     from clench.solve.controller import solve
     from clench.solve.grasp_batch import BatchContacts, GraspBatch
@@ -91,9 +96,12 @@ _HOMES = {
     "GraspBatch": "clench.solve.grasp_batch",
     "GraspCommand": "clench.models.command",
     "GraspFormat": "clench.execution.formats.exchange",
+    "GraspKind": "clench.planner.options",
     "GraspObject": "clench.models.objects.grasp_object",
+    "GraspPlan": "clench.planner.grasp_plan",
     "GraspPosture": "clench.execution.formats.grasp_posture",
     "GraspQuality": "clench.solve.quality",
+    "GraspSearch": "clench.planner.search",
     "GraspSolution": "clench.solve.solution",
     "Hand": "clench.models.hand.hand",
     "HandCriterion": "clench.grasp.criteria",
@@ -107,10 +115,12 @@ _HOMES = {
     "JointRole": "clench.models.hand.hand",
     "ObjectError": "clench.base.errors",
     "OrcaDriver": "clench.execution.drivers.orca",
+    "PlannedGrasp": "clench.planner.grasp_plan",
     "Pose": "clench.base.pose",
     "PoseErrorReport": "clench.solve.pose_error",
     "ReadySignal": "clench.execution.ready_signal",
     "Record": "clench.solve.record",
+    "Region": "clench.planner.regions",
     "Ros2Driver": "clench.execution.drivers.ros2",
     "Sensitivity": "clench.solve.sensitivity",
     "ShapeKind": "clench.models.shapes",
@@ -127,8 +137,10 @@ _HOMES = {
     "export_grasps": "clench.execution.formats.exchange",
     "grasp_quality": "clench.solve.quality",
     "import_grasps": "clench.execution.formats.exchange",
+    "iter_grasps": "clench.planner.plan_grasps",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
+    "plan_grasps": "clench.planner.plan_grasps",
     "plan_pregrasp": "clench.execution.pregrasp",
     "plan_squeeze": "clench.solve.squeezing",
     "plan_trajectory": "clench.execution.trajectory",
@@ -169,9 +181,12 @@ __all__ = [
     "GraspBatch",
     "GraspCommand",
     "GraspFormat",
+    "GraspKind",
     "GraspObject",
+    "GraspPlan",
     "GraspPosture",
     "GraspQuality",
+    "GraspSearch",
     "GraspSolution",
     "Hand",
     "HandCriterion",
@@ -185,10 +200,12 @@ __all__ = [
     "JointRole",
     "ObjectError",
     "OrcaDriver",
+    "PlannedGrasp",
     "Pose",
     "PoseErrorReport",
     "ReadySignal",
     "Record",
+    "Region",
     "Ros2Driver",
     "Sensitivity",
     "ShapeKind",
@@ -206,8 +223,10 @@ __all__ = [
     "export_grasps",
     "grasp_quality",
     "import_grasps",
+    "iter_grasps",
     "load_calibration",
     "load_command",
+    "plan_grasps",
     "plan_pregrasp",
     "plan_squeeze",
     "plan_trajectory",

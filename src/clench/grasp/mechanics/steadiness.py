@@ -23,7 +23,7 @@ EDGES: Final = 8
 #: Largest normal force of a contact within torque limits [N]; binds only where joints have none, or stand still.
 MOST_NORMAL_FORCE: Final = 1e3
 #: Rounds of reweighting of the fast bound [-].
-_ROUNDS = 3
+ROUNDS = 3
 #: Accuracy of the radius within torque limits, as a fraction of the largest wrench [-].
 _LIMITED_ACCURACY = 1e-7
 _LIMITED_BATCH = 6
@@ -72,7 +72,7 @@ def epsilon_bound(held: HeldObject, norm: WrenchNorm | str | None = WrenchNorm.L
     reach = np.ones((len(contacts), contacts.width))
     reach[:, :2], reach[:, 3:] = contacts.reach[:, :2], contacts.reach[:, 2:]
     generators, faces = contacts.cone_edges(edges), cone_faces(contacts, edges)
-    return float(resisted_ball(held.grasp_map, generators, faces, reach, caps, most, _ROUNDS))
+    return float(resisted_ball(held.grasp_map, generators, faces, reach, caps, most, ROUNDS))
 
 
 def cone_faces(contacts: ContactSet, edges: int) -> FloatArray:

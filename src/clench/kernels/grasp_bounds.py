@@ -1,0 +1,81 @@
+"""How well many grasps resist wrenches: a lower bound of epsilon for each, without Python between them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiling import allocating_kernel, inner_kernel
+from .layout import Floats, Ints
+from .wrench_bound import resisted_ball
+
+
+@allocating_kernel
+def bound_grasps(
+    first: Ints,
+    position: Floats,
+    inward: Floats,
+    friction: Floats,
+    center: Floats,
+    length: float,
+    around: Floats,
+    between: Floats,
+    rounds: int,
+    out: Floats,
+) -> None:
+    """Write lower bounds of epsilon (L1, point contacts with friction) of N grasps, 0 where none was found.
+
+    Args:
+        first: contacts `first[n]` up to `first[n + 1]` are those of grasp n, (N + 1,).
+        position: [m], inward: unit normals into the object, friction: [-]; of all contacts, (C, 3), (C, 3), (C,).
+        center: of mass, in the frame of the contacts [m], (N, 3). length: length scale of wrenches [m].
+        around, between: unit directions of the edges and of the faces of the friction polyhedra, (E, 2).
+        rounds: of reweighting, see `resisted_ball`. out: [N per N of normal force], (N,).
+    """
+    edges = len(around)
+    lean = np.cos(np.pi / edges)
+    for n in range(len(out)):
+        out[n] = 0.0
+        begin, count = first[n], first[n + 1] - first[n]
+        if count < 2:
+            continue
+        G = np.empty((6, 3 * count))
+        generators, faces = np.ones((count, edges, 3)), np.ones((count, edges, 3))
+        reach, caps = np.ones((count, 3)), np.zeros((1, 3 * count))
+        for i in range(count):
+            _put_columns(G, i, position[begin + i], inward[begin + i], center[n], length)
+            mu = friction[begin + i]
+            reach[i, 0] = reach[i, 1] = mu
+            caps[0, 3 * i + 2] = 1.0
+            for e in range(edges):
+                generators[i, e, 0], generators[i, e, 1], generators[i, e, 2] = (
+                    mu * around[e, 0],
+                    mu * around[e, 1],
+                    1.0,
+                )
+                for k in range(2):
+                    faces[i, e, k] = -between[e, k] / (mu * lean)
+        out[n] = resisted_ball(G, generators, faces, reach, caps, np.ones(1), rounds)
+
+
+@inner_kernel
+def _put_columns(G: Floats, i: int, p: Floats, n: Floats, center: Floats, length: float) -> None:
+    """Write the columns of the grasp map of a contact: two tangents and the inward normal, right-handed."""
+    far = 0
+    for k in range(1, 3):
+        if abs(n[k]) < abs(n[far]):
+            far = k
+    # The first tangent is the cross product of the axis farthest from the normal with the normal.
+    a, b = (far + 1) % 3, (far + 2) % 3
+    size = np.sqrt(n[a] * n[a] + n[b] * n[b])
+    column = 3 * i
+    G[far, column], G[a, column], G[b, column] = 0.0, -n[b] / size, n[a] / size
+    for r in range(3):
+        G[r, column + 2] = n[r]
+    G[0, column + 1] = n[1] * G[2, column] - n[2] * G[1, column]
+    G[1, column + 1] = n[2] * G[0, column] - n[0] * G[2, column]
+    G[2, column + 1] = n[0] * G[1, column] - n[1] * G[0, column]
+    x, y, z = (p[0] - center[0]) / length, (p[1] - center[1]) / length, (p[2] - center[2]) / length
+    for k in range(column, column + 3):
+        G[3, k] = y * G[2, k] - z * G[1, k]
+        G[4, k] = z * G[0, k] - x * G[2, k]
+        G[5, k] = x * G[1, k] - y * G[0, k]

@@ -1,0 +1,84 @@
+"""Complete a grasp that is returned: exact epsilon, squeeze with a reserve, a path that is proven free."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from clench.base.errors import MotionError
+from clench.base.pose import FloatArray, Pose
+from clench.execution.trajectory import plan_trajectory
+from clench.grasp.mechanics.steadiness import epsilon
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.controller import solve
+from clench.solve.holding import hold
+from clench.solve.solution import GraspSolution
+from clench.solve.squeezing import SqueezePlan, plan_squeeze
+
+from .grasp_plan import PlannedGrasp
+from .options import PlanOptions
+from .rejections import Rejection
+from .trials import FRICTION_SHARES, Closer, Trial
+
+
+@dataclass(eq=False)
+class Finisher:
+    """Complete grasps; see `PlannedGrasp`.
+
+    Args:
+        hand, obj, asked: what grasps what, and how. closer: knows the commands.
+    """
+
+    hand: Hand
+    obj: GraspObject
+    asked: PlanOptions
+    closer: Closer
+
+    def finish(self, trial: Trial, rejected: Counter[Rejection]) -> PlannedGrasp | None:
+        """Return the completed grasp; None where something is missing, which is counted."""
+        T_world_palm = Pose.from_matrix(self.obj.pose.matrix @ trial.T_object_palm)
+        command = replace(self.closer.command(trial.arm), hand_pose=T_world_palm)
+        solution = solve(self.hand, self.obj, command)
+        squeeze = self._squeeze(solution)
+        if not squeeze.feasible:
+            rejected[Rejection.NO_SQUEEZE] += 1
+            return None
+        trajectory, pregrasp = None, None
+        if self.asked.path:
+            try:
+                trajectory = plan_trajectory(solution, self.hand, obj=self.obj)
+            except MotionError:
+                rejected[Rejection.NO_WAY] += 1
+                return None
+            row = trajectory.positions[trajectory.pregrasp if trajectory.pregrasp is not None else 0]
+            pregrasp = dict(zip(self.hand.joint_names, row.tolist(), strict=True))
+        held = hold(solution, self.hand, self.obj, friction=self.asked.friction).held
+        friction: FloatArray = held.contacts.friction
+        found = [epsilon(held.with_friction(share * friction)).radius for share in FRICTION_SHARES]
+        solution = replace(solution, squeeze=squeeze.to_dict(), pregrasp=pregrasp)
+        return PlannedGrasp(
+            solution=solution,
+            command=command,
+            preshape=self.closer.shapes[trial.arm.shape].name,
+            kind=trial.kind,
+            epsilon=found[-1],
+            score=float(np.mean(found)),
+            squeeze=squeeze,
+            trajectory=trajectory,
+            number=trial.number,
+        )
+
+    def _squeeze(self, solution: GraspSolution) -> SqueezePlan:
+        asked = self.asked
+        return plan_squeeze(
+            solution,
+            self.hand,
+            self.obj,
+            mass=asked.mass,
+            gravity=asked.gravity,
+            disturbances=asked.task_wrenches,
+            friction=asked.friction,
+        )

@@ -1,0 +1,124 @@
+"""What planning gives: grasps with everything that is needed to use them, and what became of all proposals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from clench.base.pose import Pose
+from clench.execution.trajectory import Trajectory
+from clench.models.command import GraspCommand
+from clench.solve.solution import GraspSolution
+from clench.solve.squeezing import SqueezePlan
+
+from .options import GraspKind, PlanOptions
+from .rejections import HELP, Rejection
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedGrasp:
+    """A grasp that was planned: everything that is needed to use it.
+
+    Args:
+        solution: the certified answer with its pregrasp and squeeze; `solution.hand_pose` is where the palm goes.
+        command: solves to the same answer. preshape: name of the preshape. kind: see `GraspKind`.
+        epsilon: Ferrari–Canny ball at the lowest friction [N per N of normal force].
+        score: mean of epsilon at the lowest friction and at half of it; grasps are sorted by it.
+        squeeze: forces, torques and offsets that hold the object.
+        trajectory: the proven path from the open hand to the touch; None when it was not asked for.
+        number: of the proposal that it came from.
+    """
+
+    solution: GraspSolution
+    command: GraspCommand
+    preshape: str
+    kind: GraspKind
+    epsilon: float
+    score: float
+    squeeze: SqueezePlan
+    trajectory: Trajectory | None
+    number: int
+
+    @property
+    def hand_pose(self) -> Pose:
+        """Where the palm goes, `T_world_palm`."""
+        return self.solution.hand_pose
+
+    @property
+    def joint_angles(self) -> Mapping[str, float]:
+        """Angles of all joints at the touch [rad], by name."""
+        return self.solution.joint_angles
+
+    def __repr__(self) -> str:
+        position = ", ".join(f"{x:.3f}" for x in self.hand_pose.position)
+        return f"PlannedGrasp({self.kind}, '{self.preshape}', palm at [{position}] m, epsilon {self.epsilon:.3g})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form: the solution's document besides what the plan knows of it."""
+        return {
+            "preshape": self.preshape,
+            "kind": self.kind.value,
+            "epsilon": self.epsilon,
+            "score": self.score,
+            "proposal": self.number,
+            "solution": self.solution.to_dict(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class GraspPlan:
+    """Grasps of an object, the best ones first, and what became of all proposals.
+
+    Args:
+        grasps: see `PlannedGrasp`. asked: the options.
+        proposed: how many wrist poses were proposed. closed: at how many the hand was closed.
+        force_closed: how many of these resist every wrench, by the bound of epsilon.
+        rejected: how many proposals fell for each reason, by its name.
+        times: seconds by stage.
+    """
+
+    grasps: tuple[PlannedGrasp, ...]
+    asked: PlanOptions
+    proposed: int
+    closed: int
+    force_closed: int
+    rejected: dict[str, int]
+    times: dict[str, float]
+
+    def __len__(self) -> int:
+        return len(self.grasps)
+
+    def __iter__(self) -> Iterator[PlannedGrasp]:
+        return iter(self.grasps)
+
+    def __getitem__(self, number: int) -> PlannedGrasp:
+        return self.grasps[number]
+
+    @property
+    def text(self) -> str:
+        """One or two sentences: what was found, and why not more."""
+        found = f"{len(self)} of {self.asked.count} grasps from {self.proposed} proposals"
+        if len(self) >= self.asked.count:
+            return f"Found {found}."
+        counted = {k: n for k, n in self.rejected.items() if n}
+        if not counted:
+            return f"Found {found}. No zone of the hand spans two opposing places of the object."
+        reason, number = max(counted.items(), key=lambda item: item[1])
+        return f"Found {found}. Most proposals fell for '{reason}' ({number}). {HELP[Rejection(reason)]}"
+
+    def __repr__(self) -> str:
+        return f"GraspPlan({self.text!r})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form, schema `clench.plan/1`."""
+        return {
+            "schema": "clench.plan/1",
+            "text": self.text,
+            "proposed": self.proposed,
+            "closed": self.closed,
+            "force_closed": self.force_closed,
+            "rejected": dict(self.rejected),
+            "seconds": dict(self.times),
+            "grasps": [grasp.to_dict() for grasp in self.grasps],
+        }

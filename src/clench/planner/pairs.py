@@ -1,0 +1,106 @@
+"""Pairs of places on an object that oppose each other (docs/method.md section 10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from clench.base.errors import ObjectError
+from clench.base.pose import FloatArray
+from clench.grasp.scene import PackedObject
+from clench.models.objects.grasp_object import BodyRole, GraspObject
+
+from .regions import Region
+
+#: Places on the surface that are drawn, and pairs that are kept.
+_PLACES = 700
+_PAIRS = 6000
+#: Normals lean from the line between two places by at most this part of the friction angle; the second holds where
+#: the first gives too few pairs [-].
+_LEAN = (0.75, 1.25, 2.0)
+_ENOUGH = 40
+#: Pairs are farther apart than this [m].
+_NEAREST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of places on an object, each in both senses, in the object's frame, narrow ones first.
+
+    Args:
+        middle: between both [m], shape (P, 3). way: unit vector from the first to the second, shape (P, 3).
+        width: their distance [m], shape (P,). normal: the mean of the outward normals, not unit, shape (P, 3).
+    """
+
+    middle: FloatArray
+    way: FloatArray
+    width: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.width)
+
+
+def opposing_pairs(
+    obj: GraspObject, packed: PackedObject, friction: float, widest: float, touch: Region | None, avoid: Region | None
+) -> Pairs:
+    """Return pairs of places whose outward normals oppose each other within the friction cones.
+
+    Args:
+        obj, packed: the object. friction: [-]. widest: pairs farther apart are left out [m].
+        touch, avoid: both places lie in the one and neither in the other, if given.
+
+    Raises:
+        ObjectError: no graspable surface, or none in the regions.
+    """
+    points, normals = draw_surface(obj, packed, np.random.default_rng(0), _PLACES)
+    usable = np.ones(len(points), dtype=np.bool_)
+    if touch is not None:
+        usable &= touch.contains(points)
+    if avoid is not None:
+        usable &= ~avoid.contains(points)
+    points, normals = points[usable], normals[usable]
+    if len(points) < 2:
+        raise ObjectError(f"object '{obj.name}': expected surface to touch in the regions, found next to none.")
+    between = points[None] - points[:, None]
+    width = np.linalg.norm(between, axis=2)
+    way = between / np.maximum(width, 1e-9)[..., None]
+    opposed = np.minimum(-np.einsum("abk,ak->ab", way, normals), np.einsum("abk,bk->ab", way, normals))
+    fits = (width > _NEAREST) & (width < widest)
+    for lean in _LEAN:
+        first, second = np.nonzero(fits & (opposed > np.cos(min(lean * np.arctan(friction), 1.3))))
+        if len(first) >= _ENOUGH:
+            break
+    if len(first) > _PAIRS:
+        some = np.sort(np.random.default_rng(1).choice(len(first), _PAIRS, replace=False))
+        first, second = first[some], second[some]
+    order = np.argsort(width[first, second], kind="stable")
+    first, second = first[order], second[order]
+    return Pairs(0.5 * (points[first] + points[second]), way[first, second], width[first, second])
+
+
+def draw_surface(
+    obj: GraspObject, packed: PackedObject, rng: np.random.Generator, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return places on the graspable surface drawn by area [m], and the outward unit normals there, (N, 3) each.
+
+    Raises:
+        ObjectError: no graspable surface.
+    """
+    tree = packed.full_tree
+    graspable = np.array([role is BodyRole.GRASPABLE for role in packed.body_roles])[tree.body]
+    triangles = np.flatnonzero(graspable)
+    a, b, c = tree.vertices[tree.triangles[triangles]].transpose(1, 0, 2)
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1) * tree.normals[triangles].any(axis=1)
+    if not areas.sum() > 0.0:
+        raise ObjectError(f"object '{obj.name}': expected a graspable body with a surface, found none.")
+    # One draw per equal share of the area: the places are spread more evenly than independent draws.
+    shares = (np.arange(count) + rng.random(count)) / count
+    chosen = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), shares, side="right"), len(triangles) - 1)
+    root, other = np.sqrt(rng.random(count)), rng.random(count)
+    points = (
+        (1.0 - root)[:, None] * a[chosen]
+        + (root * (1.0 - other))[:, None] * b[chosen]
+        + (root * other)[:, None] * c[chosen]
+    )
+    return points, tree.normals[triangles[chosen]]

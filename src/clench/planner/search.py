@@ -1,0 +1,189 @@
+"""Search for grasps in rounds: propose, bring up, close, keep the best, finish what is returned (method section 10)."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from clench.base.errors import CommandError
+from clench.base.pose import FloatArray
+from clench.grasp.closing import core_count
+from clench.grasp.scene import pack_object
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solve.preshapes import Preshape, opposition_zones
+
+from .approach_check import Approach
+from .finishing import Finisher
+from .grasp_plan import GraspPlan, PlannedGrasp
+from .options import PlanOptions, is_reached
+from .pairs import opposing_pairs
+from .proposals import Arm, Proposals, Proposer
+from .rejections import Rejection
+from .trials import Closer, Trial
+
+#: Proposals of the first round, and of a round at most; every round has twice as many as the one before.
+FIRST_ROUND = 64
+LARGEST_ROUND = 256
+
+
+@dataclass(eq=False)
+class GraspSearch:
+    """A search for grasps: iterate over it to get them as they are found, or ask for its `plan`.
+
+    Args:
+        hand: the hand. obj: the object, with obstacles as other bodies. asked: the options.
+
+    Raises:
+        ClenchError: see `clench.plan_grasps`.
+    """
+
+    hand: Hand
+    obj: GraspObject
+    asked: PlanOptions
+    rejected: Counter[Rejection] = field(default_factory=Counter)
+    proposed: int = 0
+    closed: int = 0
+    force_closed: int = 0
+    times: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    def __post_init__(self) -> None:
+        """Find the zones of the hand and the pairs of the object, or say that there are none."""
+        began = time.perf_counter()
+        self.threads = self.asked.threads or core_count()
+        packed = pack_object(self.obj)
+        self.shapes, self.arms = _ways(self.hand, self.asked)
+        widest = max((float(s.aperture.max(initial=0.0)) for s in self.shapes), default=0.0)
+        friction = self.asked.lowest_friction or 0.6
+        pairs = opposing_pairs(self.obj, packed, friction, widest, self.asked.touch, self.asked.avoid)
+        self._proposer = Proposer(self.arms, self.shapes, pairs)
+        self._approach = Approach(self.hand, _postures(self.hand, self.shapes), packed)
+        self._closer = Closer(self.hand, self.obj, self.asked, self.arms, self.shapes, self.threads)
+        self._finisher = Finisher(self.hand, self.obj, self.asked, self._closer)
+        self._waiting: list[Trial] = []
+        self.found: list[PlannedGrasp] = []
+        self._places: list[FloatArray] = []
+        self.times["preparing"] += time.perf_counter() - began
+        self._began = began
+
+    def __iter__(self) -> Iterator[PlannedGrasp]:
+        """Yield grasps as they are found, at most as many as are wanted."""
+        size, rng_number = FIRST_ROUND, 0
+        while len(self.found) < self.asked.count and not self._is_over() and not self._proposer.is_hopeless:
+            rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((self.asked.seed, rng_number))))
+            self._round(rng, min(size, self.asked.proposals - self.proposed))
+            size, rng_number = min(2 * size, LARGEST_ROUND), rng_number + 1
+            # The best one of so many proposals is returned, so that it is among the best of all.
+            due = -(-self.proposed // self.asked.effort) if self.proposed < self.asked.proposals else self.asked.count
+            yield from self._finish(min(due, self.asked.count))
+        yield from self._finish(self.asked.count)
+
+    def plan(self) -> GraspPlan:
+        """Return what was found so far, the best grasps first."""
+        return GraspPlan(
+            grasps=tuple(sorted(self.found, key=lambda grasp: (-grasp.score, grasp.number))),
+            asked=self.asked,
+            proposed=self.proposed,
+            closed=self.closed,
+            force_closed=self.force_closed,
+            rejected={reason.value: self.rejected[reason] for reason in Rejection},
+            times=dict(self.times),
+        )
+
+    def _is_over(self) -> bool:
+        late = self.asked.seconds is not None and time.perf_counter() - self._began > self.asked.seconds
+        return late or self.proposed >= self.asked.proposals
+
+    def _round(self, rng: np.random.Generator, count: int) -> None:
+        """Propose, bring up and close; good ones wait."""
+        marks = [time.perf_counter()]
+        proposals = self._allowed(self._proposer.draw(rng, count))
+        first, self.proposed = self.proposed, self.proposed + count
+        marks.append(time.perf_counter())
+        came = self._approach.bring_up(proposals, self.arms, self.threads)
+        self.rejected[Rejection.STOPPED] += came.stopped
+        self.rejected[Rejection.OBSTACLE] += came.obstacle
+        arrived = self._reached(came.proposals)
+        marks.append(time.perf_counter())
+        trials, scores = self._closer.close(arrived, first, self.rejected)
+        marks.append(time.perf_counter())
+        self.closed += len(arrived)
+        self.force_closed += len(trials)
+        self._proposer.learn(arrived, scores)
+        self._waiting += trials
+        self._waiting.sort(key=lambda trial: (-trial.score, trial.number))
+        for key, (begin, end) in zip(("proposing", "approaching", "closing"), pairwise(marks), strict=True):
+            self.times[key] += end - begin
+
+    def _allowed(self, proposals: Proposals) -> Proposals:
+        """Leave out what comes from another direction than is asked for."""
+        if self.asked.approach is None:
+            return proposals
+        way = np.asarray(self.asked.approach, dtype=np.float64)
+        along = (self.obj.pose.rotation @ proposals.T_object_palm[:, :3, :3]) @ self.hand.palm_normal
+        fits = along @ way / np.linalg.norm(way) >= np.cos(self.asked.approach_angle)
+        self.rejected[Rejection.DIRECTION] += int((~fits).sum())
+        return proposals.taken(fits)
+
+    def _reached(self, proposals: Proposals) -> Proposals:
+        if self.asked.reachable is None or not len(proposals):
+            return proposals
+        reached = is_reached(self.asked.reachable, self.obj.pose.matrix @ proposals.T_object_palm)
+        self.rejected[Rejection.UNREACHABLE] += int((~reached).sum())
+        return proposals.taken(reached)
+
+    def _finish(self, due: int) -> Iterator[PlannedGrasp]:
+        """Yield the best of those that wait, completed, until so many were found in all."""
+        while len(self.found) < due and self._waiting:
+            began = time.perf_counter()
+            trial = self._waiting.pop(0)
+            grasp = None
+            if any(_distance(trial.links, other) < self.asked.apart for other in self._places):
+                self.rejected[Rejection.ALIKE] += 1
+            else:
+                grasp = self._finisher.finish(trial, self.rejected)
+            self.times["finishing"] += time.perf_counter() - began
+            if grasp is not None:
+                self.found.append(grasp)
+                self._places.append(trial.links)
+                yield grasp
+
+
+def _distance(one: FloatArray, other: FloatArray) -> float:
+    """Return the root mean square over all links of how far apart they are in two grasps [m]."""
+    return float(np.sqrt(((one - other) ** 2).sum(axis=1).mean()))
+
+
+def _ways(hand: Hand, asked: PlanOptions) -> tuple[tuple[Preshape, ...], tuple[Arm, ...]]:
+    """Return the preshapes and the ways of proposing.
+
+    Raises:
+        CommandError: no two sides of the hand ever face each other.
+    """
+    shapes, arms = list[Preshape](), list[Arm]()
+    for fingers in asked.sets_of_fingers(hand):
+        for shape in opposition_zones(hand, fingers):
+            arms += [Arm(len(shapes), fingers, deep) for deep in asked.depths()]
+            shapes.append(shape)
+    if not any(len(shape.aperture) for shape in shapes):
+        raise CommandError(
+            f"hand '{hand.name}': no two of its fingers ever close towards each other; planning needs two sides that "
+            f"oppose. 'clench hand' shows what was understood of it."
+        )
+    return tuple(shapes), tuple(arms)
+
+
+def _postures(hand: Hand, shapes: tuple[Preshape, ...]) -> FloatArray:
+    """Return the open posture at every preshape, shape (K, J) [rad]."""
+    rows = []
+    for shape in shapes:
+        q = np.array([j.open_value for j in hand.joints])
+        for name, angle in shape.angles.items():
+            q[hand.joint_index(name)] = angle
+        rows.append(hand.coupled(q))
+    return np.array(rows)

@@ -1,0 +1,205 @@
+"""Close the hand at proposals, and tell what came of each of them (docs/method.md section 10)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.base.pose import FloatArray, Pose, quaternions_from_rotations
+from clench.grasp.mechanics.batch_bounds import epsilon_bounds
+from clench.grasp.mechanics.contacts import pair_friction
+from clench.models.command import GraspCommand
+from clench.models.hand.forward import poses_at
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.objects.mass import mass_properties
+from clench.solve.batch_solver import BatchSolver
+from clench.solve.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
+from clench.solve.preshapes import Preshape
+from clench.solve.solution import FingerStatus, SolutionStatus
+
+from .options import GraspKind, PlanOptions
+from .proposals import Arm, Proposals
+from .rejections import Rejection
+
+#: The score is a mean of bounds at these shares of the lowest friction, so that a margin in it counts [-].
+FRICTION_SHARES = (0.5, 1.0)
+_BLOCKED = STATUSES.index(SolutionStatus.BLOCKED)
+#: What may be a grasp: of a hand without a thumb, some fingers may do.
+_HOLDS = [STATUSES.index(SolutionStatus.GRASP), STATUSES.index(SolutionStatus.PARTIAL)]
+_LIMIT = FINGER_STATUSES.index(FingerStatus.LIMIT)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A closed proposal that may be a grasp.
+
+    Args:
+        number: of the proposal, from 0. arm: its arm. T_object_palm: where the palm is, shape (4, 4).
+        q: posture at the touch [rad], shape (J,). score: mean of bounds of epsilon, see `FRICTION_SHARES`.
+        bound: lower bound of epsilon at the lowest friction. kind: of the grasp.
+        links: places of the links in the object's frame [m], shape (L, 3).
+    """
+
+    number: int
+    arm: Arm
+    T_object_palm: FloatArray
+    q: FloatArray
+    score: float
+    bound: float
+    kind: GraspKind
+    links: FloatArray
+
+
+@dataclass(eq=False)
+class Closer:
+    """Close the hand at proposals; hand and object are planned once per preshape.
+
+    Args:
+        hand, obj: what grasps what. asked: the options. arms, shapes: of the proposals. threads: how many are used.
+    """
+
+    hand: Hand
+    obj: GraspObject
+    asked: PlanOptions
+    arms: tuple[Arm, ...]
+    shapes: tuple[Preshape, ...]
+    threads: int
+    solvers: dict[int, BatchSolver] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Look up what every grasp needs."""
+        mass = mass_properties(self.obj)
+        self._center, self._length = mass.center, mass.length
+        lowest = self.asked.lowest_friction
+        links = range(len(self.hand.links))
+        self._friction = np.array(
+            [[lowest or pair_friction(self.hand, link, body) for body in self.obj.bodies] for link in links]
+        )
+        self._graspable = np.array([body.role is BodyRole.GRASPABLE for body in self.obj.bodies])
+        self._tips = np.array([finger.tip_link for finger in self.hand.fingers])
+        self._solid = [*self.hand.solid_links]
+
+    def command(self, arm: Arm) -> GraspCommand:
+        """Return what an arm asks for, at no pose in particular."""
+        names = tuple(f.name for f in self.hand.fingers)
+        fingers = None if arm.fingers == names else arm.fingers
+        # One plane, as none is closed: the full width has the answer.
+        angles = self.shapes[arm.shape].angles
+        return GraspCommand(hand_pose=Pose.identity(), preshape=angles, fingers=fingers, planes=1)
+
+    def close(self, proposals: Proposals, first: int, rejected: Counter[Rejection]) -> tuple[list[Trial], FloatArray]:
+        """Close at proposals; return those that may be grasps, and a score of every proposal, 0 for no use, (N,).
+
+        Args:
+            proposals: the proposals. first: number of the first of them. rejected: counts of reasons, which is changed.
+        """
+        trials: list[Trial] = []
+        scores = np.zeros(len(proposals))
+        for a in np.unique(proposals.arm).tolist():
+            rows = np.flatnonzero(proposals.arm == a)
+            batch = self.solve(self.arms[a], proposals.T_object_palm[rows])
+            found = self._tried(batch, self.arms[a], proposals.T_object_palm[rows], first + rows, rejected)
+            for trial in found:
+                scores[trial.number - first] = trial.score
+            trials += found
+        trials.sort(key=lambda trial: trial.number)
+        return trials, scores
+
+    def solve(self, arm: Arm, T_object_palm: FloatArray) -> GraspBatch:
+        """Return the answers of one arm at places of the palm, shape (N, 4, 4)."""
+        number = self.arms.index(arm)
+        if number not in self.solvers:
+            self.solvers[number] = BatchSolver(self.hand, self.obj, self.command(arm))
+        T = self.obj.pose.matrix @ T_object_palm
+        rows = np.concatenate([quaternions_from_rotations(T[:, :3, :3]), T[:, :3, 3]], axis=1)
+        return self.solvers[number].solve(rows, None, self.threads)
+
+    def bounds(self, batch: GraspBatch) -> tuple[FloatArray, FloatArray]:
+        """Return score and bound of every answer [N/N], shape (N,) each; 0 for anything but a grasp."""
+        contacts = batch.contacts
+        counts = np.diff(contacts.first)
+        owner = np.repeat(np.arange(len(batch)), counts)
+        keep = ~contacts.passed & self._graspable[contacts.body] & np.isin(batch.status_codes, _HOLDS)[owner]
+        first = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(batch)))])
+        mu = self._friction[contacts.link[keep], contacts.body[keep]]
+        centers = np.array([Pose(row[4:], row[:4]).apply(self._center) for row in batch.object_poses]).reshape(-1, 3)
+        found = [
+            epsilon_bounds(first, contacts.position[keep], contacts.normal[keep], share * mu, centers, self._length)
+            for share in FRICTION_SHARES
+        ]
+        return np.mean(found, axis=0), found[-1]
+
+    def _tried(
+        self, batch: GraspBatch, arm: Arm, T: FloatArray, numbers: NDArray[np.intp], rejected: Counter[Rejection]
+    ) -> list[Trial]:
+        score, bound = self.bounds(batch)
+        kinds, touching = self._kinds(batch)
+        wanted = set(self.asked.kinds) if self.asked.kinds is not None else set(GraspKind)
+        thumbs = [k for k, f in enumerate(batch.finger_names) if self.hand.finger(f).is_thumb]
+        at_limit = (batch.finger_codes[:, thumbs] == _LIMIT).any(axis=1)
+        in_region, holds = self._in_regions(batch), np.isin(batch.status_codes, _HOLDS)
+        checks = (
+            (batch.status_codes == _BLOCKED, Rejection.OVERLAPS),
+            (~holds & at_limit, Rejection.THUMB_LIMIT),
+            (~holds | (touching < self.asked.min_fingers), Rejection.NO_GRASP),
+            (~batch.certified, Rejection.NOT_CERTIFIED),
+            (np.array([kind not in wanted for kind in kinds], dtype=np.bool_), Rejection.OTHER_KIND),
+            (~in_region, Rejection.REGION),
+            (bound <= 0.0, Rejection.NO_CLOSURE),
+        )
+        left = np.ones(len(batch), dtype=np.bool_)
+        for falls, reason in checks:
+            rejected[reason] += int((left & falls).sum())
+            left &= ~falls
+        rows = np.flatnonzero(left)
+        places = self._places(batch.joint_angles[rows], T[rows])
+        return [
+            Trial(int(numbers[n]), arm, T[n], batch.joint_angles[n], float(score[n]), float(bound[n]), kinds[n], links)
+            for n, links in zip(rows.tolist(), places, strict=True)
+        ]
+
+    def _kinds(self, batch: GraspBatch) -> tuple[list[GraspKind], NDArray[np.int64]]:
+        """Return the kind of every answer, and how many fingers touch the object."""
+        contacts = batch.contacts
+        owner = np.repeat(np.arange(len(batch)), np.diff(contacts.first))
+        keep = ~contacts.passed & self._graspable[contacts.body]
+        names = [f.name for f in self.hand.fingers]
+        finger = np.array([names.index(name) for name in batch.finger_names], dtype=np.int64)
+        touched = np.zeros((len(batch), len(batch.finger_names)), dtype=np.bool_)
+        touched[owner[keep], contacts.finger[keep]] = True
+        other = np.zeros(len(batch), dtype=np.bool_)
+        off_tip = keep & (contacts.link != self._tips[finger[contacts.finger]])
+        other[owner[off_tip]] = True
+        count = touched.sum(axis=1)
+        few = {0: GraspKind.PINCH, 1: GraspKind.PINCH, 2: GraspKind.PINCH, 3: GraspKind.TRIPOD}
+        kinds = [
+            GraspKind.POWER if power else few.get(n, GraspKind.PRECISION)
+            for power, n in zip(other.tolist(), count.tolist(), strict=True)
+        ]
+        return kinds, count
+
+    def _in_regions(self, batch: GraspBatch) -> NDArray[np.bool_]:
+        inside = np.ones(len(batch), dtype=np.bool_)
+        contacts = batch.contacts
+        if self.asked.touch is None and self.asked.avoid is None:
+            return inside
+        owner = np.repeat(np.arange(len(batch)), np.diff(contacts.first))
+        points = self.obj.pose.inverse().apply(contacts.position) if len(contacts) else np.empty((0, 3))
+        wrong = np.zeros(len(contacts), dtype=np.bool_)
+        if self.asked.touch is not None:
+            wrong |= ~self.asked.touch.contains(points)
+        if self.asked.avoid is not None:
+            wrong |= self.asked.avoid.contains(points)
+        inside[owner[wrong & self._graspable[contacts.body]]] = False
+        return inside
+
+    def _places(self, q: FloatArray, T_object_palm: FloatArray) -> FloatArray:
+        """Return the places of the links that can touch, in the object's frame [m], shape (N, L, 3)."""
+        if not len(q):
+            return np.empty((0, len(self._solid), 3))
+        placed: FloatArray = (T_object_palm[:, None] @ poses_at(self.hand, q)[:, self._solid])[..., :3, 3]
+        return placed
