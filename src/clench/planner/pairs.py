@@ -22,6 +22,8 @@ _LEAN = (0.75, 1.25, 2.0)
 _ENOUGH = 40
 #: Pairs are farther apart than this [m].
 _NEAREST = 1e-3
+#: How far around a place the object's extent is looked at [m].
+_AROUND = 0.06
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +32,16 @@ class Pairs:
 
     Args:
         middle: between both [m], shape (P, 3). way: unit vector from the first to the second, shape (P, 3).
-        width: their distance [m], shape (P,). normal: the mean of the outward normals, not unit, shape (P, 3).
+        width: their distance [m], shape (P,).
+        along: unit vector across `way` in which the object extends most around both places, shape (P, 3).
+        longer: how much more it extends there than across, 0 to 1, shape (P,).
     """
 
     middle: FloatArray
     way: FloatArray
     width: FloatArray
+    along: FloatArray
+    longer: FloatArray
 
     def __len__(self) -> int:
         return len(self.width)
@@ -76,7 +82,26 @@ def opposing_pairs(
         first, second = first[some], second[some]
     order = np.argsort(width[first, second], kind="stable")
     first, second = first[order], second[order]
-    return Pairs(0.5 * (points[first] + points[second]), way[first, second], width[first, second])
+    spread = _spread(points)
+    way = way[first, second]
+    along, longer = _extent(spread[first] + spread[second], way)
+    return Pairs(0.5 * (points[first] + points[second]), way, width[first, second], along, longer)
+
+
+def _spread(points: FloatArray) -> FloatArray:
+    """Return the second moments of the points around each point, no farther than `_AROUND`, shape (N, 3, 3)."""
+    between = points[None] - points[:, None]
+    near = np.einsum("abk,abk->ab", between, between) < _AROUND**2
+    moments: FloatArray = np.einsum("ab,abi,abj->aij", near.astype(np.float64), between, between, optimize=True)
+    return moments
+
+
+def _extent(moments: FloatArray, way: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the direction across a way of the largest moment, (P, 3), and how much larger it is, 0 to 1, (P,)."""
+    across = np.eye(3) - way[:, :, None] * way[:, None, :]
+    values, vectors = np.linalg.eigh(across @ moments @ across)
+    # The smallest moment is that along the way, which is 0.
+    return vectors[:, :, 2], 1.0 - np.sqrt(np.maximum(values[:, 1], 0.0) / np.maximum(values[:, 2], 1e-18))
 
 
 def draw_surface(

@@ -17,11 +17,16 @@ _ROOM = 0.01
 #: Pairs that are looked at for every proposal, and how far a zone's aperture may miss [m].
 _LOOKS = 12
 _MISS = 0.012
+#: How much good opposition counts against a miss of the aperture [-].
+_OPPOSED = 6.0
 #: Share of the proposals that vary a good one, once there are so many good ones [-].
-VARIED = 0.5
-_ENOUGH_GOOD = 6
+VARIED = 0.7
+_ENOUGH_GOOD = 3
 #: Standard deviations of a variation: turn [rad] and shift [m].
-_TURN, _SHIFT = 0.25, 0.008
+_TURN, _SHIFT = 0.15, 0.005
+#: Rows of pads longer than this [m] are laid along what is long, as often as it is longer than wide times this [-],
+#: and askew by this [rad].
+_ROW, _ALIGNED, _ASKEW = 0.01, 1.2, 0.25
 #: How far past its place a hand of a deep arm may go [m].
 DEEP = 0.06
 #: Shares of the proposals go to arms by the power of their success [-].
@@ -125,25 +130,41 @@ class Proposer:
         arm = np.sort(rng.choice(len(self.arms), count, p=success / success.sum()))
         looks = rng.integers(len(self.pairs), size=(count, _LOOKS))
         room, noise = rng.uniform(0.0, _ROOM, (count, _LOOKS)), rng.gumbel(size=(count, _LOOKS))
-        roll, pick = rng.uniform(0.0, 2.0 * np.pi, count), rng.random(count)
-        centers, axes, pair = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, dtype=np.int64)
+        pick = rng.random(count)
+        centers, axes, rows_of = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+        pair = np.empty(count, dtype=np.int64)
         for a in np.unique(arm):
             rows, shape = np.flatnonzero(arm == a), self.shapes[self.arms[a].shape]
             wanted = self.pairs.width[looks[rows]] + room[rows]
             miss = np.abs(wanted[..., None] - shape.aperture)
-            cost = np.maximum(miss - _MISS, 0.0) / 0.002 + miss / _MISS - 3.0 * shape.quality
+            cost = np.maximum(miss - _MISS, 0.0) / 0.002 + miss / _MISS - _OPPOSED * shape.quality
             look = np.argmin(cost.min(axis=2) - 0.3 * noise[rows], axis=1)
             here = cost[np.arange(len(rows)), look]
             # Zones that are about as good as the best one share the proposals.
             near = here < here.min(axis=1, keepdims=True) + 0.5
             zone = np.argmax(np.cumsum(near, axis=1) > (pick[rows] * near.sum(axis=1))[:, None], axis=1)
             centers[rows], axes[rows], pair[rows] = shape.center[zone], shape.axis[zone], looks[rows, look]
+            rows_of[rows] = shape.row[zone]
         way = self.pairs.way[pair]
         T = np.zeros((count, 4, 4))
-        T[:, :3, :3] = turns_about(way, roll) @ frames(way) @ frames(axes).transpose(0, 2, 1)
+        turn = frames(way) @ frames(axes).transpose(0, 2, 1)
+        roll = self._roll(rng, pair, np.einsum("nij,nj->ni", turn, rows_of))
+        T[:, :3, :3] = turns_about(way, roll) @ turn
         T[:, :3, 3] = self.pairs.middle[pair] - np.einsum("nij,nj->ni", T[:, :3, :3], centers)
         T[:, 3, 3] = 1.0
         return Proposals(arm.astype(np.int64), T, centers)
+
+    def _roll(self, rng: np.random.Generator, pair: NDArray[np.int64], row: FloatArray) -> FloatArray:
+        """Return how far hands turn about the ways of pairs, so that rows of pads lie along what is long, (N,) [rad].
+
+        Args:
+            rng: draws. pair: which pairs, (N,). row: of pads, in the object's frame, not turned yet [m], (N, 3).
+        """
+        count, way, along = len(pair), self.pairs.way[pair], self.pairs.along[pair]
+        sine, cosine = (np.cross(row, along) * way).sum(axis=1), (row * along).sum(axis=1)
+        straight = np.arctan2(sine, cosine) + np.pi * rng.integers(2, size=count) + _ASKEW * rng.normal(size=count)
+        aligned = (rng.random(count) < _ALIGNED * self.pairs.longer[pair]) & (np.linalg.norm(row, axis=1) > _ROW)
+        return np.where(aligned, straight, rng.uniform(0.0, 2.0 * np.pi, count))
 
     def _varied(self, rng: np.random.Generator, count: int) -> Proposals:
         # The better one of two good ones: better ones are varied more often.

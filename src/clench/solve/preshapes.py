@@ -53,6 +53,7 @@ class Preshape:
         angles: what it sets, by joint name [rad]: posture joints and open values of closing joints.
         center, axis: of its zones in the palm frame, shapes (Z, 3): the middle [m], and the unit vector from the one
             side (thumb) to the other.
+        row: from the first to the last pad of the other side, across the axis [m], shape (Z, 3).
         aperture: distance of the pads [m], shape (Z,). quality: how well they oppose, -1 to 1, shape (Z,).
     """
 
@@ -60,6 +61,7 @@ class Preshape:
     angles: dict[str, float]
     center: FloatArray
     axis: FloatArray
+    row: FloatArray
     aperture: FloatArray
     quality: FloatArray
 
@@ -176,8 +178,8 @@ def _move(hand: Hand, pads: Sequence[Pad], postures: FloatArray) -> _Pads:
     return _Pads(points, normals, moved / np.where(size > 1e-9, size, 1.0))
 
 
-def _zones(pads: _Pads, one: int, others: list[int]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return centres, axes, apertures and qualities of the zones of two sides, at all pairs of shares."""
+def _zones(pads: _Pads, one: int, others: list[int]) -> tuple[FloatArray, ...]:
+    """Return centres, axes, rows, apertures and qualities of the zones of two sides, at all pairs of shares."""
     group = pads.point[:, others].mean(axis=1)
     between = group[None] - pads.point[:, one][:, None]
     aperture = np.linalg.norm(between, axis=2)
@@ -190,16 +192,19 @@ def _zones(pads: _Pads, one: int, others: list[int]) -> tuple[FloatArray, FloatA
         np.einsum("abk,ak->ab", axis, pads.moving[:, one]),
         -np.einsum("abk,bok->abo", axis, pads.moving[:, others]).mean(axis=2),
     )
-    quality = (0.5 * (facing + closing)).ravel()
+    quality = (0.75 * facing + 0.25 * closing).ravel()
     center = (0.5 * (group[None] + pads.point[:, one][:, None])).reshape(-1, 3)
     well = (quality > WELL) & (aperture.ravel() < APERTURES[-1])
-    return center[well], axis.reshape(-1, 3)[well], aperture.ravel()[well], quality[well]
+    row = np.broadcast_to(pads.point[:, others[-1]] - pads.point[:, others[0]], between.shape)
+    row = row - np.einsum("abk,abk->ab", row, axis)[..., None] * axis
+    columns = center, axis.reshape(-1, 3), row.reshape(-1, 3), aperture.ravel(), quality
+    return tuple(column[well] for column in columns)
 
 
 def _named(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray, ...]]) -> Iterator[Preshape]:
     """Yield the open hand and the best candidates of every aperture, without those that close without a certificate."""
     best = np.full((len(candidates), len(APERTURES) - 1), -np.inf)
-    for number, (_, _, _, aperture, quality) in enumerate(candidates):
+    for number, (*_, aperture, quality) in enumerate(candidates):
         if len(aperture):
             np.maximum.at(best[number], np.searchsorted(APERTURES, aperture, side="right") - 1, quality)
     chosen, refused = [0], set[int]()

@@ -14,8 +14,8 @@ from .link_mesh import LinkMesh, link_meshes
 
 #: Triangles whose normal is within this cosine of the closing direction belong to the pad [-].
 _FACING = 0.5
-#: The pad lies as high as this share of its surface reaches along the closing direction [-].
-_HIGH = 0.9
+#: Places of that surface that are looked at; one in so many is nearest to its middle.
+_PLACES, _MIDDLE = 600, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,17 +62,29 @@ def _pad(hand: Hand, number: int, finger: Finger, mesh: LinkMesh) -> Pad | None:
     towards = _closing_direction(hand, finger, mesh)
     if towards is None:
         return None
+    points, normals = _facing_surface(mesh, towards)
+    if not len(points):
+        return None
+    across = points - np.outer(points @ towards, towards)
+    away = np.linalg.norm(across - across.mean(axis=0), axis=1)
+    near = np.argsort(away, kind="stable")[: max(len(points) // _MIDDLE, 1)]
+    normal = normals[near].mean(axis=0)
+    return Pad(number, finger.tip_link, points[near].mean(axis=0), normal / np.linalg.norm(normal))
+
+
+def _facing_surface(mesh: LinkMesh, towards: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return places of the surface that faces a direction, by area as seen from there, with normals, (N, 3) each."""
+    facing = mesh.tree.normals @ towards
     corners = mesh.tree.vertices[mesh.tree.triangles]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    facing = mesh.tree.normals @ towards
-    weight = areas * np.where(facing > _FACING, facing, 0.0)
-    if not weight.sum() > 0.0:
-        return None
-    middles = corners.mean(axis=1)
-    middle, heights = weight @ middles / weight.sum(), middles @ towards
-    order = np.argsort(heights, kind="stable")
-    height = heights[order[np.searchsorted(np.cumsum(weight[order]), _HIGH * weight.sum())]]
-    return Pad(number, finger.tip_link, middle + towards * (height - middle @ towards), towards)
+    weights = np.cumsum(areas * np.where(facing > _FACING, facing, 0.0))
+    if not len(weights) or not weights[-1] > 0.0:
+        return np.empty((0, 3)), np.empty((0, 3))
+    rng = np.random.default_rng(0)
+    chosen = np.searchsorted(weights, weights[-1] * (np.arange(_PLACES) + 0.5) / _PLACES, side="right")
+    root, other = np.sqrt(rng.random(_PLACES)), rng.random(_PLACES)
+    shares = np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
+    return np.einsum("nk,nkx->nx", shares, corners[chosen]), mesh.tree.normals[chosen]
 
 
 def _closing_direction(hand: Hand, finger: Finger, mesh: LinkMesh) -> FloatArray | None:
