@@ -66,6 +66,7 @@ class Finisher:
             kind=trial.kind,
             epsilon=found[-1],
             score=float(np.mean(found)),
+            displaced=None if self.asked.sigma is None else trial.score,
             squeeze=squeeze,
             trajectory=trajectory,
             number=trial.number,

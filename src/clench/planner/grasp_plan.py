@@ -24,7 +24,8 @@ class PlannedGrasp:
         solution: the certified answer with its pregrasp and squeeze; `solution.hand_pose` is where the palm goes.
         command: solves to the same answer. preshape: name of the preshape. kind: see `GraspKind`.
         epsilon: Ferrari–Canny ball at the lowest friction [N per N of normal force].
-        score: mean of epsilon at the lowest friction and at half of it; grasps are sorted by it.
+        score: mean of epsilon at the lowest friction and at half of it; grasps are sorted by it, unless displaced.
+        displaced: mean of the bound of this score over displacements of the object; None without `pose_sigma`.
         squeeze: forces, torques and offsets that hold the object.
         trajectory: the proven path from the open hand to the touch; None when it was not asked for.
         number: of the proposal that it came from.
@@ -36,9 +37,15 @@ class PlannedGrasp:
     kind: GraspKind
     epsilon: float
     score: float
+    displaced: float | None
     squeeze: SqueezePlan
     trajectory: Trajectory | None
     number: int
+
+    @property
+    def rank(self) -> tuple[float, int]:
+        """What plans are sorted by: the better score first, then the earlier proposal."""
+        return -(self.score if self.displaced is None else self.displaced), self.number
 
     @property
     def hand_pose(self) -> Pose:
@@ -61,6 +68,7 @@ class PlannedGrasp:
             "kind": self.kind.value,
             "epsilon": self.epsilon,
             "score": self.score,
+            "displaced": self.displaced,
             "proposal": self.number,
             "solution": self.solution.to_dict(),
         }

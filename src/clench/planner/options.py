@@ -24,7 +24,7 @@ from .regions import Region
 #: Proposals per grasp that is wanted: the best one of so many is returned.
 EFFORT: Final = 40
 #: Two grasps are alike when their links are nearer than this, as a root mean square over all links [m].
-APART: Final = 0.01
+APART: Final = 0.02
 #: Reachability: poses of the palm in the world, (N, 4, 4), to whether each can be reached, (N,).
 Reachable = Callable[[FloatArray], ArrayLike]
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from bisect import insort
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,6 +31,8 @@ from .trials import Closer, Trial
 #: Proposals of the first round, and of a round at most; every round has twice as many as the one before.
 FIRST_ROUND = 64
 LARGEST_ROUND = 256
+#: A grasp is lost when displacements of the object leave less than this part of its score [-].
+LEFT = 0.2
 
 
 @dataclass(eq=False)
@@ -68,6 +71,7 @@ class GraspSearch:
         self._waiting: list[Trial] = []
         self.found: list[PlannedGrasp] = []
         self._places: list[FloatArray] = []
+        self._displaced: set[int] = set()
         self.times["preparing"] += time.perf_counter() - began
         self._began = began
 
@@ -86,7 +90,7 @@ class GraspSearch:
     def plan(self) -> GraspPlan:
         """Return what was found so far, the best grasps first."""
         return GraspPlan(
-            grasps=tuple(sorted(self.found, key=lambda grasp: (-grasp.score, grasp.number))),
+            grasps=tuple(sorted(self.found, key=lambda grasp: grasp.rank)),
             asked=self.asked,
             proposed=self.proposed,
             closed=self.closed,
@@ -116,7 +120,7 @@ class GraspSearch:
         self.force_closed += len(trials)
         self._proposer.learn(arrived, scores)
         self._waiting += trials
-        self._waiting.sort(key=lambda trial: (-trial.score, trial.number))
+        self._waiting.sort(key=_rank)
         for key, (begin, end) in zip(("proposing", "approaching", "closing"), pairwise(marks), strict=True):
             self.times[key] += end - begin
 
@@ -141,9 +145,10 @@ class GraspSearch:
         """Yield the best of those that wait, completed, until so many were found in all."""
         while len(self.found) < due and self._waiting:
             began = time.perf_counter()
-            trial = self._waiting.pop(0)
-            grasp = None
-            if any(_distance(trial.links, other) < self.asked.apart for other in self._places):
+            trial, grasp = self._waiting.pop(0), None
+            if self.asked.sigma is not None and trial.number not in self._displaced:
+                self._displace(trial, self.asked.sigma)
+            elif any(_distance(trial.links, other) < self.asked.apart for other in self._places):
                 self.rejected[Rejection.ALIKE] += 1
             else:
                 grasp = self._finisher.finish(trial, self.rejected)
@@ -152,6 +157,19 @@ class GraspSearch:
                 self.found.append(grasp)
                 self._places.append(trial.links)
                 yield grasp
+
+    def _displace(self, trial: Trial, sigma: tuple[float, float]) -> None:
+        """Score a trial by what is left of it when the object is displaced, and let it wait again."""
+        self._displaced.add(trial.number)
+        score = self._closer.displaced_score(trial, sigma)
+        if score <= LEFT * trial.score:
+            self.rejected[Rejection.NOT_ROBUST] += 1
+        else:
+            insort(self._waiting, replace(trial, score=score), key=_rank)
+
+
+def _rank(trial: Trial) -> tuple[float, int]:
+    return -trial.score, trial.number
 
 
 def _distance(one: FloatArray, other: FloatArray) -> float:

@@ -22,11 +22,13 @@ from clench.solve.preshapes import Preshape
 from clench.solve.solution import FingerStatus, SolutionStatus
 
 from .options import GraspKind, PlanOptions
-from .proposals import Arm, Proposals
+from .proposals import Arm, Proposals, vary
 from .rejections import Rejection
 
 #: The score is a mean of bounds at these shares of the lowest friction, so that a margin in it counts [-].
 FRICTION_SHARES = (0.5, 1.0)
+#: Displacements of the object for which a grasp is closed again.
+DISPLACEMENTS = 16
 _BLOCKED = STATUSES.index(SolutionStatus.BLOCKED)
 #: What may be a grasp: of a hand without a thumb, some fingers may do.
 _HOLDS = [STATUSES.index(SolutionStatus.GRASP), STATUSES.index(SolutionStatus.PARTIAL)]
@@ -117,6 +119,20 @@ class Closer:
         T = self.obj.pose.matrix @ T_object_palm
         rows = np.concatenate([quaternions_from_rotations(T[:, :3, :3]), T[:, :3, 3]], axis=1)
         return self.solvers[number].solve(rows, None, self.threads)
+
+    def displaced_score(self, trial: Trial, sigma: tuple[float, float]) -> float:
+        """Return the mean score of a trial when the object is displaced at random, 0 where no grasp is left [N/N].
+
+        The hand stays where it is and closes until it touches. The same trial gets the same draws.
+
+        Args:
+            trial: the trial. sigma: standard deviations of the object's position [m] and of its rotation [rad].
+        """
+        rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((self.asked.seed, 1, trial.number))))
+        T = np.repeat(np.linalg.inv(trial.T_object_palm)[None], DISPLACEMENTS, axis=0)
+        center = np.repeat(self._center[None], DISPLACEMENTS, axis=0)
+        moved = vary(rng, T, center, sigma[1], sigma[0])
+        return float(self.bounds(self.solve(trial.arm, np.linalg.inv(moved)))[0].mean())
 
     def bounds(self, batch: GraspBatch) -> tuple[FloatArray, FloatArray]:
         """Return score and bound of every answer [N/N], shape (N,) each; 0 for anything but a grasp."""

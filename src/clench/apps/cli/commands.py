@@ -15,6 +15,7 @@ from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
 from .parsing import as_range
+from .plan_command import plan
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
@@ -292,6 +293,7 @@ def bench(*arguments: str) -> int:
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "solve": solve,
+    "plan": plan,
     "batch": batch,
     "hand": hand,
     "execute": execute,

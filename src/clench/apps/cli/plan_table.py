@@ -1,0 +1,32 @@
+"""The table of planned grasps, on standard output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .tables import new_console, new_table, plain
+
+
+def print_plan(document: Mapping[str, Any], text: str) -> None:
+    """Print planned grasps, the best ones first, and what became of the other proposals; see `clench plan --json`."""
+    console = new_console()
+    columns = ["", "kind", "preshape", "palm at [mm]", "epsilon", "touching", "torque [Nm]"]
+    tried = any("hold" in grasp for grasp in document["grasps"])
+    table = new_table(f"{document['hand']} on {document['object']}", *columns, *(["held"] if tried else []))
+    for number, grasp in enumerate(document["grasps"], start=1):
+        solution = grasp["solution"]
+        place = " ".join(f"{1e3 * x:.0f}" for x in solution["hand_pose"]["position"])
+        links = sorted({contact["link"] for contact in solution["contacts"] if not contact["passed"]})
+        torque = max((abs(t) for t in solution["squeeze"]["torques"].values()), default=0.0)
+        row = [str(number), grasp["kind"], grasp["preshape"], place, f"{grasp['epsilon']:.3f}", f"{len(links)} links"]
+        row += [f"{torque:.3f}", *(["yes" if grasp["hold"]["held"] else "no"] if tried else [])]
+        table.add_row(*map(plain, row))
+    console.print(table)
+    console.print(plain(text))
+    fallen = {reason: n for reason, n in document["rejected"].items() if n}
+    if fallen:
+        most = sorted(fallen.items(), key=lambda item: -item[1])
+        console.print("rejected: " + plain(", ".join(f"{n} {reason}" for reason, n in most)), soft_wrap=True)
+    closed, closure = document["closed"], document["force_closed"]
+    console.print(f"{closed} closed, {closure} of them resist every wrench; {document['seconds']['total']:.2f} s")
