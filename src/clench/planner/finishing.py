@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,10 @@ class Finisher:
     asked: PlanOptions
     closer: Closer
 
+    def __post_init__(self) -> None:
+        """Note how contacts are modelled."""
+        self._model: dict[str, Any] = {"contact_model": self.asked.model, "torsion": self.asked.torsion}
+
     def finish(self, trial: Trial, rejected: Counter[Rejection]) -> PlannedGrasp | None:
         """Return the completed grasp; None where something is missing, which is counted."""
         T_world_palm = Pose.from_matrix(self.obj.pose.matrix @ trial.T_object_palm)
@@ -55,7 +60,7 @@ class Finisher:
                 return None
             row = trajectory.positions[trajectory.pregrasp if trajectory.pregrasp is not None else 0]
             pregrasp = dict(zip(self.hand.joint_names, row.tolist(), strict=True))
-        held = hold(solution, self.hand, self.obj, friction=self.asked.friction).held
+        held = hold(solution, self.hand, self.obj, friction=self.asked.friction, **self._model).held
         friction: FloatArray = held.contacts.friction
         found = [epsilon(held.with_friction(share * friction)).radius for share in FRICTION_SHARES]
         solution = replace(solution, squeeze=squeeze.to_dict(), pregrasp=pregrasp)
@@ -82,4 +87,5 @@ class Finisher:
             gravity=asked.gravity,
             disturbances=asked.task_wrenches,
             friction=asked.friction,
+            **self._model,
         )

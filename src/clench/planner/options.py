@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from clench.base.defaults import MASS
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.pose import FloatArray, checked_vector
-from clench.grasp.mechanics.contacts import friction_range
+from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel, friction_range
 from clench.grasp.mechanics.loads import check_loads, mass_range
 from clench.models.hand.hand import Hand
 
@@ -49,6 +49,8 @@ class PlanArguments(TypedDict, total=False):
     mass: float | tuple[float, float]
     gravity: ArrayLike | None
     task_wrenches: ArrayLike | None
+    contact_model: ContactModel | str | None
+    torsion: float
     kinds: Sequence[GraspKind | str] | None
     fingers: Sequence[str] | None
     min_fingers: int
@@ -80,6 +82,8 @@ class PlanOptions:
     mass: float | tuple[float, float] = MASS
     gravity: ArrayLike | None = None
     task_wrenches: ArrayLike | None = None
+    contact_model: ContactModel | str | None = None
+    torsion: float = DEFAULT_TORSION
     kinds: Sequence[GraspKind | str] | None = None
     fingers: Sequence[str] | None = None
     min_fingers: int = 2
@@ -104,7 +108,9 @@ class PlanOptions:
         for key in ("most", "threads"):
             if getattr(self, key) is not None:
                 _check_whole(getattr(self, key), key, 1)
-        for key in ("apart", "approach_angle", "seconds"):
+        if self.contact_model not in [None, *ContactModel]:
+            raise CommandError(f"contact_model: expected one of {', '.join(ContactModel)}, got {self.contact_model!r}.")
+        for key in ("torsion", "apart", "approach_angle", "seconds"):
             _check_number(getattr(self, key), key)
         if self.friction is not None:
             friction_range(self.friction)
@@ -142,6 +148,13 @@ class PlanOptions:
     def lowest_friction(self) -> float | None:
         """The lowest friction that is planned for [-]; None: that of links and object."""
         return None if self.friction is None else friction_range(self.friction)[0]
+
+    @property
+    def model(self) -> ContactModel:
+        """Model of the contacts: two point contacts resist no twist about their line, so pinches have soft fingers."""
+        if self.contact_model is None:
+            return ContactModel.SOFT if set(self.kinds or ()) == {GraspKind.PINCH} else ContactModel.POINT
+        return ContactModel(self.contact_model)
 
     @property
     def sigma(self) -> tuple[float, float] | None:

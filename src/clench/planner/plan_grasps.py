@@ -28,6 +28,8 @@ def plan_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
         mass: of the object [kg], a number or a range.
         gravity: its direction in the world; None: the object is held in any direction.
         task_wrenches: rows (force [N], torque [Nm]) in the world about the centre of mass that are resisted, (N, 6).
+        contact_model: "point", or "soft" for fingers that also resist a twist about the normal, with the coefficient
+            torsion [m]; None is soft for pinches alone, which hold nothing without it, else point.
         kinds: some of "pinch", "tripod", "precision", "power"; None is any.
         fingers: names of the fingers that may close; None is all. min_fingers: how many touch at least.
         approach: direction in the world in which the palm comes; approach_angle: how far off it may be [rad].

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray, Pose, quaternions_from_rotations
+from clench.base.pose import FloatArray, Pose, invert, quaternions_from_rotations
 from clench.grasp.mechanics.batch_bounds import epsilon_bounds
-from clench.grasp.mechanics.contacts import pair_friction
+from clench.grasp.mechanics.contacts import ContactModel, pair_friction
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
@@ -129,10 +129,11 @@ class Closer:
             trial: the trial. sigma: standard deviations of the object's position [m] and of its rotation [rad].
         """
         rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((self.asked.seed, 1, trial.number))))
-        T = np.repeat(np.linalg.inv(trial.T_object_palm)[None], DISPLACEMENTS, axis=0)
+        T = np.repeat(invert(trial.T_object_palm)[None], DISPLACEMENTS, axis=0)
         center = np.repeat(self._center[None], DISPLACEMENTS, axis=0)
         moved = vary(rng, T, center, sigma[1], sigma[0])
-        return float(self.bounds(self.solve(trial.arm, np.linalg.inv(moved)))[0].mean())
+        placed = np.array([invert(T) for T in moved])
+        return float(self.bounds(self.solve(trial.arm, placed))[0].mean())
 
     def bounds(self, batch: GraspBatch) -> tuple[FloatArray, FloatArray]:
         """Return score and bound of every answer [N/N], shape (N,) each; 0 for anything but a grasp."""
@@ -143,10 +144,9 @@ class Closer:
         first = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(batch)))])
         mu = self._friction[contacts.link[keep], contacts.body[keep]]
         centers = np.array([Pose(row[4:], row[:4]).apply(self._center) for row in batch.object_poses]).reshape(-1, 3)
-        found = [
-            epsilon_bounds(first, contacts.position[keep], contacts.normal[keep], share * mu, centers, self._length)
-            for share in FRICTION_SHARES
-        ]
+        torsion = self.asked.torsion if self.asked.model is ContactModel.SOFT else None
+        where = contacts.position[keep], contacts.normal[keep]
+        found = [epsilon_bounds(first, *where, k * mu, centers, self._length, torsion) for k in FRICTION_SHARES]
         return np.mean(found, axis=0), found[-1]
 
     def _tried(
