@@ -1,0 +1,82 @@
+"""Hands that are brought up stop where they touch, judged by sampled places along the way."""
+
+import numpy as np
+import pytest
+
+import clench
+from clench.base.pose import invert
+from clench.grasp.depths import hand_depths
+from clench.grasp.scene import pack_object
+from clench.models.objects.obstacles import table
+from clench.planner.approach_check import OFF, SHORT, Approach
+from clench.planner.proposals import DEEP, Arm, Proposals, frames, turns_about, vary
+
+
+def draws(count: int) -> Proposals:
+    rng = np.random.default_rng(4)
+    way = rng.normal(size=(count, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    T = np.zeros((count, 4, 4))
+    T[:, :3, :3] = turns_about(way, rng.uniform(0.0, 6.0, count))
+    T[:, :3, 3] = rng.uniform(-0.12, 0.12, (count, 3))
+    T[:, 3, 3] = 1.0
+    return Proposals(np.arange(count) % 2, T, np.zeros((count, 3)))
+
+
+@pytest.mark.parametrize("with_table", [False, True])
+def test_no_hand_overlaps_on_its_way_and_each_goes_as_far_as_it_may(with_table):
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("cylinder:r=0.03,h=0.12")
+    if with_table:
+        obj = obj.with_body(table(-0.06))
+    packed, q = pack_object(obj), hand.open_angles()
+    arms = (Arm(0, ("thumb",), False), Arm(0, ("thumb",), True))
+    asked = draws(80 if not with_table else 200)
+    came = Approach(hand, q[None], packed).bring_up(asked, arms, 2)
+    assert len(came.proposals) + came.stopped + came.obstacle == len(asked)
+    assert len(came.proposals) > 5
+    assert came.stopped > 5
+    assert (came.obstacle > 0) == with_table
+
+    def overlaps(T) -> bool:
+        return any(depth.place is not None for depth in hand_depths(hand, q, packed, invert(T)))
+
+    for arm, T in zip(came.proposals.arm, came.proposals.T_object_palm, strict=True):
+        into = T[:3, :3] @ hand.palm_normal
+        start = next(p for p in asked.T_object_palm if np.allclose(p[:3, :3], T[:3, :3]))
+        gone = float((T[:3, 3] - start[:3, 3]) @ into)
+        most = DEEP if arm else 0.0
+        assert -SHORT - 1e-9 <= gone <= most + 1e-9
+        for back in (0.0, 0.01, 0.05, 0.15):
+            before = T.copy()
+            before[:3, 3] -= back * into
+            assert not overlaps(before)
+        if gone < most - 1e-9:
+            after = T.copy()
+            after[:3, 3] += (OFF + 1e-6) * into
+            assert overlaps(after)
+
+
+def test_frames_and_turns_are_rotations_with_the_given_axes():
+    rng = np.random.default_rng(1)
+    axes = np.vstack([np.eye(3), -np.eye(3), rng.normal(size=(20, 3))])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    made = frames(axes)
+    np.testing.assert_allclose(made[:, :, 0], axes, atol=1e-12)
+    np.testing.assert_allclose(made @ made.transpose(0, 2, 1), np.broadcast_to(np.eye(3), made.shape), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(made), 1.0)
+    angles = rng.uniform(-4.0, 4.0, len(axes))
+    turned = turns_about(axes, angles)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", turned, axes), axes, atol=1e-12)
+    np.testing.assert_allclose(np.trace(turned, axis1=1, axis2=2), 1.0 + 2.0 * np.cos(angles), atol=1e-12)
+
+
+def test_variations_turn_about_the_point_and_shift_by_what_is_asked():
+    rng = np.random.default_rng(2)
+    T = np.repeat(np.eye(4)[None], 4000, axis=0)
+    point = np.broadcast_to([0.1, 0.0, 0.05], (4000, 3))
+    still = vary(rng, T, point, 0.3, 0.0)
+    moved = np.einsum("nij,nj->ni", still[:, :3, :3], point) + still[:, :3, 3]
+    np.testing.assert_allclose(moved, point, atol=1e-12)
+    shifted = vary(rng, T, point, 0.0, 0.01)
+    assert np.std(shifted[:, :3, 3]) == pytest.approx(0.01, rel=0.05)
+    np.testing.assert_allclose(shifted[:, :3, :3], T[:, :3, :3])
