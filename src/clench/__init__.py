@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from clench.models.hand.findings import Finding, FindingCode
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+    from clench.models.objects.stable_poses import StablePose, stable_poses
     from clench.models.shapes import CollisionSource, ShapeKind
     from clench.solve.batch import solve_batch, solve_stream
     from clench.solve.controller import solve
@@ -117,6 +118,7 @@ _HOMES = {
     "SimulatedHand": "clench.execution.simulation",
     "SolutionStatus": "clench.solve.solution",
     "SqueezePlan": "clench.solve.squeezing",
+    "StablePose": "clench.models.objects.stable_poses",
     "Tracker": "clench.solve.tracking",
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
@@ -138,6 +140,7 @@ _HOMES = {
     "set_object_cache": "clench.grasp.scene",
     "solve_batch": "clench.solve.batch",
     "solve_stream": "clench.solve.batch",
+    "stable_poses": "clench.models.objects.stable_poses",
     "write_log": "clench.execution.formats.mcap_log",
 }
 
@@ -195,6 +198,7 @@ __all__ = [
     "SimulatedHand",
     "SolutionStatus",
     "SqueezePlan",
+    "StablePose",
     "Tracker",
     "Trajectory",
     "UnknownNameError",
@@ -218,6 +222,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "solve_stream",
+    "stable_poses",
     "write_log",
 ]
 
