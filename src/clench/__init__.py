@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from clench.execution.trajectory import Trajectory, plan_trajectory
     from clench.grasp.approach import approach_poses
     from clench.grasp.calibration import Calibration, load_calibration
+    from clench.grasp.contact_kinds import GraspKind
     from clench.grasp.criteria import Criterion, HandCriterion
     from clench.grasp.criterion_registry import register_criterion
     from clench.grasp.scene import set_object_cache
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from clench.solve.batch import solve_batch, solve_stream
     from clench.solve.controller import solve
     from clench.solve.grasp_batch import BatchContacts, GraspBatch
+    from clench.solve.grasp_kinds import grasp_kind
     from clench.solve.pose_error import PoseErrorReport, pose_error
     from clench.solve.quality import GraspQuality, grasp_quality
     from clench.solve.record import Record
@@ -92,6 +94,7 @@ _HOMES = {
     "GraspBatch": "clench.solve.grasp_batch",
     "GraspCommand": "clench.models.command",
     "GraspFormat": "clench.execution.formats.exchange",
+    "GraspKind": "clench.grasp.contact_kinds",
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspPosture": "clench.execution.formats.grasp_posture",
     "GraspQuality": "clench.solve.quality",
@@ -127,6 +130,7 @@ _HOMES = {
     "complete": "clench.execution.completing",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
+    "grasp_kind": "clench.solve.grasp_kinds",
     "grasp_quality": "clench.solve.quality",
     "import_grasps": "clench.execution.formats.exchange",
     "load_calibration": "clench.grasp.calibration",
@@ -172,6 +176,7 @@ __all__ = [
     "GraspBatch",
     "GraspCommand",
     "GraspFormat",
+    "GraspKind",
     "GraspObject",
     "GraspPosture",
     "GraspQuality",
@@ -208,6 +213,7 @@ __all__ = [
     "complete",
     "execute",
     "export_grasps",
+    "grasp_kind",
     "grasp_quality",
     "import_grasps",
     "load_calibration",
