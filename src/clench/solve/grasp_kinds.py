@@ -49,5 +49,5 @@ def grasp_kind(solution: GraspSolution, hand: Hand, obj: GraspObject | None = No
         target = graspable_body(obj, pack_object(obj))
         gap, palm = nearest_link(hand, q, hand.fixed_links, source, target, T)
         links += [palm] if gap <= PALM_NEAR else []
-    (code,) = contact_kinds(hand, np.array([0, len(links)]), np.array(links, dtype=np.int64))
-    return KINDS[code]
+    codes = contact_kinds(hand, np.array([0, len(links)]), np.array(links, dtype=np.int64))
+    return KINDS[int(codes[0])]

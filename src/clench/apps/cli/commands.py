@@ -14,6 +14,7 @@ from .calibrating import calibrate
 from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
+from .objects import object_
 from .parsing import as_range
 
 if TYPE_CHECKING:
@@ -294,6 +295,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "solve": solve,
     "batch": batch,
     "hand": hand,
+    "object": object_,
     "execute": execute,
     "export": export,
     "import": import_,

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.base.visible_text import visible
+from .tables import console as _console
+from .tables import plain as _plain
+from .tables import sentences as _sentences
+from .tables import table as _table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -348,33 +351,6 @@ def _front_table(front: Sequence[HandSets]) -> Table:
 
 def _score(candidate: Candidate, name: str) -> str:
     return f"{candidate.scores[name]:.4g}" if name in candidate.scores else ""
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    return Console(highlight=False, soft_wrap=False)
-
-
-def _table(title: str, *columns: str) -> Table:
-    from rich.table import Table
-
-    table = Table(title=_plain(title), title_justify="left", show_header=any(columns))
-    for column in columns:
-        table.add_column(_plain(column), overflow="fold")
-    return table
-
-
-def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:
-    for sentence in sentences:
-        console.print(f"[yellow]{label}:[/yellow] {_plain(sentence)}")
-
-
-def _plain(text: Any) -> str:
-    """Return text in which square brackets and escape codes are just that: names come from files."""
-    from rich.markup import escape
-
-    return escape(visible(str(text)))
 
 
 def _millimetres(length: float) -> str:

@@ -1,9 +1,10 @@
 """Stable poses: how an object rests on a horizontal table, and how likely each rest is.
 
 The object rests on a facet of its convex hull. A facet is stable when the centre of mass projects into it. The model of
-a random drop is that of Wiegley, Rao and Goldberg (1992): the first facet to meet the table is the one below the centre
-of mass in a random orientation, so its probability is its solid angle, seen from the centre of mass, over 4 pi. An
-unstable facet rolls over the edge beyond which the centre of mass lies farthest. Every roll lowers the centre of mass.
+a random drop is quasi-static, the first of Goldberg et al., "Part pose statistics: estimators and experiments" (IEEE
+Transactions on Robotics and Automation 15(5), 1999). The object lands on the facet below its centre of mass in a random
+orientation, so the probability of a facet is its solid angle, seen from the centre of mass, over 4 pi. From an unstable
+facet the object rolls over the edge that the centre of mass overhangs most. Every roll lowers the centre of mass.
 """
 
 from __future__ import annotations
