@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import clench
 from clench.base.pose import Pose
 from clench.models.mesh import TriangleMesh
+from clench.models.objects import stable_poses as module
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.objects.hull_facets import hull_facets
 from clench.models.objects.mass import mass_properties
@@ -104,6 +105,23 @@ def leaning(along_x: float, along_y: float) -> GraspObject:
     """Return a prism that leans, by the run for a unit of rise."""
     points = BOX_CORNERS * [0.01, 0.01, 0.05]
     return of_points(points + points[:, 2:] * [along_x, along_y, 0.0])
+
+
+def bumpy_ball(seed: int) -> GraspObject:
+    """Return the hull of random points of a sphere: it rests on about a hundred facets in all directions."""
+    points = np.random.default_rng(seed).normal(size=(150, 3))
+    return of_points(0.05 * points / np.linalg.norm(points, axis=1, keepdims=True))
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.1, 0.2])
+def test_many_facets_hang_together_as_few_do(angle: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where facets are many, only neighbours on the sphere are compared; the groups are the same."""
+    capsule = GraspObject.load("capsule:r=0.02,h=0.1")  # rests on one circle of directions
+    objects = [capsule, cone(0.05, 0.06), *map(bumpy_ball, range(4))]
+    expected = [stable_poses(obj, merge_angle=angle) for obj in objects]
+    assert {1, 2, 3} <= {s.facets for found in expected[2:] for s in found}
+    monkeypatch.setattr(module, "_MANY", 4)
+    assert [stable_poses(obj, merge_angle=angle) for obj in objects] == expected
 
 
 def test_a_leaning_prism_falls_on_the_side_it_leans_to() -> None:

@@ -34,6 +34,8 @@ MERGE_ANGLE: Final = math.radians(12.0)
 ROUND_FRACTION: Final = 1e-3
 #: Overhangs that differ by less than this fraction of the object's size are equal [-].
 _TIE: Final = 1e-6
+#: So many directions have too many near pairs.
+_MANY: Final = 1000
 #: Digits up to which probabilities count when poses are sorted: the rest is rounding.
 _DIGITS: Final = 9
 
@@ -196,14 +198,36 @@ def _groups(normals: FloatArray, stable: Indices, angle: float) -> list[Indices]
     """Return the stable facets in groups that hang together by steps of at most an angle [rad]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
 
     count = len(stable)
-    # A chord of the unit sphere; no facet merges with a parallel one: there is just one in each direction.
-    pairs = cKDTree(normals[stable]).query_pairs(2.0 * math.sin(angle / 2.0), output_type="ndarray")
+    directions = normals[stable]
+    pairs = _near_pairs(directions, 2.0 * math.sin(angle / 2.0))
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
-    return [stable[label == k] for k in range(int(label.max()) + 1)]
+    order = np.argsort(label, kind="stable")
+    return np.split(stable[order], np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def _near_pairs(directions: FloatArray, chord: float) -> Indices:
+    """Return pairs of points of the unit sphere by which those hang together that are a chord apart or less [-].
+
+    Of many points there are too many near pairs. The shortest tree over points of a sphere lies in their convex hull,
+    so its edges join the same points.
+    """
+    from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+    tree = cKDTree(directions)
+    if len(directions) > _MANY:
+        try:
+            triangles = ConvexHull(directions).simplices
+        except QhullError:  # on one circle: there are not too many pairs
+            return tree.query_pairs(chord, output_type="ndarray")
+        edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        # Points that rounding leaves inside of the hull hang on their neighbours.
+        edges = np.vstack([edges, np.asarray(tree.query(directions, k=2)[1])])
+        length = np.linalg.norm(directions[edges[:, 0]] - directions[edges[:, 1]], axis=1)
+        return np.asarray(edges[length <= chord])
+    return tree.query_pairs(chord, output_type="ndarray")
 
 
 def _pose(
