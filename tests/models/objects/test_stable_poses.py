@@ -373,6 +373,17 @@ def test_a_center_of_mass_outside_is_refused(center: list[float]) -> None:
         stable_poses(box, center_of_mass=center)
 
 
+def test_a_surface_that_crosses_itself_may_have_its_center_outside() -> None:
+    """A prism over a bow tie: its two lobes count with opposite signs."""
+    tie = np.array([[0.0, 0.0], [0.1, 0.1], [0.1, 0.0], [0.0, 0.09]])
+    points = np.array([[x, y, z] for z in (0.0, 0.03) for x, y in tie])
+    sides = [t for i, j in ((0, 1), (1, 2), (2, 3), (3, 0)) for t in ([i, j, j + 4], [i, j + 4, i + 4])]
+    obj = GraspObject.from_meshes([(points, [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], *sides])])
+    with pytest.raises(clench.ObjectError, match=r"does its surface cross itself\? Give the centre of mass\.$"):
+        stable_poses(obj)
+    assert stable_poses(obj, center_of_mass=[0.05, 0.05, 0.015])
+
+
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

@@ -103,13 +103,13 @@ def hull_facets(points: FloatArray, name: str) -> HullFacets:
     try:
         hull = ConvexHull((points - middle) / size if size > 0.0 else points)
     except (QhullError, ValueError):
-        raise flat(name) from None
+        raise _flat(name) from None
     label, seeds = _coplanar(hull.points, hull.simplices, hull.equations, hull.neighbors)
     corners = hull.points[hull.simplices]
     normals, offsets = hull.equations[seeds, :3], -hull.equations[seeds, 3]
     start, out, edge_facet, edge_other = _edges(corners, hull.neighbors, label, normals)
     if 2.0 * hull.volume <= COPLANAR * hull.area:
-        raise flat(name)
+        raise _flat(name)
     return HullFacets(
         points=hull.points[np.unique(hull.simplices)] * size + middle,
         size=size,
@@ -124,7 +124,7 @@ def hull_facets(points: FloatArray, name: str) -> HullFacets:
     )
 
 
-def flat(name: str) -> ObjectError:
+def _flat(name: str) -> ObjectError:
     """Return the error of an object whose points lie in one plane."""
     return ObjectError(f"{name}: expected a solid, but the object is flat: all of its points lie in one plane.")
 

@@ -22,7 +22,7 @@ from clench.base.pose import FloatArray, Pose, checked_vector
 from clench.models.shapes import Shape, ShapeKind
 
 from .grasp_object import BodyRole, GraspObject
-from .hull_facets import COPLANAR, HullFacets, flat, hull_facets
+from .hull_facets import HullFacets, hull_facets
 from .mass import mass_properties
 from .obstacles import table
 
@@ -32,6 +32,8 @@ Indices = NDArray[np.intp]
 MERGE_ANGLE: Final = math.radians(12.0)
 #: Facets stand in for a round shape; they are off by at most this fraction of its largest size [-].
 ROUND_FRACTION: Final = 1e-3
+#: The centre of mass is inside of the hull by more than this fraction of the object's size [-].
+_INSIDE: Final = 1e-9
 #: Overhangs that differ by less than this fraction of the object's size are equal [-].
 _TIE: Final = 1e-6
 #: So many directions have too many near pairs.
@@ -143,16 +145,14 @@ def _points(shape: Shape) -> FloatArray:
 def _center(obj: GraspObject, hull: HullFacets, given: ArrayLike | None) -> FloatArray:
     """Return the centre of mass in the object's frame, checked to be inside of the hull."""
     if given is None:
-        center = mass_properties(obj).center
-        if hull.heights(center).min() <= COPLANAR * hull.size:
-            raise flat(obj.name)
-        return center
-    center = checked_vector(given, 3, "center_of_mass", "[x, y, z] in metres, in the object's frame")
-    if hull.heights(center).min() <= COPLANAR * hull.size:
+        center, cause = mass_properties(obj).center, "; does its surface cross itself? Give the centre of mass"
+    else:
+        center, cause = checked_vector(given, 3, "center_of_mass", "[x, y, z] in metres, in the object's frame"), ""
+    if hull.heights(center).min() <= _INSIDE * hull.size:
         low, high = (", ".join(f"{v:.4g}" for v in f(hull.points, axis=0)) for f in (np.min, np.max))
         raise ObjectError(
             f"center_of_mass: {center.tolist()} is not inside of the convex hull of {obj.name}, "
-            f"which reaches from [{low}] to [{high}] m."
+            f"which reaches from [{low}] to [{high}] m{cause}."
         )
     return center
 
