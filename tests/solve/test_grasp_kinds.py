@@ -46,7 +46,7 @@ def with_links(
 def test_tips_only(hand: clench.Hand, grasp: clench.GraspSolution) -> None:
     names = [finger.name for finger in hand.fingers]
     kinds = [clench.grasp_kind(with_links(grasp, hand, dict.fromkeys(names[:n], 0)), hand) for n in range(6)]
-    assert kinds == ["none", "none", "pinch", "tripod", "precision", "precision"]
+    assert kinds == [None, None, "pinch", "tripod", "precision", "precision"]
     assert clench.grasp_kind(with_links(grasp, hand, {"index": 0, "thumb": 1}), hand) is clench.GraspKind.POWER
 
 

@@ -16,8 +16,8 @@ class GraspKind(StrEnum):
 
     | fingers that touch | with their last links only | with another link, or the palm touches too |
     |---|---|---|
-    | none | `none` | `none` |
-    | one | `none` | `power` with the palm, else `none` |
+    | none | no kind | no kind |
+    | one | no kind | `power` with the palm, else no kind |
     | two | `pinch` | `power` |
     | three | `tripod` | `power` |
     | four or more | `precision` | `power` |
@@ -31,18 +31,16 @@ class GraspKind(StrEnum):
     """four or more fingers touch, each with its last link only"""
     POWER = "power"
     """the palm or another link of a finger touches as well"""
-    NONE = "none"
-    """fewer than two of the fingers and the palm touch"""
 
 
-#: What the codes of `contact_kinds` mean, in order.
+#: What the codes of `contact_kinds` mean, in order; -1 is no kind: fewer than two of the fingers and the palm touch.
 KINDS: Final = tuple(GraspKind)
 
 
 def contact_kinds(
     hand: Hand, first: NDArray[np.int64], link: NDArray[np.int64], counted: NDArray[np.bool_] | None = None
 ) -> NDArray[np.int8]:
-    """Return the kinds of N grasps as indices into `KINDS`, shape (N,).
+    """Return the kinds of N grasps as indices into `KINDS`, -1 for no kind, shape (N,).
 
     The last link of a finger is its tip, together with the links that are fixed to the tip. The palm stands for all
     links that no finger moves.
@@ -64,8 +62,7 @@ def contact_kinds(
     wide[grasp[~is_last[link]]] = True
     fingers = touches[:, :-1].sum(axis=1)
     conditions = [touches.sum(axis=1) < 2, wide, fingers == 2, fingers == 3]
-    kinds = (GraspKind.NONE, GraspKind.POWER, GraspKind.PINCH, GraspKind.TRIPOD)
-    codes = [KINDS.index(kind) for kind in kinds]
+    codes = [-1, *(KINDS.index(kind) for kind in (GraspKind.POWER, GraspKind.PINCH, GraspKind.TRIPOD))]
     return np.select(conditions, codes, KINDS.index(GraspKind.PRECISION)).astype(np.int8)
 
 

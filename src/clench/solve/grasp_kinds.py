@@ -21,11 +21,11 @@ from .solution import GraspSolution
 PALM_NEAR: Final = 0.002
 
 
-def grasp_kind(solution: GraspSolution, hand: Hand, obj: GraspObject | None = None) -> GraspKind:
-    """Return the kind of a grasp by the links that touch; see `GraspKind`.
+def grasp_kind(solution: GraspSolution, hand: Hand, obj: GraspObject | None = None) -> GraspKind | None:
+    """Return the kind of a grasp by the links that touch, None if fewer than two of fingers and palm touch.
 
-    The default closing order brings every link to the object, so most of its grasps are power grasps. The order
-    `fingertip` gives the other kinds.
+    `GraspKind` lists the kinds. The default closing order brings every link to the object, so most of its grasps are
+    power grasps. The order `fingertip` gives the other kinds.
 
     A contact that a later motion opened does not count. A solution lists contacts of the fingers only, because the palm
     does not close. With the object, the palm touches when it is within 2 mm of it, and contacts with obstacles do not
@@ -50,4 +50,4 @@ def grasp_kind(solution: GraspSolution, hand: Hand, obj: GraspObject | None = No
         gap, palm = nearest_link(hand, q, hand.fixed_links, source, target, T)
         links += [palm] if gap <= PALM_NEAR else []
     codes = contact_kinds(hand, np.array([0, len(links)]), np.array(links, dtype=np.int64))
-    return KINDS[int(codes[0])]
+    return None if codes[0] < 0 else KINDS[int(codes[0])]

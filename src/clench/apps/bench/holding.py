@@ -16,6 +16,7 @@ from clench.base.json_files import write_atomically, write_json
 from clench.execution.convex_pieces import in_pieces
 from clench.execution.hold import Hold, HoldTest
 from clench.execution.scene import lowest
+from clench.grasp.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table
@@ -143,9 +144,9 @@ def _of_best(trials: Sequence[Trial]) -> dict[str, Value]:
         values[key] = sum(held)
         values[f"{key}_interval"] = f"{100 * low:.0f}-{100 * high:.0f} %"
     values |= {f"outcome_{name}": n for name, n in sorted(Counter(t.outcome for t in trials).items())}
-    for kind in sorted({t.grasp_kind for t in trials}):
+    for kind in GraspKind:
         of_kind = [t.report.held for t in trials if t.grasp_kind is kind]
-        values |= {f"{kind}_tried": len(of_kind), f"{kind}_held": sum(of_kind)}
+        values |= {f"{kind}_tried": len(of_kind), f"{kind}_held": sum(of_kind)} if of_kind else {}
     for name in trials[0].harder if trials else ():
         values[f"no_feasible_squeeze_{name}"] = sum(not t.harder[name].planned for t in trials)
     if not trials:

@@ -57,7 +57,7 @@ class Trial:
     """
 
     solution: GraspSolution
-    grasp_kind: GraspKind
+    grasp_kind: GraspKind | None
     score: float
     simultaneous: bool
     measures: GraspMeasures
@@ -88,7 +88,7 @@ class Trial:
             "open_angles": dict(self.solution.open_angles),
             "score": self.score,
             "outcome": self.outcome,
-            "grasp_kind": str(self.grasp_kind),
+            "grasp_kind": self.grasp_kind,
             "simultaneous": self.simultaneous,
             "measures": asdict(self.measures),
             "hold": self.report.to_dict(),

@@ -42,19 +42,20 @@ def object_(
 
 def print_object(report: ObjectReport) -> None:
     """Print what is known of an object."""
-    from .tables import console, plain, sentences, table
+    from .tables import new_console, new_table, plain
 
-    out = console()
-    summary = table("object", "", "")
+    out = new_console()
+    summary = new_table("object", "", "")
     for label, text in report.summary_rows():
         summary.add_row(plain(label), plain(text))
     out.print(summary)
     rows = report.pose_rows()
     if rows:
         title = f"stable poses on a table, {min(len(rows), _MOST_ROWS)} of {len(rows)}, the most probable first"
-        poses = table(title, "share", "points down", "centre [mm]", "stands on")
+        poses = new_table(title, "share", "points down", "centre [mm]", "stands on")
         for row in rows[:_MOST_ROWS]:
             poses.add_row(*map(plain, row))
         out.print(poses)
-    sentences(out, "no stable pose", [] if report.no_stable_pose is None else [report.no_stable_pose])
-    sentences(out, "warning", report.warnings)
+    said = [] if report.no_stable_pose is None else [("no stable pose", report.no_stable_pose)]
+    for label, text in [*said, *(("warning", warning) for warning in report.warnings)]:
+        out.print(f"[yellow]{label}:[/yellow] {plain(text)}")

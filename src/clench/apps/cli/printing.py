@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .tables import console as _console
+from .tables import new_console as _console
+from .tables import new_table as _table
 from .tables import plain as _plain
-from .tables import sentences as _sentences
-from .tables import table as _table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -351,6 +350,11 @@ def _front_table(front: Sequence[HandSets]) -> Table:
 
 def _score(candidate: Candidate, name: str) -> str:
     return f"{candidate.scores[name]:.4g}" if name in candidate.scores else ""
+
+
+def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:
+    for sentence in sentences:
+        console.print(f"[yellow]{label}:[/yellow] {_plain(sentence)}")
 
 
 def _millimetres(length: float) -> str:

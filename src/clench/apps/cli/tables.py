@@ -1,8 +1,7 @@
-"""Tables, sentences and text from files on a console: what every printed answer is made of."""
+"""Tables and text for people, on standard output."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from clench.base.visible_text import visible
@@ -12,27 +11,25 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def console() -> Console:
-    """Return the console of standard output."""
+def new_console() -> Console:
+    """Return a console that writes to standard output."""
     from rich.console import Console
 
     return Console(highlight=False, soft_wrap=False)
 
 
-def table(title: str, *columns: str) -> Table:
-    """Return an empty table; without any heading the columns have none."""
+def new_table(title: str, *columns: str) -> Table:
+    """Return a table without rows.
+
+    Args:
+        title: above it. columns: their headings.
+    """
     from rich.table import Table
 
-    made = Table(title=plain(title), title_justify="left", show_header=any(columns))
+    table = Table(title=plain(title), title_justify="left", show_header=any(columns))
     for column in columns:
-        made.add_column(plain(column), overflow="fold")
-    return made
-
-
-def sentences(out: Console, label: str, texts: Sequence[str]) -> None:
-    """Print sentences, each after a label."""
-    for text in texts:
-        out.print(f"[yellow]{label}:[/yellow] {plain(text)}")
+        table.add_column(plain(column), overflow="fold")
+    return table
 
 
 def plain(text: Any) -> str:
