@@ -128,6 +128,17 @@ def test_the_own_hand_page_leads_to_a_grasp(tmp_path: Path, monkeypatch: pytest.
     assert names["solution"].certified
 
 
+def test_the_objects_page_runs_and_names_every_field_and_kind() -> None:
+    text = page("objects.md")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(code, "objects.md", "exec"), names)
+    assert names["scene"].pose == names["alone"].pose == names["poses"][0].pose
+    documented = set(re.findall(r"`(\w+)`", text))
+    assert {field.name for field in fields(clench.StablePose)} <= documented
+    assert {kind.value for kind in clench.GraspKind} == set(re.findall(r"^\| `(\w+)` \| .*(?:finger|palm)", text, re.M))
+
+
 def test_every_criterion_and_preset_is_documented() -> None:
     text = page("calibration.md")
     for name in criterion_names():

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from clench.execution.trajectory import Trajectory, plan_trajectory
     from clench.grasp.approach import approach_poses
     from clench.grasp.calibration import Calibration, load_calibration
+    from clench.grasp.contact_kinds import GraspKind
     from clench.grasp.criteria import Criterion, HandCriterion
     from clench.grasp.criterion_registry import register_criterion
     from clench.grasp.scene import set_object_cache
@@ -40,15 +41,16 @@ if TYPE_CHECKING:
     from clench.models.hand.findings import Finding, FindingCode
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+    from clench.models.objects.stable_poses import StablePose, stable_poses
     from clench.models.shapes import CollisionSource, ShapeKind
     from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
-    from clench.planner.options import GraspKind
     from clench.planner.plan_grasps import iter_grasps, plan_grasps
     from clench.planner.regions import Region
     from clench.planner.search import GraspSearch
     from clench.solve.batch import solve_batch, solve_stream
     from clench.solve.controller import solve
     from clench.solve.grasp_batch import BatchContacts, GraspBatch
+    from clench.solve.grasp_kinds import grasp_kind
     from clench.solve.pose_error import PoseErrorReport, pose_error
     from clench.solve.quality import GraspQuality, grasp_quality
     from clench.solve.record import Record
@@ -96,7 +98,7 @@ _HOMES = {
     "GraspBatch": "clench.solve.grasp_batch",
     "GraspCommand": "clench.models.command",
     "GraspFormat": "clench.execution.formats.exchange",
-    "GraspKind": "clench.planner.options",
+    "GraspKind": "clench.grasp.contact_kinds",
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspPlan": "clench.planner.grasp_plan",
     "GraspPosture": "clench.execution.formats.grasp_posture",
@@ -127,6 +129,7 @@ _HOMES = {
     "SimulatedHand": "clench.execution.simulation",
     "SolutionStatus": "clench.solve.solution",
     "SqueezePlan": "clench.solve.squeezing",
+    "StablePose": "clench.models.objects.stable_poses",
     "Tracker": "clench.solve.tracking",
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
@@ -135,6 +138,7 @@ _HOMES = {
     "complete": "clench.execution.completing",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
+    "grasp_kind": "clench.solve.grasp_kinds",
     "grasp_quality": "clench.solve.quality",
     "import_grasps": "clench.execution.formats.exchange",
     "iter_grasps": "clench.planner.plan_grasps",
@@ -150,6 +154,7 @@ _HOMES = {
     "set_object_cache": "clench.grasp.scene",
     "solve_batch": "clench.solve.batch",
     "solve_stream": "clench.solve.batch",
+    "stable_poses": "clench.models.objects.stable_poses",
     "write_log": "clench.execution.formats.mcap_log",
 }
 
@@ -212,6 +217,7 @@ __all__ = [
     "SimulatedHand",
     "SolutionStatus",
     "SqueezePlan",
+    "StablePose",
     "Tracker",
     "Trajectory",
     "UnknownNameError",
@@ -221,6 +227,7 @@ __all__ = [
     "complete",
     "execute",
     "export_grasps",
+    "grasp_kind",
     "grasp_quality",
     "import_grasps",
     "iter_grasps",
@@ -237,6 +244,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "solve_stream",
+    "stable_poses",
     "write_log",
 ]
 

@@ -40,7 +40,8 @@ def run(capsys: pytest.CaptureFixture[str], *options: str) -> dict[str, object]:
 
 
 def test_the_best_of_a_few_hold_and_the_table_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    options = ("--poses", "12", "--best", "1", "--others", "1", "--table", str(tmp_path / "table.md"))
+    files = ("--table", str(tmp_path / "table.md"), "--trials", str(tmp_path / "trials.json"))
+    options = ("--poses", "12", "--best", "1", "--others", "1", *files)
     found = run(capsys, *options)
     case = {key.removeprefix("robonaut2.ball."): value for key, value in found.items() if key.startswith("robonaut2.")}
     assert (case["tried"], case["held"], case["held_5mm_5deg"]) == (1, 1, 1)
@@ -50,6 +51,10 @@ def test_the_best_of_a_few_hold_and_the_table_says_so(capsys: pytest.CaptureFixt
     assert float(str(case["touch_spread_max_ms"])) <= 5.0
     assert float(str(case["penetration_max_um"])) <= 10.0
     assert case["self_penetration_max_um"] == 0.0
+    assert (case["outcome_held"], case["power_tried"], case["power_held"]) == (1, 1, 1)
+    kept = json.loads((tmp_path / "trials.json").read_text())
+    assert kept["schema"] == "clench.hold-trials/2"
+    assert (kept["trials"][0]["outcome"], kept["trials"][0]["grasp_kind"]) == ("held", "power")
     lines = (tmp_path / "table.md").read_text().splitlines()
     assert lines[2].startswith("| robonaut2 | ball | 1 | 1 | 21-100 % |")
     assert len({line.count("|") for line in lines}) == 1

@@ -116,6 +116,12 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     [
         (["solv"], "clench: error: Command 'solv' is not in clench. Did you mean 'solve'?"),
         (["hand", "robonaut3"], "clench: error: Hand 'robonaut3' is not"),
+        (["object", "cup"], "clench: error: Object 'cup' is not in the built-in objects"),
+        (["object", "ball", "--scale", "-1"], "clench: error: scale: expected a finite number above 0, got -1.0."),
+        (
+            ["object", "mug", "--center-of-mass", "0", "0", "1"],
+            "clench: error: center_of_mass: [0.0, 0.0, 1.0] is not inside of the convex hull of mug, ",
+        ),
         (["execute", "absent.json"], "clench: error: absent.json: no such file."),
         (["record", "absent.db"], "clench: error: absent.db: no such record."),
         (["solve", "--hand", "robonaut2", "--object", "absent.obj"], "clench: error: "),
@@ -445,6 +451,24 @@ def test_hand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatc
     out = capsys.readouterr().out
     assert "thumb_proximal" in out
     assert "coupled joints" in out
+
+
+def test_object(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["object", "box:x=0.1,y=0.05,z=0.03", "--scale", "2", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "clench.object/1"
+    assert document["size"] == pytest.approx([0.2, 0.1, 0.06])
+    assert len(document["stable_poses"]) == 6
+    assert main(["object", "cylinder:r=0.03,h=0.1", "--center-of-mass", "0", "0", "0.04"]) == 0
+    out = capsys.readouterr().out
+    assert "[0, 0, 0.04] m" in out
+    assert "stable poses on a table, 3 of 3" in out
+    (tmp_path / "[flat].obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n")
+    assert main(["object", str(tmp_path / "[flat].obj")]) == 0
+    out = capsys.readouterr().out
+    assert "no stable pose: [flat]: expected a solid, but the object is flat" in out
+    assert "warning: [flat].obj: not watertight" in out
 
 
 def test_bench_is_handed_its_own_arguments(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_grasps_for_any_number_of_threads(plan, han
 
 def test_grasps_move_with_the_object(plan, hand, mug):
     pose = clench.Pose([0.3, -0.2, 0.5], wxyz=[0.5, 0.5, -0.5, 0.5])
-    moved = clench.plan_grasps(hand, mug.at(pose), 1, effort=16, most=64, path=False)
+    moved = clench.plan_grasps(hand, mug.posed(pose), 1, effort=16, most=64, path=False)
     still = clench.plan_grasps(hand, mug, 1, effort=16, most=64, path=False)
     relative = (pose.inverse() @ moved[0].hand_pose).matrix
     np.testing.assert_allclose(relative, (mug.pose.inverse() @ still[0].hand_pose).matrix, atol=1e-9)

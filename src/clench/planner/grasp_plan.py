@@ -8,11 +8,12 @@ from typing import Any
 
 from clench.base.pose import Pose
 from clench.execution.trajectory import Trajectory
+from clench.grasp.contact_kinds import GraspKind
 from clench.models.command import GraspCommand
 from clench.solve.solution import GraspSolution
 from clench.solve.squeezing import SqueezePlan
 
-from .options import GraspKind, PlanOptions
+from .options import PlanOptions
 from .rejections import HELP, Rejection
 
 

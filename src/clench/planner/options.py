@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from numbers import Integral, Real
 from typing import Any, Final, TypedDict
 
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from clench.base.defaults import MASS
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.pose import FloatArray, checked_vector
+from clench.grasp.contact_kinds import GraspKind
 from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel, friction_range
 from clench.grasp.mechanics.loads import check_loads, mass_range
 from clench.models.hand.hand import Hand
@@ -27,19 +27,6 @@ EFFORT: Final = 40
 APART: Final = 0.02
 #: Reachability: poses of the palm in the world, (N, 4, 4), to whether each can be reached, (N,).
 Reachable = Callable[[FloatArray], ArrayLike]
-
-
-class GraspKind(StrEnum):
-    """Name the kinds of grasps."""
-
-    PINCH = "pinch"
-    """two fingers touch, with their last links only"""
-    TRIPOD = "tripod"
-    """three fingers touch, with their last links only"""
-    PRECISION = "precision"
-    """four fingers or more touch, with their last links only"""
-    POWER = "power"
-    """other links touch, too"""
 
 
 class PlanArguments(TypedDict, total=False):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray, Pose, invert, quaternions_from_rotations
+from clench.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
 from clench.grasp.mechanics.batch_bounds import epsilon_bounds
 from clench.grasp.mechanics.contacts import ContactModel, pair_friction
 from clench.models.command import GraspCommand
@@ -21,7 +22,7 @@ from clench.solve.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
 from clench.solve.preshapes import Preshape
 from clench.solve.solution import FingerStatus, SolutionStatus
 
-from .options import GraspKind, PlanOptions
+from .options import PlanOptions
 from .proposals import Arm, Proposals, vary
 from .rejections import Rejection
 
@@ -82,7 +83,6 @@ class Closer:
             [[lowest or pair_friction(self.hand, link, body) for body in self.obj.bodies] for link in links]
         )
         self._graspable = np.array([body.role is BodyRole.GRASPABLE for body in self.obj.bodies])
-        self._tips = np.array([finger.tip_link for finger in self.hand.fingers])
         self._solid = [*self.hand.solid_links]
 
     def command(self, arm: Arm) -> GraspCommand:
@@ -138,9 +138,8 @@ class Closer:
     def bounds(self, batch: GraspBatch) -> tuple[FloatArray, FloatArray]:
         """Return score and bound of every answer [N/N], shape (N,) each; 0 for anything but a grasp."""
         contacts = batch.contacts
-        counts = np.diff(contacts.first)
-        owner = np.repeat(np.arange(len(batch)), counts)
-        keep = ~contacts.passed & self._graspable[contacts.body] & np.isin(batch.status_codes, _HOLDS)[owner]
+        owner, keep = self._counted(batch)
+        keep = keep & np.isin(batch.status_codes, _HOLDS)[owner]
         first = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(batch)))])
         mu = self._friction[contacts.link[keep], contacts.body[keep]]
         centers = np.array([Pose(row[4:], row[:4]).apply(self._center) for row in batch.object_poses]).reshape(-1, 3)
@@ -153,8 +152,9 @@ class Closer:
         self, batch: GraspBatch, arm: Arm, T: FloatArray, numbers: NDArray[np.intp], rejected: Counter[Rejection]
     ) -> list[Trial]:
         score, bound = self.bounds(batch)
-        kinds, touching = self._kinds(batch)
-        wanted = set(self.asked.kinds) if self.asked.kinds is not None else set(GraspKind)
+        kinds = contact_kinds(self.hand, batch.contacts.first, batch.contacts.link, self._counted(batch)[1])
+        wanted = [KINDS.index(GraspKind(kind)) for kind in self.asked.kinds or GraspKind]
+        touching = self._touching(batch)
         thumbs = [k for k, f in enumerate(batch.finger_names) if self.hand.finger(f).is_thumb]
         at_limit = (batch.finger_codes[:, thumbs] == _LIMIT).any(axis=1)
         in_region, holds = self._in_regions(batch), np.isin(batch.status_codes, _HOLDS)
@@ -163,7 +163,7 @@ class Closer:
             (~holds & at_limit, Rejection.THUMB_LIMIT),
             (~holds | (touching < self.asked.min_fingers), Rejection.NO_GRASP),
             (~batch.certified, Rejection.NOT_CERTIFIED),
-            (np.array([kind not in wanted for kind in kinds], dtype=np.bool_), Rejection.OTHER_KIND),
+            (~np.isin(kinds, wanted), Rejection.OTHER_KIND),
             (~in_region, Rejection.REGION),
             (bound <= 0.0, Rejection.NO_CLOSURE),
         )
@@ -174,29 +174,32 @@ class Closer:
         rows = np.flatnonzero(left)
         places = self._places(batch.joint_angles[rows], T[rows])
         return [
-            Trial(int(numbers[n]), arm, T[n], batch.joint_angles[n], float(score[n]), float(bound[n]), kinds[n], links)
+            Trial(
+                int(numbers[n]),
+                arm,
+                T[n],
+                batch.joint_angles[n],
+                float(score[n]),
+                float(bound[n]),
+                KINDS[kinds[n]],
+                links,
+            )
             for n, links in zip(rows.tolist(), places, strict=True)
         ]
 
-    def _kinds(self, batch: GraspBatch) -> tuple[list[GraspKind], NDArray[np.int64]]:
-        """Return the kind of every answer, and how many fingers touch the object."""
+    def _touching(self, batch: GraspBatch) -> NDArray[np.int64]:
+        """Return how many fingers touch the object in every answer, (N,)."""
+        owner, keep = self._counted(batch)
+        touched = np.zeros((len(batch), len(batch.finger_names)), dtype=np.bool_)
+        touched[owner[keep], batch.contacts.finger[keep]] = True
+        count: NDArray[np.int64] = touched.sum(axis=1)
+        return count
+
+    def _counted(self, batch: GraspBatch) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return whose every contact is, and whether it counts: it was not opened again and is no obstacle's, (C,)."""
         contacts = batch.contacts
         owner = np.repeat(np.arange(len(batch)), np.diff(contacts.first))
-        keep = ~contacts.passed & self._graspable[contacts.body]
-        names = [f.name for f in self.hand.fingers]
-        finger = np.array([names.index(name) for name in batch.finger_names], dtype=np.int64)
-        touched = np.zeros((len(batch), len(batch.finger_names)), dtype=np.bool_)
-        touched[owner[keep], contacts.finger[keep]] = True
-        other = np.zeros(len(batch), dtype=np.bool_)
-        off_tip = keep & (contacts.link != self._tips[finger[contacts.finger]])
-        other[owner[off_tip]] = True
-        count = touched.sum(axis=1)
-        few = {0: GraspKind.PINCH, 1: GraspKind.PINCH, 2: GraspKind.PINCH, 3: GraspKind.TRIPOD}
-        kinds = [
-            GraspKind.POWER if power else few.get(n, GraspKind.PRECISION)
-            for power, n in zip(other.tolist(), count.tolist(), strict=True)
-        ]
-        return kinds, count
+        return owner, ~contacts.passed & self._graspable[contacts.body]
 
     def _in_regions(self, batch: GraspBatch) -> NDArray[np.bool_]:
         inside = np.ones(len(batch), dtype=np.bool_)

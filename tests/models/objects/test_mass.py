@@ -25,7 +25,7 @@ from clench.models.tessellation import BOX_CORNERS, BOX_TRIANGLES
 def test_shapes(text: str, volume: float, length: float) -> None:
     found = mass_properties(clench.GraspObject.load(text))
     assert np.abs(found.center).max() < 1e-12
-    assert found.volume == pytest.approx(volume, rel=2e-2)  # triangles are inscribed
+    assert found.volume == pytest.approx(volume, rel=1e-12)
     assert found.length == pytest.approx(length, rel=1e-9)
 
 

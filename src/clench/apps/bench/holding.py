@@ -16,6 +16,7 @@ from clench.base.json_files import write_atomically, write_json
 from clench.execution.convex_pieces import in_pieces
 from clench.execution.hold import Hold, HoldTest
 from clench.execution.scene import lowest
+from clench.grasp.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table
@@ -27,7 +28,7 @@ from .trying import Trial, try_grasp
 
 #: Stricter limits on the object's motion: name, distance [m], angle [rad].
 STRICT = (("10mm_5deg", 0.01, float(np.deg2rad(5.0))), ("5mm_5deg", 0.005, float(np.deg2rad(5.0))))
-TRIALS_SCHEMA = "clench.hold-trials/1"
+TRIALS_SCHEMA = "clench.hold-trials/2"
 #: Where the file with a Markdown table has a column: heading, key.
 _COLUMNS = (
     ("tried", "tried"),
@@ -63,7 +64,7 @@ class HoldBench:
 
 @dataclass(frozen=True)
 class HoldFiles:
-    """Say where more is written: a Markdown table, and all trials (JSON, schema `clench.hold-trials/1`)."""
+    """Say where more is written: a Markdown table, and all trials (JSON, schema `clench.hold-trials/2`)."""
 
     table: Path | None = None
     trials: Path | None = None
@@ -142,7 +143,10 @@ def _of_best(trials: Sequence[Trial]) -> dict[str, Value]:
         low, high = wilson(sum(held), count)
         values[key] = sum(held)
         values[f"{key}_interval"] = f"{100 * low:.0f}-{100 * high:.0f} %"
-    values |= {f"kind_{kind}": n for kind, n in sorted(Counter(t.kind for t in trials).items())}
+    values |= {f"outcome_{name}": n for name, n in sorted(Counter(t.outcome for t in trials).items())}
+    for kind in GraspKind:
+        of_kind = [t.report.held for t in trials if t.grasp_kind is kind]
+        values |= {f"{kind}_tried": len(of_kind), f"{kind}_held": sum(of_kind)} if of_kind else {}
     for name in trials[0].harder if trials else ():
         values[f"no_feasible_squeeze_{name}"] = sum(not t.harder[name].planned for t in trials)
     if not trials:
@@ -180,7 +184,7 @@ def _of_score(trials: Sequence[Trial]) -> dict[str, Value]:
         "score_trials": len(trials),
         "score_held": sum(held),
         **({} if area is None else {"score_auc": area}),
-        **{f"all_{kind}": n for kind, n in sorted(Counter(t.kind for t in trials).items())},
+        **{f"all_{name}": n for name, n in sorted(Counter(t.outcome for t in trials).items())},
     }
 
 

@@ -13,11 +13,13 @@ from clench.execution.pulling import hold_and_pull
 from clench.execution.scene import Scene, build_scene
 from clench.execution.simulation import nearest
 from clench.execution.trajectory import plan_trajectory
+from clench.grasp.contact_kinds import GraspKind
 from clench.grasp.depths import hand_depths
 from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
+from clench.solve.grasp_kinds import grasp_kind
 from clench.solve.posture import posture
 from clench.solve.solution import GraspSolution
 
@@ -49,12 +51,13 @@ class Trial:
     """Hold what came of a grasp.
 
     Args:
-        solution: the grasp. score: our own, see `GradedGrasp`.
+        solution: the grasp. grasp_kind: by the links that touch. score: our own, see `GradedGrasp`.
         simultaneous: a way is known on which all contacts are reached at once.
         measures: at the grasp's posture. report: at the settings asked for. harder: held under other ones, by name.
     """
 
     solution: GraspSolution
+    grasp_kind: GraspKind | None
     score: float
     simultaneous: bool
     measures: GraspMeasures
@@ -62,7 +65,7 @@ class Trial:
     harder: Mapping[str, HoldReport]
 
     @property
-    def kind(self) -> str:
+    def outcome(self) -> str:
         """What happened, for counting."""
         limits = self.report.settings.max_distance, self.report.settings.max_angle
         if self.report.held:
@@ -84,7 +87,8 @@ class Trial:
             "joint_angles": dict(self.solution.joint_angles),
             "open_angles": dict(self.solution.open_angles),
             "score": self.score,
-            "kind": self.kind,
+            "outcome": self.outcome,
+            "grasp_kind": self.grasp_kind,
             "simultaneous": self.simultaneous,
             "measures": asdict(self.measures),
             "hold": self.report.to_dict(),
@@ -103,6 +107,7 @@ def try_grasp(
     trajectory = plan_trajectory(solution, hand, obj=obj, force=True)
     return Trial(
         solution,
+        grasp_kind(solution, hand, obj),
         score,
         trajectory.pregrasp is not None,
         measure_grasp(solution, hand, obj),

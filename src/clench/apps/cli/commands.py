@@ -14,6 +14,7 @@ from .calibrating import calibrate
 from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
+from .objects import object_
 from .parsing import as_range
 from .plan_command import plan
 
@@ -296,6 +297,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "plan": plan,
     "batch": batch,
     "hand": hand,
+    "object": object_,
     "execute": execute,
     "export": export,
     "import": import_,

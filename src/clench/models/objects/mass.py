@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.models.mesh import TriangleMesh
+from clench.models.shapes import Shape, ShapeKind
 
 from .grasp_object import Body, BodyRole, GraspObject
 
@@ -37,7 +38,7 @@ def mass_properties(obj: GraspObject) -> MassProperties:
 
 @lru_cache(maxsize=8)
 def _of_bodies(bodies: tuple[Body, ...]) -> MassProperties:
-    solids = [_solid(shape.to_mesh(), body.closed) for body in bodies for shape in body.shapes]
+    solids = [_solid(shape, body.closed) for body in bodies for shape in body.shapes]
     volumes = np.array([volume for _, volume, _ in solids])
     centers = np.array([center for center, _, _ in solids])
     weights = volumes if volumes.sum() > 0.0 else np.ones(len(volumes))
@@ -47,9 +48,12 @@ def _of_bodies(bodies: tuple[Body, ...]) -> MassProperties:
     return MassProperties(center, float(volumes.sum()), length, all(body.closed for body in bodies))
 
 
-def _solid(mesh: TriangleMesh, closed: bool) -> tuple[FloatArray, float, FloatArray]:
-    """Return centroid, volume and used vertices of a mesh; of its convex hull where it does not close."""
+def _solid(shape: Shape, closed: bool) -> tuple[FloatArray, float, FloatArray]:
+    """Return centroid, volume and vertices of a shape; of its convex hull if it is a mesh that does not close."""
+    mesh = shape.to_mesh()
     vertices = mesh.vertices[np.unique(mesh.triangles)]
+    if shape.kind is not ShapeKind.MESH:
+        return shape.pose.position, _primitive_volume(shape), vertices
     middle = vertices.mean(axis=0)
     if closed:
         a, b, c = (mesh.vertices[mesh.triangles[:, k]] - middle for k in range(3))
@@ -58,6 +62,19 @@ def _solid(mesh: TriangleMesh, closed: bool) -> tuple[FloatArray, float, FloatAr
             moment = (volumes[:, None] * (a + b + c) / 4.0).sum(axis=0)
             return middle + moment / volumes.sum(), float(volumes.sum()), vertices
     return (*_hull_solid(vertices, middle), vertices)
+
+
+def _primitive_volume(shape: Shape) -> float:
+    a, b, c = shape.size
+    match shape.kind:
+        case ShapeKind.BOX:
+            return 8.0 * a * b * c
+        case ShapeKind.CYLINDER:
+            return 2.0 * math.pi * a * a * b
+        case ShapeKind.ELLIPSOID:
+            return 4.0 / 3.0 * math.pi * a * b * c
+        case _:  # a ball, or a capsule, whose core has the half length b
+            return 4.0 / 3.0 * math.pi * a**3 + (2.0 * math.pi * a * a * b if shape.kind is ShapeKind.CAPSULE else 0.0)
 
 
 def _hull_solid(vertices: FloatArray, middle: FloatArray) -> tuple[FloatArray, float]:
