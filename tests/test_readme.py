@@ -19,6 +19,8 @@ from clench.grasp.criterion_registry import criterion_names, find_criterion
 from clench.models.command_file import KEYS, command_from_dict
 from clench.models.hand.findings import FindingCode
 from clench.models.hand.hand_file import read_hand_file
+from clench.planner.options import PlanArguments
+from clench.planner.rejections import Rejection
 from clench.solve.causes import CauseCode
 from handmade import make_solution
 
@@ -32,7 +34,7 @@ def page(name: str) -> str:
 
 
 def test_the_ten_lines_run_and_their_number_is_right() -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    code, planning = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
     names: dict[str, Any] = {}
     exec(compile(code, "README.md", "exec"), names)
@@ -40,6 +42,20 @@ def test_the_ten_lines_run_and_their_number_is_right() -> None:
     said = re.search(r'"index_proximal": ([\d.]+)', code)
     assert said is not None
     assert names["solution"].joint_angles["index_proximal"] == pytest.approx(float(said[1]), abs=0.005)
+    exec(compile(planning, "README.md", "exec"), names)
+    assert len(names["plan"]) == 5
+
+
+def test_the_page_about_planning_runs_and_names_all_options_and_reasons(tmp_path: Path) -> None:
+    text = page("planning.md")
+    names: dict[str, Any] = {}
+    for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(compile(code.replace("clench_out", str(tmp_path)), "planning.md", "exec"), names)
+    assert names["plan"].proposed
+    options = set(PlanArguments.__annotations__) - {"torsion"}
+    assert options <= set(re.findall(r"`(\w+)=", text))
+    for reason in Rejection:
+        assert reason.value in text
 
 
 def test_the_driver_on_the_page_works_and_its_members_are_all() -> None:

@@ -16,9 +16,10 @@ import clench
 from clench.apps.cli import commands
 from clench.apps.cli.demo import MUG_POSE
 from clench.apps.cli.main import main
+from clench.base.defaults import MASS
 from clench.base.errors import CommandError
 from clench.execution.report import ExecutionReport, JointReached
-from clench.grasp import approach, sizes
+from clench.grasp import sizes
 from clench.kernels import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource
@@ -53,8 +54,8 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     monkeypatch.setitem(vars(clench), "Hand", loader)
     monkeypatch.setitem(vars(clench), "GraspObject", loader)
     monkeypatch.setitem(vars(clench), "solve", fake.solve)
-    poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
-    monkeypatch.setattr(approach, "drawn_poses", lambda *_: iter(poses))
+    planned = SimpleNamespace(command=GraspCommand(hand_pose=clench.Pose([0.0, 0.0, 0.1]), planes=1))
+    monkeypatch.setitem(vars(clench), "plan_grasps", lambda *_, **__: [planned])
     monkeypatch.setitem(vars(clench), "complete", lambda solution, *_, **__: solution)
     monkeypatch.setattr(sizes, "warn_of_size", lambda *_: None)
     # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
@@ -218,39 +219,51 @@ def test_solve_prints_a_table(
     assert "no closing joint can move" in out
 
 
-def test_solve_without_command_draws_an_approach_pose(solver: FakeSolver) -> None:
+def test_solve_without_command_plans_one_grasp(solver: FakeSolver, monkeypatch: pytest.MonkeyPatch) -> None:
+    planned, asked = clench.plan_grasps, list[object]()
+
+    def plan_grasps(hand: object, obj: object, count: int, **options: object) -> object:
+        asked.append((count, options))
+        return planned(hand, obj, count)
+
+    monkeypatch.setitem(vars(clench), "plan_grasps", plan_grasps)
     solver.answer = make_solution(status=SolutionStatus.GRASP)
-    main([*SOLVE, "--seed", "5", "--planes", "3", "--order", "proximal-first", "--scale", "0.001", "--palm", "p"])
+    arguments = ["--seed", "5", "--planes", "3", "--order", "proximal-first", "--scale", "0.001", "--palm", "p"]
+    main([*SOLVE, *arguments, "--friction", "0.4"])
     (command,) = solver.commands
-    assert command == GraspCommand(hand_pose=clench.Pose([0, 0, 0]), seed=5, planes=3)
+    assert command == GraspCommand(hand_pose=clench.Pose([0, 0, 0.1]), seed=5, planes=3)
+    assert asked == [(1, {"mass": MASS, "friction": 0.4, "seed": 5, "path": False})]
     assert solver.loaded[0] == ("pincer", {"hand_file": None, "palm": "p", "collision_source": None})
     assert solver.loaded[1] == ("ball", {"scale": 0.001})
 
 
-@pytest.mark.parametrize(
-    ("statuses", "taken"),
-    [
-        (("no_contact", "partial", "grasp"), 2),
-        (("blocked", "partial", "partial"), 1),
-        (("no_contact", "blocked", "no_contact"), 0),
-    ],
-)
-def test_solve_without_command_takes_the_first_pose_that_gives_a_grasp(
-    solver: FakeSolver,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    statuses: tuple[str, ...],
-    taken: int,
-) -> None:
-    def solve(hand: object, obj: object, command: GraspCommand) -> GraspSolution:
-        status = SolutionStatus(statuses[round(command.hand_pose.position[2] / 0.1)])
-        return replace(make_solution(status=status), hand_pose=command.hand_pose)
+def test_solve_without_command_says_why_there_is_no_grasp(capsys: pytest.CaptureFixture[str]) -> None:
+    few = ["solve", "--hand", "robonaut2", "--object", "sphere:r=0.001"]
+    assert main(few) == 1
+    assert "too few fingers touch" in capsys.readouterr().out
+    assert main([*few, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["grasps"] == []
 
-    monkeypatch.setitem(vars(clench), "solve", solve)
-    main([*SOLVE, "--json"])
+
+def test_plan_prints_a_table_writes_files_and_one_document(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    plan = ["plan", "--hand", "robonaut2", "--object", "ball", "--count", "2", "--effort", "16"]
+    assert main([*plan, "--out", str(tmp_path / "new")]) == 0
+    out = capsys.readouterr().out
+    assert "Found 2 of 2 grasps from 64 proposals." in out
+    solution = clench.GraspSolution.load(tmp_path / "new" / "grasp-01.json")
+    assert solution.is_valid()
+    assert (tmp_path / "new" / "grasp-02-trajectory.json").is_file()
+    written = json.loads((tmp_path / "new" / "plan.json").read_text())
+    assert main([*plan, "--json", "--without-path"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["status"] == statuses[taken]
-    assert clench.GraspSolution.from_dict(document).hand_pose.position[2] == pytest.approx(0.1 * taken)
+    assert [g["solution"]["joint_angles"] for g in document["grasps"]] == [
+        g["solution"]["joint_angles"] for g in written["grasps"]
+    ]
+    assert document["hand"] == "robonaut2"
+    assert document["seconds"]["total"] > 0.0
 
 
 def test_solve_with_a_command_file(solver: FakeSolver, tmp_path: Path) -> None:
@@ -480,7 +493,7 @@ def test_bench_is_handed_its_own_arguments(monkeypatch: pytest.MonkeyPatch) -> N
     assert seen == [["solve", "--poses", "3", "--json"]]
 
 
-def test_demo_takes_the_best_pose_and_leaves_files(
+def test_demo_plans_a_grasp_and_leaves_files(
     executed: Callable[[bool], list[object]],
     solver: FakeSolver,
     figures: None,
@@ -489,14 +502,7 @@ def test_demo_takes_the_best_pose_and_leaves_files(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     calls = executed(True)
-    answers = [
-        make_solution(status=SolutionStatus.BLOCKED),
-        make_solution(status=SolutionStatus.GRASP),
-        make_solution(status=SolutionStatus.PARTIAL),
-    ]
-    poses = [clench.Pose([0.0, 0.0, 0.1 * i]) for i in range(3)]
-    by_pose = dict(zip(map(str, poses), answers, strict=True))
-    monkeypatch.setitem(vars(clench), "solve", lambda hand, obj, command: by_pose[str(command.hand_pose)])
+    solver.answer = make_solution(status=SolutionStatus.GRASP)
     assert main(["demo", "--out", str(tmp_path / "out"), "--seed", "0", "--json"]) == 0
     captured = capsys.readouterr()
     solution = GraspSolution.from_dict(json.loads(captured.out))

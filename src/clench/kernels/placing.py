@@ -1,4 +1,4 @@
-"""Bring open hands up to an object along their palms' normals: where each one stops (docs/method.md section 10)."""
+"""Bring open hands up to an object along their palms' normals: where each one stops (docs/method.md section 9)."""
 
 from __future__ import annotations
 

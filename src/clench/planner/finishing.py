@@ -12,6 +12,7 @@ from clench.base.errors import MotionError
 from clench.base.pose import FloatArray, Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.grasp.mechanics.steadiness import epsilon
+from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solve.controller import solve
@@ -66,7 +67,7 @@ class Finisher:
         solution = replace(solution, squeeze=squeeze.to_dict(), pregrasp=pregrasp)
         return PlannedGrasp(
             solution=solution,
-            command=command,
+            command=replace(command, planes=GraspCommand.planes),
             preshape=self.closer.shapes[trial.arm.shape].name,
             kind=trial.kind,
             epsilon=found[-1],

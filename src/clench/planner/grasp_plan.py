@@ -80,13 +80,15 @@ class GraspPlan:
     """Grasps of an object, the best ones first, and what became of all proposals.
 
     Args:
-        grasps: see `PlannedGrasp`. asked: the options.
+        hand, object: their names. grasps: see `PlannedGrasp`. asked: the options.
         proposed: how many wrist poses were proposed. closed: at how many the hand was closed.
         force_closed: how many of these resist every wrench, by the bound of epsilon.
         rejected: how many proposals fell for each reason, by its name.
         times: seconds by stage.
     """
 
+    hand: str
+    object: str
     grasps: tuple[PlannedGrasp, ...]
     asked: PlanOptions
     proposed: int
@@ -123,11 +125,13 @@ class GraspPlan:
         """Return the JSON form, schema `clench.plan/1`."""
         return {
             "schema": "clench.plan/1",
+            "hand": self.hand,
+            "object": self.object,
             "text": self.text,
             "proposed": self.proposed,
             "closed": self.closed,
             "force_closed": self.force_closed,
             "rejected": dict(self.rejected),
-            "seconds": dict(self.times),
+            "seconds": {**self.times, "total": sum(self.times.values())},
             "grasps": [grasp.to_dict() for grasp in self.grasps],
         }

@@ -1,4 +1,4 @@
-"""Pairs of places on an object that oppose each other (docs/method.md section 10)."""
+"""Pairs of places on an object that oppose each other (docs/method.md section 9)."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from .search import GraspSearch
 
 
 def plan_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack[PlanArguments]) -> GraspPlan:
-    """Plan grasps of an object where it stands: no wrist pose and no preshape are needed (docs/method.md section 10).
+    """Plan grasps of an object where it stands: no wrist pose and no preshape are needed (docs/method.md section 9).
 
     The hand's pads face each other in some zones. The planner puts these zones on opposing places of the object,
     brings the open hand up along the palm's normal, closes it over the full width, and keeps the grasps whose contacts

@@ -1,4 +1,4 @@
-"""Propose where the palm goes: the zones of a hand on the opposing pairs of an object (docs/method.md section 10)."""
+"""Propose where the palm goes: the zones of a hand on the opposing pairs of an object (docs/method.md section 9)."""
 
 from __future__ import annotations
 

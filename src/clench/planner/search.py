@@ -1,4 +1,4 @@
-"""Search for grasps in rounds: propose, bring up, close, keep the best, finish what is returned (method section 10)."""
+"""Search for grasps in rounds: propose, bring up, close, keep the best, finish what is returned."""
 
 from __future__ import annotations
 
@@ -90,6 +90,8 @@ class GraspSearch:
     def plan(self) -> GraspPlan:
         """Return what was found so far, the best grasps first."""
         return GraspPlan(
+            hand=self.hand.name,
+            object=self.obj.name,
             grasps=tuple(sorted(self.found, key=lambda grasp: grasp.rank)),
             asked=self.asked,
             proposed=self.proposed,

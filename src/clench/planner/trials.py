@@ -1,4 +1,4 @@
-"""Close the hand at proposals, and tell what came of each of them (docs/method.md section 10)."""
+"""Close the hand at proposals, and tell what came of each of them (docs/method.md section 9)."""
 
 from __future__ import annotations
 

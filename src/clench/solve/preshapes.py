@@ -1,4 +1,4 @@
-"""The opposition zones of a hand: where, and how far apart, pads come to face each other (docs/method.md section 10).
+"""The opposition zones of a hand: where, and how far apart, pads come to face each other (docs/method.md section 9).
 
 A preshape fixes the posture joints and bends the outer joints. The first closing joint of every finger then closes. A
 zone is what two opposing sides of the hand are like on the way: the middle between their pads, the axis from one to the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -20,16 +20,12 @@ from .plan_command import plan
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
-    from clench.models.hand.hand import Hand
-    from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
+    from clench.planner.grasp_plan import GraspPlan
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
 Source = Literal["engine", "raw", "visual"]
 Order = Literal["proximal-first", "together", "fingertip"]
 Status = Literal["grasp", "partial", "no_contact", "blocked"]
-#: Approach poses that are tried where no command says where the hand is.
-APPROACHES = 16
 
 
 def demo(
@@ -46,7 +42,7 @@ def demo(
         out: folder for the files.
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        seed: try the approach poses of this seed instead of the kept pose of the built-in hand on the mug.
+        seed: plan a grasp from this seed instead of the kept pose of the built-in hand on the mug.
         json: print the solution as one JSON document, and nothing else, on standard output.
     """
     from .demo import run_demo
@@ -82,8 +78,7 @@ def solve(
     Args:
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        command: command file (JSON); without it the hand is placed at one of 16 approach poses of --seed, the first
-            that gives a grasp.
+        command: command file (JSON); without it clench plans one grasp, from --seed, as `clench plan` does.
         hand_file: TOML file that overrides what was found in the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
@@ -91,7 +86,7 @@ def solve(
         planes: curl planes per finger.
         order: in which the joints close; several are solved one by one, and the best is kept.
         criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
-        seed: of the approach poses; recorded with the result.
+        seed: of the planned grasp; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
         record: SQLite record to append the solution to.
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
@@ -107,7 +102,6 @@ def solve(
     from math import radians
 
     import clench
-    from clench.base.json_files import check_folder
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
     from clench.models.objects.loading import size_warnings
@@ -119,20 +113,22 @@ def solve(
 
     forces = forces or bool(mass or friction)
     carried, gripped = _checked_forces(mass, friction, criteria)
-    if out is not None:
-        check_folder(out)
-    if record is not None:
-        clench.Record.check(record)
+    _check_files(out, record)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     told = size_warnings(the_object) if warn_of_size(the_hand, the_object) else ()
-    given = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
+    given = None if command is None else read_command(command, the_hand)
     asked: dict[str, Any] = {} if planes is None else {"planes": planes}
     asked |= {} if criteria is None else {"criteria": criteria}
-    commands = (in_orders(replace(one, **asked), order or ()) for one in given)
     announce()
     warm_up()
-    the_command, solution = first_grasp(the_hand, the_object, commands)
+    if given is None:
+        plan = clench.plan_grasps(the_hand, the_object, 1, mass=carried, friction=gripped, seed=seed, path=False)
+        if not len(plan):
+            return _no_grasp(plan, json)
+        given = replace(plan[0].command, seed=seed)
+    the_command = in_orders(replace(given, **asked), order or ())
+    solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
     if json or forces or out is not None or record is not None:
@@ -144,8 +140,8 @@ def solve(
         files.append(record)
     error = None
     if pose_error is not None:
-        shift, turn = pose_error
-        error = clench.pose_error(the_hand, the_object, the_command, shift, radians(turn), solution=solution)
+        off = pose_error[0], radians(pose_error[1])
+        error = clench.pose_error(the_hand, the_object, the_command, *off, solution=solution)
     if json:
         more: dict[str, Any] = {} if error is None else {"pose_error": error.to_dict()}
         if explain:
@@ -161,6 +157,17 @@ def solve(
         if forces:
             print_forces(solution)
     return exit_code(solution, strict)
+
+
+def _check_files(out: Path | None, record: Path | None) -> None:
+    """Refuse a folder or a record that cannot be written, before anything is loaded."""
+    import clench
+    from clench.base.json_files import check_folder
+
+    if out is not None:
+        check_folder(out)
+    if record is not None:
+        clench.Record.check(record)
 
 
 def _checked_forces(mass: tuple[float, ...], friction: tuple[float, ...], criteria: str | None) -> tuple[Any, Any]:
@@ -307,31 +314,17 @@ COMMANDS: dict[str, Callable[..., int]] = {
 }
 
 
-def approaches(hand: Hand, obj: GraspObject, seed: int) -> Iterator[GraspCommand]:
-    """Return a command for each of the first approach poses of a seed, which are drawn one after another.
+def _no_grasp(plan: GraspPlan, json: bool) -> int:
+    """Say why planning found no grasp, and return the exit code for an answer that is no grasp."""
+    from .plan_table import print_plan
+    from .results import print_json
 
-    Raises:
-        ClenchError: see `clench.approach_poses`.
-    """
-    from itertools import islice
-
-    import clench
-    from clench.grasp.approach import drawn_poses
-
-    poses = islice(drawn_poses(hand, obj, seed, {}), APPROACHES)
-    return (clench.GraspCommand(hand_pose=pose, seed=seed) for pose in poses)
-
-
-def first_grasp(hand: Hand, obj: GraspObject, commands: Iterable[GraspCommand]) -> tuple[GraspCommand, GraspSolution]:
-    """Return the first command that gives a grasp, and its solution; without any, the first that touches most."""
-    import clench
-
-    tried: list[tuple[GraspCommand, GraspSolution]] = []
-    for command in commands:
-        tried.append((command, clench.solve(hand, obj, command)))
-        if tried[-1][1].status == "grasp":
-            return tried[-1]
-    return max(tried, key=lambda one: one[1].status == "partial")
+    document = plan.to_dict()
+    if json:
+        print_json(document)
+    else:
+        print_plan(document, plan.text)
+    return 1
 
 
 def in_orders(command: GraspCommand, names: Sequence[Order]) -> GraspCommand:

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clench.base.errors import CommandError
 from clench.base.pose import Pose
 from clench.models.command import GraspCommand
-from clench.solve.solution import FingerStatus, GraspSolution, SolutionStatus
 
 from .commands import loadable
 from .results import exit_code, print_json, write_results
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: Where the palm of the built-in hand holds the built-in mug: around its wall, away from the handle.
 MUG_POSE = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
-#: How many approach poses are tried for any other hand or object.
-TRIES = 24
 STEPS = 6
 
 
@@ -72,11 +70,14 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
 
 
 def choose_command(hand: Hand, obj: GraspObject, models: tuple[str, str], seed: int | None) -> GraspCommand:
-    """Return the command kept for the built-in hand and mug, else the best of a few approach poses.
+    """Return the command kept for the built-in hand and mug, else that of a planned grasp.
 
     Args:
         hand, obj: what is solved. models: what they were loaded from.
-        seed: of the approach poses; None keeps to the built-in pose where there is one.
+        seed: of the planned grasp; None keeps to the built-in pose where there is one.
+
+    Raises:
+        CommandError: no grasp was found.
     """
     import clench
 
@@ -84,14 +85,10 @@ def choose_command(hand: Hand, obj: GraspObject, models: tuple[str, str], seed: 
         command = GraspCommand(hand_pose=MUG_POSE)
         clench.solve(hand, obj, command)
         return command
-    commands = [GraspCommand(hand_pose=pose, seed=seed) for pose in clench.approach_poses(hand, obj, TRIES, seed or 0)]
-    return max(commands, key=lambda command: _merit(clench.solve(hand, obj, command)))
-
-
-def _merit(solution: GraspSolution) -> tuple[bool, bool, int, float]:
-    touching = sum(f.status is FingerStatus.TOUCH for f in solution.fingers.values())
-    grasp = solution.status is SolutionStatus.GRASP
-    return grasp, solution.is_valid(), touching, -(solution.max_penetration or 0.0)
+    plan = clench.plan_grasps(hand, obj, 1, seed=seed or 0, path=False)
+    if not len(plan):
+        raise CommandError(f"demo: {plan.text}")
+    return replace(plan[0].command, seed=seed)
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -42,7 +41,7 @@ def plan(
     seconds: float | None = None,
     seed: int = 0,
     threads: int | None = None,
-    no_path: bool = False,
+    without_path: bool = False,
     hold: bool = False,
     out: Path | None = None,
     json: bool = False,
@@ -72,7 +71,7 @@ def plan(
         seconds: no new proposals after this time.
         seed: the same seed gives the same grasps.
         threads: how many are used; all cores by default.
-        no_path: leave out the free paths, which take longest.
+        without_path: leave out the free paths, which take longest.
         hold: try every grasp in simulation: close on the free object, squeeze, pull in six directions (docs/hold.md).
         out: folder for plan.json, the solution and trajectory of every grasp, and a picture of all of them.
         json: print one JSON document on standard output.
@@ -105,7 +104,7 @@ def plan(
         "seconds": seconds,
         "seed": seed,
         "threads": threads,
-        "path": not no_path,
+        "path": not without_path,
     }
     given = {"mass": as_range(mass, "--mass"), "apart": apart, "effort": effort}
     asked |= {key: value for key, value in given.items() if value is not None}
@@ -120,11 +119,11 @@ def plan(
     warn_of_size(the_hand, the_object)
     announce()
     warm_up()
-    began = time.perf_counter()
     found = _searched(the_hand, the_object, count, asked)
-    seconds_taken = time.perf_counter() - began
     held = [_held(grasp, the_hand, the_object, asked["friction"]) for grasp in found] if hold else []
-    document = _document(found, held, the_hand, the_object, seconds_taken)
+    document = found.to_dict()
+    for entry, report in zip(document["grasps"], held, strict=False):
+        entry["hold"] = report.to_dict()
     files = [] if out is None else _write(found, document, out)
     if json:
         print_json(document)
@@ -157,13 +156,6 @@ def _held(grasp: PlannedGrasp, hand: Hand, obj: GraspObject, friction: Any) -> H
     lowest = FRICTION if friction is None else friction_range(friction)[0]
     way = grasp.trajectory or plan_trajectory(grasp.solution, hand, obj=obj, force=True)
     return hold_and_pull(grasp.solution, hand, obj, Hold(mass=grasp.squeeze.mass, friction=lowest), way)
-
-
-def _document(found: GraspPlan, held: list[HoldReport], hand: Hand, obj: GraspObject, seconds: float) -> dict[str, Any]:
-    document = found.to_dict() | {"hand": hand.name, "object": obj.name, "seconds": {**found.times, "total": seconds}}
-    for entry, report in zip(document["grasps"], held, strict=False):
-        entry["hold"] = report.to_dict()
-    return document
 
 
 def _write(found: GraspPlan, document: dict[str, Any], folder: Path) -> list[Path]:

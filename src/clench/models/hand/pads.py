@@ -1,4 +1,4 @@
-"""The pads of fingers: the side of each last link that a closing finger pushes with (docs/method.md section 10)."""
+"""The pads of fingers: the side of each last link that a closing finger pushes with (docs/method.md section 9)."""
 
 from __future__ import annotations
 
