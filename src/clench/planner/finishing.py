@@ -20,6 +20,7 @@ from clench.solve.holding import hold
 from clench.solve.solution import GraspSolution
 from clench.solve.squeezing import SqueezePlan, plan_squeeze
 
+from .confidence import shipped_table
 from .grasp_plan import PlannedGrasp
 from .options import PlanOptions
 from .rejections import Rejection
@@ -64,6 +65,7 @@ class Finisher:
         held = hold(solution, self.hand, self.obj, friction=self.asked.friction, **self._model).held
         friction: FloatArray = held.contacts.friction
         found = [epsilon(held.with_friction(share * friction)).radius for share in FRICTION_SHARES]
+        score = float(np.mean(found))
         solution = replace(solution, squeeze=squeeze.to_dict(), pregrasp=pregrasp)
         return PlannedGrasp(
             solution=solution,
@@ -71,8 +73,9 @@ class Finisher:
             preshape=self.closer.shapes[trial.arm.shape].name,
             kind=trial.kind,
             epsilon=found[-1],
-            score=float(np.mean(found)),
+            score=score,
             displaced=None if self.asked.sigma is None else trial.score,
+            confidence=shipped_table().confidence(score),
             squeeze=squeeze,
             trajectory=trajectory,
             number=trial.number,

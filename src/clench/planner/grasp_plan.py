@@ -27,6 +27,7 @@ class PlannedGrasp:
         epsilon: Ferrari–Canny ball at the lowest friction [N per N of normal force].
         score: mean of epsilon at the lowest friction and at half of it; grasps are sorted by it, unless displaced.
         displaced: mean of the bound of this score over displacements of the object; None without `pose_sigma`.
+        confidence: measured share of grasps with such a score that held in simulation, 0 to 1 (docs/planning.md).
         squeeze: forces, torques and offsets that hold the object.
         trajectory: the proven path from the open hand to the touch; None when it was not asked for.
         number: of the proposal that it came from.
@@ -39,6 +40,7 @@ class PlannedGrasp:
     epsilon: float
     score: float
     displaced: float | None
+    confidence: float
     squeeze: SqueezePlan
     trajectory: Trajectory | None
     number: int
@@ -70,6 +72,7 @@ class PlannedGrasp:
             "epsilon": self.epsilon,
             "score": self.score,
             "displaced": self.displaced,
+            "confidence": self.confidence,
             "proposal": self.number,
             "solution": self.solution.to_dict(),
         }

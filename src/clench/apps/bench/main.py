@@ -193,6 +193,43 @@ def scaling(
     return _print(bench_scaling(hand, object, scale, asked, plot, table), json)
 
 
+def confidence(
+    *,
+    hands: tuple[str, ...] = ("robonaut2",),
+    objects: tuple[str, ...] = ("mug", "bottle", "screwdriver", "ball"),
+    scale: float = 1.0,
+    proposals: int = 128,
+    grasps: int = 6,
+    mass: float = MASS,
+    friction: float = FRICTION,
+    seed: int = 0,
+    out: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Try planned grasps of all scores in simulation, and tabulate the share that holds: the confidence of a score.
+
+    Args:
+        hands: built-in names, or paths to .urdf or .xml files.
+        objects: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
+        scale: multiplies the objects' lengths, e.g. 0.001 for meshes in millimetres.
+        proposals: per hand and object.
+        grasps: tried of them, spread evenly over the scores.
+        mass: of the objects [kg].
+        friction: of all contacts.
+        seed: of the proposals.
+        out: file for the table (JSON), as `src/clench/planner/confidence.json`.
+        json: print one JSON document on standard output.
+    """
+    from clench.execution.hold import Hold
+
+    from .confidence_bench import ConfidenceBench, bench_confidence
+
+    _at_least(1, proposals=proposals, grasps=grasps)
+    _writable(out)
+    asked = ConfidenceBench(proposals, grasps, seed, Hold(mass=mass, friction=friction))
+    return _print(bench_confidence(hands, objects, scale, asked, out, not json), json)
+
+
 def choose(
     *,
     hand: str = "patent15",
@@ -293,6 +330,7 @@ def hold(
 
 
 BENCHMARKS: dict[str, Callable[..., int]] = {
+    "confidence": confidence,
     "solve": solve,
     "batch": batch,
     "choose": choose,

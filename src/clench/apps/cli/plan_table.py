@@ -11,7 +11,7 @@ from .tables import new_console, new_table, plain
 def print_plan(document: Mapping[str, Any], text: str) -> None:
     """Print planned grasps, the best ones first, and what became of the other proposals; see `clench plan --json`."""
     console = new_console()
-    columns = ["", "kind", "preshape", "palm at [mm]", "epsilon", "touching", "torque [Nm]"]
+    columns = ["", "kind", "preshape", "palm [mm]", "epsilon", "holds", "links", "torque [Nm]"]
     tried = any("hold" in grasp for grasp in document["grasps"])
     table = new_table(f"{document['hand']} on {document['object']}", *columns, *(["held"] if tried else []))
     for number, grasp in enumerate(document["grasps"], start=1):
@@ -19,7 +19,8 @@ def print_plan(document: Mapping[str, Any], text: str) -> None:
         place = " ".join(f"{1e3 * x:.0f}" for x in solution["hand_pose"]["position"])
         links = sorted({contact["link"] for contact in solution["contacts"] if not contact["passed"]})
         torque = max((abs(t) for t in solution["squeeze"]["torques"].values()), default=0.0)
-        row = [str(number), grasp["kind"], grasp["preshape"], place, f"{grasp['epsilon']:.3f}", f"{len(links)} links"]
+        row = [str(number), grasp["kind"], grasp["preshape"], place, f"{grasp['epsilon']:.3f}"]
+        row += [f"{100 * grasp['confidence']:.0f} %", str(len(links))]
         row += [f"{torque:.3f}", *(["yes" if grasp["hold"]["held"] else "no"] if tried else [])]
         table.add_row(*map(plain, row))
     console.print(table)
