@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
-LAYERS = ["base", "kernels", "models", "grasp", "solve", "execution", "apps"]
+LAYERS = ["base", "kernels", "models", "grasp", "solver", "execution", "apps"]
 HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -152,7 +152,7 @@ def test_names_say_something() -> None:
 
 
 def test_every_folder_is_a_layer() -> None:
-    folders = {p for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"}
+    folders = {p for p in PACKAGE.iterdir() if any(p.glob("**/*.py"))}
     expect_none(f"{shown(p)} is not a layer" for p in sorted(folders) if p.name not in LAYERS)
     modules = set(PACKAGE.glob("*.py"))
     assert PACKAGE / "__init__.py" in modules
@@ -162,9 +162,9 @@ def test_every_folder_is_a_layer() -> None:
 @pytest.mark.parametrize(
     "statement",
     [
-        "from clench.solve import solution",
-        "def f():\n    from clench.solve.solution import GraspSolution",
-        "from ..solve.solution import GraspSolution",
+        "from clench.solver import solution",
+        "def f():\n    from clench.solver.solution import GraspSolution",
+        "from ..solver.solution import GraspSolution",
         "import clench.apps.cli.main",
         "import clench",
         "from clench import solve",

@@ -19,7 +19,7 @@ from clench.grasp.criterion_registry import criterion_names, find_criterion
 from clench.models.command_file import KEYS, command_from_dict
 from clench.models.hand.findings import FindingCode
 from clench.models.hand.hand_file import read_hand_file
-from clench.solve.causes import CauseCode
+from clench.solver.causes import CauseCode
 from handmade import make_solution
 
 ROOT = Path(__file__).parents[1]

@@ -41,14 +41,14 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
     from clench.models.shapes import CollisionSource, ShapeKind
-    from clench.solve.batch import solve_batch, solve_stream
-    from clench.solve.controller import solve
-    from clench.solve.grasp_batch import BatchContacts, GraspBatch
-    from clench.solve.pose_error import PoseErrorReport, pose_error
-    from clench.solve.quality import GraspQuality, grasp_quality
-    from clench.solve.record import Record
-    from clench.solve.sensitivity import Sensitivity, sensitivity
-    from clench.solve.solution import (
+    from clench.solver.batch import solve_batch, solve_stream
+    from clench.solver.controller import solve
+    from clench.solver.grasp_batch import BatchContacts, GraspBatch
+    from clench.solver.pose_error import PoseErrorReport, pose_error
+    from clench.solver.quality import GraspQuality, grasp_quality
+    from clench.solver.record import Record
+    from clench.solver.sensitivity import Sensitivity, sensitivity
+    from clench.solver.solution import (
         Candidate,
         Contact,
         ContactKind,
@@ -57,25 +57,25 @@ if TYPE_CHECKING:
         GraspSolution,
         SolutionStatus,
     )
-    from clench.solve.squeezing import SqueezePlan, plan_squeeze
-    from clench.solve.tracking import Tracker
+    from clench.solver.squeezing import SqueezePlan, plan_squeeze
+    from clench.solver.tracking import Tracker
 
 __version__ = "0.1.0"
 
 # One documented path per name: the module that defines it. A test holds this equal to `__all__`.
 _HOMES = {
     "Actuator": "clench.execution.executing",
-    "BatchContacts": "clench.solve.grasp_batch",
+    "BatchContacts": "clench.solver.grasp_batch",
     "Body": "clench.models.objects.grasp_object",
     "BodyRole": "clench.models.objects.grasp_object",
     "Calibration": "clench.grasp.calibration",
-    "Candidate": "clench.solve.solution",
+    "Candidate": "clench.solver.solution",
     "ClenchError": "clench.base.errors",
     "ClosingOrder": "clench.models.command",
     "CollisionSource": "clench.models.shapes",
     "CommandError": "clench.base.errors",
-    "Contact": "clench.solve.solution",
-    "ContactKind": "clench.solve.solution",
+    "Contact": "clench.solver.solution",
+    "ContactKind": "clench.solver.solution",
     "Criterion": "clench.grasp.criteria",
     "DrivenHand": "clench.execution.driven_hand",
     "DriverError": "clench.execution.driver",
@@ -86,15 +86,15 @@ _HOMES = {
     "Film": "clench.execution.filming",
     "Finding": "clench.models.hand.findings",
     "FindingCode": "clench.models.hand.findings",
-    "FingerResult": "clench.solve.solution",
-    "FingerStatus": "clench.solve.solution",
-    "GraspBatch": "clench.solve.grasp_batch",
+    "FingerResult": "clench.solver.solution",
+    "FingerStatus": "clench.solver.solution",
+    "GraspBatch": "clench.solver.grasp_batch",
     "GraspCommand": "clench.models.command",
     "GraspFormat": "clench.execution.formats.exchange",
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspPosture": "clench.execution.formats.grasp_posture",
-    "GraspQuality": "clench.solve.quality",
-    "GraspSolution": "clench.solve.solution",
+    "GraspQuality": "clench.solver.quality",
+    "GraspSolution": "clench.solver.solution",
     "Hand": "clench.models.hand.hand",
     "HandCriterion": "clench.grasp.criteria",
     "HandDriver": "clench.execution.driver",
@@ -108,16 +108,16 @@ _HOMES = {
     "ObjectError": "clench.base.errors",
     "OrcaDriver": "clench.execution.drivers.orca",
     "Pose": "clench.base.pose",
-    "PoseErrorReport": "clench.solve.pose_error",
+    "PoseErrorReport": "clench.solver.pose_error",
     "ReadySignal": "clench.execution.ready_signal",
-    "Record": "clench.solve.record",
+    "Record": "clench.solver.record",
     "Ros2Driver": "clench.execution.drivers.ros2",
-    "Sensitivity": "clench.solve.sensitivity",
+    "Sensitivity": "clench.solver.sensitivity",
     "ShapeKind": "clench.models.shapes",
     "SimulatedHand": "clench.execution.simulation",
-    "SolutionStatus": "clench.solve.solution",
-    "SqueezePlan": "clench.solve.squeezing",
-    "Tracker": "clench.solve.tracking",
+    "SolutionStatus": "clench.solver.solution",
+    "SqueezePlan": "clench.solver.squeezing",
+    "Tracker": "clench.solver.tracking",
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
     "approach_poses": "clench.grasp.approach",
@@ -125,19 +125,20 @@ _HOMES = {
     "complete": "clench.execution.completing",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
-    "grasp_quality": "clench.solve.quality",
+    "grasp_quality": "clench.solver.quality",
     "import_grasps": "clench.execution.formats.exchange",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
     "plan_pregrasp": "clench.execution.pregrasp",
-    "plan_squeeze": "clench.solve.squeezing",
+    "plan_squeeze": "clench.solver.squeezing",
     "plan_trajectory": "clench.execution.trajectory",
-    "pose_error": "clench.solve.pose_error",
+    "pose_error": "clench.solver.pose_error",
     "register_criterion": "clench.grasp.criterion_registry",
-    "sensitivity": "clench.solve.sensitivity",
+    "sensitivity": "clench.solver.sensitivity",
     "set_object_cache": "clench.grasp.scene",
-    "solve_batch": "clench.solve.batch",
-    "solve_stream": "clench.solve.batch",
+    "solve": "clench.solver.controller",
+    "solve_batch": "clench.solver.batch",
+    "solve_stream": "clench.solver.batch",
     "write_log": "clench.execution.formats.mcap_log",
 }
 
@@ -223,9 +224,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name == "solve":
-        # The layer of this name is a package, which importing any of its modules binds here; it is callable.
-        return importlib.import_module("clench.solve")
     if name not in _HOMES:
         raise AttributeError(f"module 'clench' has no attribute {name!r}; it has: {', '.join(__all__)}")
     value = getattr(importlib.import_module(_HOMES[name]), name)

@@ -21,7 +21,7 @@ from clench.base.errors import FileError
 from clench.models.command import GraspCommand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.obstacles import table
-from clench.solve.solution import FingerStatus, GraspSolution
+from clench.solver.solution import FingerStatus, GraspSolution
 from handmade import make_candidate, make_contact
 
 

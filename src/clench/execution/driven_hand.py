@@ -12,8 +12,8 @@ from clench.base.errors import ClenchError, CommandError, UnknownNameError
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .command_check import CommandCheck, NotFollowingError, check_tensions, command_limits
 from .driven_report import Done, report_on

@@ -12,7 +12,7 @@ from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .report import ExecutionReport
 from .trajectory import Trajectory, plan_trajectory

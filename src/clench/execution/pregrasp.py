@@ -13,8 +13,8 @@ from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE
 from .step_check import placed_object

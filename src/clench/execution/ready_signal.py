@@ -13,8 +13,8 @@ from clench.base.errors import CommandError
 from clench.base.json_files import check_writable, write_json
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.record import Record
-from clench.solve.solution import GraspSolution
+from clench.solver.record import Record
+from clench.solver.solution import GraspSolution
 
 from .driver import DriverError
 from .report import ExecutionReport

@@ -9,7 +9,7 @@ from typing import Any
 
 from clench.base.json_files import write_json
 from clench.base.pose import FloatArray
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .history import CommandsSent, ExecutionHistory
 from .hold import HoldReport, ObjectMotion, Pulled

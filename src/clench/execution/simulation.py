@@ -12,8 +12,8 @@ import numpy as np
 from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import Contact, FingerStatus, GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import Contact, FingerStatus, GraspSolution
 
 from .blocking import simulated_blocker
 from .drives import Drive, check_drive, sentences

@@ -14,7 +14,7 @@ from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after

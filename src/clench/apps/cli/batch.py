@@ -67,9 +67,9 @@ def batch(
     import clench
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
-    from clench.solve.batch import CHUNK
-    from clench.solve.batch_parts import check_batch_file
-    from clench.solve.devices import CPU, why_not
+    from clench.solver.batch import CHUNK
+    from clench.solver.batch_parts import check_batch_file
+    from clench.solver.devices import CPU, why_not
 
     from .printing import print_batch, print_files
     from .results import print_json
@@ -127,7 +127,7 @@ def batch(
 @contextmanager
 def _going_on(out: Path | None) -> Iterator[None]:
     """Say where the parts are when a batch is interrupted."""
-    from clench.solve.batch_parts import parts_folder
+    from clench.solver.batch_parts import parts_folder
 
     try:
         yield

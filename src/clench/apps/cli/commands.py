@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
+    from clench.solver.solution import GraspSolution
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
 Source = Literal["engine", "raw", "visual"]
@@ -109,8 +109,8 @@ def solve(
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
     from clench.models.objects.loading import size_warnings
-    from clench.solve.orders import settled
-    from clench.solve.pareto import hand_front
+    from clench.solver.orders import settled
+    from clench.solver.pareto import hand_front
 
     from .printing import print_choice, print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results

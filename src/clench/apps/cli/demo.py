@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from clench.base.pose import Pose
 from clench.models.command import GraspCommand
-from clench.solve.solution import FingerStatus, GraspSolution, SolutionStatus
+from clench.solver.solution import FingerStatus, GraspSolution, SolutionStatus
 
 from .commands import loadable
 from .results import exit_code, print_json, write_results

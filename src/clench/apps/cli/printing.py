@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from clench.execution.hold import HoldReport
     from clench.execution.report import ExecutionReport, NextStepReached
     from clench.models.hand.report import HandReport
-    from clench.solve.pareto import HandSets
-    from clench.solve.pose_error import PoseErrorReport
-    from clench.solve.record import RecordEntry
-    from clench.solve.solution import Candidate, FingerResult, GraspSolution
+    from clench.solver.pareto import HandSets
+    from clench.solver.pose_error import PoseErrorReport
+    from clench.solver.record import RecordEntry
+    from clench.solver.solution import Candidate, FingerResult, GraspSolution
 
 #: Rows of a table that may be long.
 _MOST_ROWS = 10
@@ -201,7 +201,7 @@ def _print_steps(console: Console, steps: Sequence[NextStepReached]) -> None:
 
 def print_choice(solution: GraspSolution) -> None:
     """Print what counted, the sets of every finger, and the sentences; nothing where the solution does not say."""
-    from clench.solve.pareto import hand_front
+    from clench.solver.pareto import hand_front
 
     out, choice = _console(), solution.choice
     if choice is None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
+    from clench.solver.solution import GraspSolution
 
 
 def print_json(document: dict[str, Any]) -> None:

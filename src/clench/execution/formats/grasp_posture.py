@@ -11,7 +11,7 @@ from clench.base.pose import FloatArray, Pose, invert
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
-from clench.solve.posture import posture
+from clench.solver.posture import posture
 
 #: How files call the frame of the hand's own model file.
 BASE: Final = "world"

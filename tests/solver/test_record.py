@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from clench.base.errors import ClenchError, FileError, UnknownNameError
-from clench.solve.record import SCHEMA_VERSION, Record
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.record import SCHEMA_VERSION, Record
+from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_solution
 
 

@@ -13,9 +13,9 @@ import clench
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
 from clench.grasp import criterion_registry
-from clench.solve import alternatives, controller, packing
-from clench.solve.planning import planned
-from clench.solve.problem import make_problem
+from clench.solver import alternatives, controller, packing
+from clench.solver.planning import planned
+from clench.solver.problem import make_problem
 
 HANDS = {name: clench.Hand.load(name) for name in ("robonaut2", "patent15")}
 ASKED: dict[str, dict[str, Any]] = {

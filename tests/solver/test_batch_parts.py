@@ -9,8 +9,8 @@ import pytest
 import clench
 from clench.base.errors import FileError
 from clench.models.command import GraspCommand
-from clench.solve.batch_parts import parts_folder
-from clench.solve.batch_solver import BatchSolver
+from clench.solver.batch_parts import parts_folder
+from clench.solver.batch_solver import BatchSolver
 
 PLANES = GraspCommand(hand_pose=clench.Pose.identity(), planes=2)
 

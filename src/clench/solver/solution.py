@@ -128,7 +128,7 @@ class FingerResult(LateFields):
 
     Args:
         name: of the finger. status, reason: how it ended. chosen: index of the chosen candidate.
-        cause: why it does not touch: ``"code"`` (see `clench.solve.causes.CauseCode`), ``"text"`` and numbers;
+        cause: why it does not touch: ``"code"`` (see `clench.solver.causes.CauseCode`), ``"text"`` and numbers;
             None when it touches.
     """
 

@@ -10,8 +10,8 @@ import pytest
 
 import clench
 from clench.base.pose import Pose
-from clench.solve.pareto import hand_front
-from clench.solve.solution import FingerResult, FingerStatus, GraspSolution
+from clench.solver.pareto import hand_front
+from clench.solver.solution import FingerResult, FingerStatus, GraspSolution
 from handmade import make_candidate, make_solution
 
 CRITERIA = {

@@ -14,9 +14,9 @@ import pytest
 from clench.apps.cli.main import main
 from clench.base.errors import FileError, UnknownNameError
 from clench.grasp.calibration import Calibration, load_calibration
-from clench.solve import record as record_module
-from clench.solve.examples import SCHEMA, read_examples, recorded_outcomes, solve_scores
-from clench.solve.record import Record
+from clench.solver import record as record_module
+from clench.solver.examples import SCHEMA, read_examples, recorded_outcomes, solve_scores
+from clench.solver.record import Record
 from handmade import make_candidate, make_solution
 
 

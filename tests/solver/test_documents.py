@@ -17,7 +17,7 @@ from clench.base.errors import ClenchError, FileError
 from clench.base.json_files import write_atomically
 from clench.base.pose import Pose
 from clench.models.hand.extremes import LARGEST_ANGLE
-from clench.solve.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
+from clench.solver.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
 from handmade import make_candidate, make_contact, make_solution
 
 finite = st.floats(allow_nan=False, allow_infinity=False)

@@ -8,9 +8,9 @@ from chain_hands import HandBuilder, along_x, mount, three_links
 from clench.base.pose import Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import JointRole
-from clench.solve.alternatives import finger_sets
-from clench.solve.orders import best_order
-from clench.solve.problem import make_problem
+from clench.solver.alternatives import finger_sets
+from clench.solver.orders import best_order
+from clench.solver.problem import make_problem
 from handmade import make_solution
 
 RADIUS = 0.007

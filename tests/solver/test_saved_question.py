@@ -9,7 +9,7 @@ import pytest
 
 import clench
 from clench.base.errors import FileError
-from clench.solve.saved_question import SavedBatch
+from clench.solver.saved_question import SavedBatch
 
 
 def test_grasps_of_a_file_are_solved_again(tmp_path: Path) -> None:

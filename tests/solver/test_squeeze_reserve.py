@@ -15,8 +15,8 @@ from clench.grasp.mechanics.held import HeldObject
 from clench.grasp.mechanics.loads import GRAVITY
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import SqueezePlan, plan_squeeze
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import SqueezePlan, plan_squeeze
 
 Grip = tuple[Hand, GraspObject, GraspSolution]
 

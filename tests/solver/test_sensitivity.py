@@ -12,7 +12,7 @@ from chain_hands import HandBuilder, along_x, one_link, three_links
 from clench.base.pose import Pose
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import Shape, ShapeKind
-from clench.solve.pose_error import displaced
+from clench.solver.pose_error import displaced
 from oracle.width import make_case
 
 STEP = 1e-5
