@@ -6,7 +6,7 @@ import os
 import stat
 from pathlib import Path
 
-from .errors import FileError
+from .errors import CommandError, FileError
 
 
 def read_file(path: str | Path, most: int, missing: str = "no such file.") -> bytes:
@@ -45,7 +45,13 @@ def read_file(path: str | Path, most: int, missing: str = "no such file.") -> by
 
 
 def expanded(path: str | Path) -> Path:
-    """Return a path with the home folder in place of its `~`, where that is known."""
+    """Return a path with the home folder in place of its `~`, where that is known.
+
+    Raises:
+        CommandError: neither text nor a path.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise CommandError(f"path: expected text or a pathlib.Path, got {type(path).__name__}.")
     try:
         return Path(path).expanduser()
     except RuntimeError:

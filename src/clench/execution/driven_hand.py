@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import ClenchError, CommandError, UnknownNameError
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
@@ -79,6 +80,7 @@ class DrivenHand:
         squeeze: float = 1.0,
         stay_connected: bool = False,
     ) -> None:
+        check_type(hand, Hand, "hand")
         if not (np.isfinite(squeeze) and squeeze >= 0.0):
             raise CommandError(f"squeeze: expected a finite number of at least 0, got {squeeze!r}.")
         check_driver(driver)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -68,6 +69,8 @@ class SimulatedHand:
         film: Film | None = None,
         on_step: Callable[[float, FloatArray], None] | None = None,
     ) -> None:
+        check_type(hand, Hand, "hand")
+        check_type(obj, GraspObject, "obj")
         self._hand = hand
         self.obj = obj
         self.angle_tolerance = angle_tolerance

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, FileError
 from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
@@ -182,6 +183,10 @@ def plan_trajectory(
             joint's limits; or `speed`, `acceleration` or `clearance` is out of range.
         UnknownNameError: a next step of a joint that the hand does not have.
     """
+    check_type(solution, GraspSolution, "solution")
+    check_type(hand, Hand, "hand")
+    if obj is not None:
+        check_type(obj, GraspObject, "obj")
     if solution.rounds != 1:
         raise CommandError(
             f"rounds: expected a solution of 1 round, got {solution.rounds} (0 is until rest): of joints that were "

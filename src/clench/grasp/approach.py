@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, ObjectError
 from clench.base.memory import in_parts
 from clench.base.pose import FloatArray, Pose, invert, quaternion_from_rotation, rotation_about
@@ -50,6 +51,8 @@ def approach_poses(
         UnknownNameError: a joint of the preshape that does not exist.
         ObjectError: no graspable surface, or no free pose found.
     """
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     if count < 0:
         raise CommandError(f"approach poses: expected a count of 0 or more, got {count}.")
     return list(itertools.islice(drawn_poses(hand, obj, seed, {} if preshape is None else preshape), count))

@@ -9,26 +9,25 @@ from functools import partial
 from itertools import islice
 from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose
 from clench.base.pose_arrays import pose_rows
 from clench.grasp.closing import core_count
 from clench.models.command import GraspCommand
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
 
 from .batch_parts import BatchParts
 from .batch_progress import shown
 from .batch_solver import BatchSolver
 from .devices import CPU, why_not
 from .grasp_batch import GraspBatch, Question
-
-if TYPE_CHECKING:
-    from clench.models.hand.hand import Hand
-    from clench.models.objects.grasp_object import GraspObject
 
 #: Poses that are solved at a time: a few ten megabytes.
 CHUNK: Final = 1024
@@ -71,7 +70,7 @@ def solve_batch(
         CommandError: malformed poses or numbers, an unknown device, or see `clench.solve`. FileError: `out` cannot be
             written, or its parts are those of another batch; both are known before anything is solved.
     """
-    asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
+    asked = _asked(hand, obj, command)
     rows = pose_rows(hand_poses, "hand_poses")
     there = None if object_poses is None else pose_rows(object_poses, "object_poses")
     if there is not None and len(there) != len(rows):
@@ -120,11 +119,21 @@ def solve_stream(
     Raises:
         CommandError: malformed poses or numbers, or see `clench.solve`.
     """
-    asked = GraspCommand(hand_pose=Pose.identity()) if command is None else command
+    asked = _asked(hand, obj, command)
     count, size, device = _threads(threads), _whole(chunk, "chunk"), _usable(device)
     solver = BatchSolver(hand, obj, asked)
     solve = partial(solver.solve, threads=count, device=device)
     return _stream(solve, iter(hand_poses), None if object_poses is None else iter(object_poses), size)
+
+
+def _asked(hand: Hand, obj: GraspObject, command: GraspCommand | None) -> GraspCommand:
+    """Check the types of the inputs; return the command."""
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
+    if command is None:
+        return GraspCommand(hand_pose=Pose.identity())
+    check_type(command, GraspCommand, "command")
+    return command
 
 
 def _stream(

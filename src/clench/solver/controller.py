@@ -7,7 +7,9 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from clench.base.argument_types import check_type
 from clench.base.deferring import DeferredMapping, once
+from clench.base.pose import Pose
 from clench.grasp.calibration import Calibration, calibration_of
 from clench.grasp.candidates import FingerCandidate, combined_posture
 from clench.grasp.criteria import Setting
@@ -15,7 +17,7 @@ from clench.grasp.criterion_registry import score_sets
 from clench.grasp.exact import hand_bodies
 from clench.grasp.sequence import close_in_sequence
 from clench.grasp.simultaneous import close_together
-from clench.models.command import GraspCommand
+from clench.models.command import GraspCommand, as_command
 from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -36,12 +38,12 @@ if TYPE_CHECKING:
     from .record import Record
 
 
-def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record | None = None) -> GraspSolution:
+def solve(hand: Hand, obj: GraspObject, command: GraspCommand | Pose, *, record: Record | None = None) -> GraspSolution:
     """Close a hand around an object and return the best set of contacts and joint angles (docs/method.md).
 
     Args:
         hand: see `Hand.load`. obj: see `GraspObject.load`.
-        command: where the hand is, how it is preshaped, what is asked for.
+        command: where the hand is, how it is preshaped, what is asked for; or the pose of the palm, `T_world_palm`.
         record: a store that the solution is appended to.
 
     Raises:
@@ -49,6 +51,9 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand, *, record: Record
     """
     from clench.kernels.warming import announce
 
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
+    command = as_command(command)
     announce()
     if command.orders:
         check_command(hand, command)

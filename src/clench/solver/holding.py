@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose, checked_vector
 from clench.grasp.mechanics.contacts import (
     DEFAULT_TORSION,
@@ -86,6 +87,9 @@ def hold(
         CommandError: the solution is of another hand, friction not above 0, a malformed centre of mass.
         UnknownNameError: a contact's link is not in the hand.
     """
+    check_type(solution, GraspSolution, "solution")
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     lowest = friction_range(friction)[0] if isinstance(friction, tuple) else friction
     if lowest is not None:
         check_friction(lowest)

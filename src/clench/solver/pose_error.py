@@ -11,7 +11,7 @@ import numpy as np
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose, quaternion_from_rotation, rotation_about
-from clench.models.command import GraspCommand
+from clench.models.command import GraspCommand, as_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
@@ -98,7 +98,7 @@ class PoseErrorReport:
 def pose_error(
     hand: Hand,
     obj: GraspObject,
-    command: GraspCommand,
+    command: GraspCommand | Pose,
     translation: float = 0.002,
     rotation: float = 0.03490658503988659,
     *,
@@ -118,6 +118,7 @@ def pose_error(
     for key, value, most in (("translation", translation, np.inf), ("rotation", rotation, np.pi)):
         if not (np.isfinite(value) and 0.0 <= value <= most):
             raise CommandError(f"pose error: expected a {key} of 0 or more{_most(most)}, got {value}.")
+    command = as_command(command)
     solution = solve(hand, obj, command) if solution is None else solution
     command = settled(command, solution)
     at = np.array([solution.joint_angles[name] for name in hand.joint_names])

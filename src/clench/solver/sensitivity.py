@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.base.argument_types import check_type
 from clench.base.errors import ClenchError
 from clench.base.pose import FloatArray
 from clench.grasp.plan import closing_joints
@@ -93,6 +94,9 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
     Raises:
         ClenchError: another hand or object.
     """
+    check_type(solution, GraspSolution, "solution")
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     source = collision_source_named(solution.collision_source)
     packed = pack_object(obj)
     _check_same(solution, hand, packed, source)

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
-from clench.models.command import GraspCommand
+from clench.models.command import GraspCommand, as_command
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
 
 from .batch_solver import BatchSolver
 from .grasp_batch import GraspBatch
-
-if TYPE_CHECKING:
-    from clench.models.hand.hand import Hand
-    from clench.models.objects.grasp_object import GraspObject
 
 #: By how much another plane's weighted sum has to be better before a finger leaves the one it has [-].
 MARGIN: Final = 0.05
@@ -32,16 +31,20 @@ class Tracker:
 
     Args:
         hand, obj: as for `clench.solve`.
-        command: what is asked for, at the first pose; one open posture per finger and order `proximal-first`.
+        command: what is asked for, at the first pose, with one open posture per finger and order `proximal-first`; or
+            the first pose.
         margin: see above [-]; 0 chooses as `clench.solve` does.
 
     Raises:
         CommandError: a command with several postures or another order, and see `clench.solve`.
     """
 
-    def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand, *, margin: float = MARGIN) -> None:
+    def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand | Pose, *, margin: float = MARGIN) -> None:
         if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0.0 <= margin < math.inf:
             raise CommandError(f"margin: expected a finite number of at least 0, got {margin!r}.")
+        check_type(hand, Hand, "hand")
+        check_type(obj, GraspObject, "obj")
+        command = as_command(command)
         self._solver = BatchSolver(hand, obj, command)
         if self._solver.packed is None:
             raise CommandError(
@@ -63,8 +66,8 @@ class Tracker:
             CommandError: what is given is no pose.
         """
         for pose, key in ((hand_pose, "hand_pose"), (object_pose, "object_pose")):
-            if pose is not None and not isinstance(pose, Pose):
-                raise CommandError(f"{key}: expected a clench.Pose, got {type(pose).__name__}.")
+            if pose is not None:
+                check_type(pose, Pose, key)
         self._hand_pose = hand_pose or self._hand_pose
         self._object_pose = object_pose or self._object_pose
         answer = self._solver.solve_one(self._hand_pose, self._object_pose)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
+from clench.base.argument_types import check_type
 from clench.base.errors import ObjectError
 from clench.base.pose import Pose
 from clench.models.mesh import TriangleMesh
@@ -90,6 +91,7 @@ class GraspObject:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        check_type(self.pose, Pose, "pose")
         if not any(body.role is BodyRole.GRASPABLE for body in self.bodies):
             raise ObjectError(f"{self.name}: expected at least one graspable body, got obstacles only.")
 
