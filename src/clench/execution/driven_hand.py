@@ -11,6 +11,7 @@ import numpy as np
 from clench.base.argument_types import check_type
 from clench.base.errors import ClenchError, CommandError, UnknownNameError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.posture import posture
@@ -97,6 +98,10 @@ class DrivenHand:
         self.stay_connected = stay_connected
         self._last_report: ExecutionReport | None = None
         supervision_of(driver)
+
+    def __repr__(self) -> str:
+        obj = None if self.obj is None else self.obj.name
+        return described(self, hand=self.hand.name, driver=self.name, obj=obj)
 
     @property
     def hand(self) -> Hand:

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from clench.base.errors import CommandError
 from clench.base.json_files import check_writable, write_json
+from clench.base.short_repr import described
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.record import Record
@@ -59,6 +60,9 @@ class ReadySignal:
         self.record = Path(record)
         self.timeout = timeout
         self._channel = _channel(to)
+
+    def __repr__(self) -> str:
+        return described(self, hand=self.hand.name, record=self.record, timeout=self.timeout)
 
     @property
     def hand(self) -> Hand:

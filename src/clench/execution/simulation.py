@@ -11,6 +11,7 @@ import numpy as np
 
 from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import described
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.posture import posture
@@ -80,6 +81,9 @@ class SimulatedHand:
         self.drive = check_drive(drive)
         self.film = film
         self.on_step = on_step
+
+    def __repr__(self) -> str:
+        return described(self, hand=self.hand.name, obj=self.obj.name, hold=self.hold, drive=self.drive)
 
     @property
     def hand(self) -> Hand:

@@ -13,6 +13,7 @@ from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, FileError
 from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution
@@ -62,6 +63,18 @@ class Trajectory:
     acceleration: float = ACCELERATION
     turns: tuple[tuple[str, ...], ...] = ()
     open_bodies: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            hand=self.hand,
+            object=self.object,
+            joints=len(self.joints),
+            points=len(self.times),
+            duration=self.duration,
+            pregrasp=self.pregrasp,
+            next_steps=len(self.after),
+        )
 
     @property
     def touches_at_once(self) -> bool:

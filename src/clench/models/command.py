@@ -11,6 +11,7 @@ from typing import Any
 
 from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import short_repr
 
 from .hand.hand import Hand
 from .shapes import CollisionSource
@@ -81,6 +82,8 @@ class GraspCommand:
     next_steps: tuple[Mapping[str, float], ...] = ()
     task_wrenches: tuple[Mapping[str, tuple[float, ...]], ...] = ()
     seed: int | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         check_type(self.hand_pose, Pose, "hand_pose")

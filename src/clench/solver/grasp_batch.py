@@ -15,6 +15,7 @@ from clench.base.deferring import LateFields
 from clench.base.errors import CommandError
 from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import described, short_repr
 
 from .saved_question import question_arrays
 from .solution import FingerStatus, GraspSolution, SolutionStatus
@@ -62,6 +63,8 @@ class BatchContacts:
     normal: FloatArray
     gap: FloatArray
 
+    __repr__ = short_repr
+
     def __len__(self) -> int:
         return len(self.finger)
 
@@ -94,6 +97,8 @@ class Question:
     command: GraspCommand
     preshapes: dict[str, FloatArray]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class GraspBatch(LateFields):
@@ -124,6 +129,10 @@ class GraspBatch(LateFields):
     planes: NDArray[np.int16]
     contacts: BatchContacts
     one_by_one: NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        asked = self.question
+        return described(self, hand=asked.hand.name, object=asked.obj.name, poses=len(self), status=self.counts())
 
     def __len__(self) -> int:
         return len(self.status_codes)

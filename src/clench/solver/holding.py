@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose, checked_vector
+from clench.base.short_repr import short_repr
 from clench.grasp.mechanics.contacts import (
     DEFAULT_TORSION,
     ContactModel,
@@ -42,6 +43,8 @@ class HeldSolution:
     T_world_palm: Pose
     model: ContactModel
     center: FloatArray
+
+    __repr__ = short_repr
 
     def world_wrench(self, wrench: FloatArray) -> dict[str, list[float]]:
         """Return a wrench `(force, torque / length)` of the palm frame as force [N] and torque [Nm] in the world."""

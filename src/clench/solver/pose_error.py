@@ -11,6 +11,7 @@ import numpy as np
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose, quaternion_from_rotation, rotation_about
+from clench.base.short_repr import short_repr
 from clench.models.command import GraspCommand, as_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -37,6 +38,8 @@ class PoseErrorCorner:
     lost: tuple[str, ...]
     gained: tuple[str, ...]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PoseErrorReport:
@@ -55,6 +58,8 @@ class PoseErrorReport:
     touching: tuple[str, ...]
     predicted: FloatArray
     corners: tuple[PoseErrorCorner, ...]
+
+    __repr__ = short_repr
 
     @property
     def measured(self) -> FloatArray:

@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from clench.base.defaults import MASS
+from clench.base.short_repr import described
 from clench.grasp.mechanics.actuation import Actuation, Effort, actuation
 from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
 from clench.grasp.mechanics.loads import gravity_any_direction, mass_range
@@ -41,6 +42,17 @@ class GraspQuality:
     within_torques: Ball | None
     mass: float
     effort: Actuation
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            force_closure=self.force_closure,
+            epsilon=self.epsilon.radius,
+            volume=self.volume,
+            norm=self.norm,
+            mass=self.mass,
+            worst_torque=self.effort.worst_torque,
+        )
 
     @property
     def force_closure(self) -> bool:

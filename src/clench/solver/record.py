@@ -17,6 +17,7 @@ import msgspec
 from clench.base.errors import ClenchError, FileError, UnknownNameError
 from clench.base.file_limits import JSON_BYTES
 from clench.base.json_files import check_writable, parse_json
+from clench.base.short_repr import described
 
 from .documents import solution_from_dict, solution_to_json
 from .solution import FingerStatus, GraspSolution, SolutionStatus
@@ -114,6 +115,9 @@ class Record:
             except BaseException:
                 self._connection.close()
                 raise
+
+    def __repr__(self) -> str:
+        return described(self, path=self.path)
 
     @classmethod
     def check(cls, path: str | Path) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from clench.base.argument_types import check_type
 from clench.base.errors import ClenchError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 from clench.grasp.plan import closing_joints
 from clench.grasp.pose_change import PoseChange
 from clench.grasp.scene import PackedObject, hash_hand, pack_object
@@ -47,6 +48,8 @@ class Sensitivity:
     rotation: FloatArray
     stopped_by: Mapping[str, str]
     reasons: Mapping[str, str]
+
+    __repr__ = short_repr
 
     @property
     def matrix(self) -> FloatArray:

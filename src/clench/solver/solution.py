@@ -12,6 +12,7 @@ import numpy as np
 
 from clench.base.deferring import DeferredMapping, LateFields
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import described, short_repr
 
 
 class SolutionStatus(StrEnum):
@@ -84,6 +85,8 @@ class Contact:
     curve_angle: float | None
     link_angle: float | None
 
+    __repr__ = short_repr
+
     def _key(self) -> tuple[object, ...]:
         values = (getattr(self, f.name) for f in fields(self))
         return tuple(tuple(v.tolist()) if isinstance(v, np.ndarray) else v for v in values)
@@ -121,6 +124,8 @@ class Candidate:
     scores: Mapping[str, float]
     contacts: tuple[Contact, ...]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class FingerResult(LateFields):
@@ -138,6 +143,9 @@ class FingerResult(LateFields):
     chosen: int
     candidates: tuple[Candidate, ...]
     cause: Mapping[str, Any] | None = None
+
+    def __repr__(self) -> str:
+        return described(self, name=self.name, status=self.status, reason=self.reason, chosen=self.chosen)
 
     @classmethod
     def deferred(
@@ -216,6 +224,18 @@ class GraspSolution(LateFields):
     rounds: int = 1
     next_steps: tuple[Mapping[str, float], ...] = ()
     object_scale: float = field(default_factory=lambda: 1.0)
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            hand=self.hand,
+            object=self.object,
+            status=self.status,
+            certified=self.certified,
+            fingers={name: finger.status.value for name, finger in self.fingers.items()},
+            contacts=len(self.contacts),
+            hand_pose=self.hand_pose,
+        )
 
     @classmethod
     def deferred(cls, make: Callable[[], GraspSolution], **known: Any) -> GraspSolution:

@@ -18,6 +18,7 @@ from clench.base.defaults import (
     MOST_FORCE_PER_WEIGHT,
 )
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described
 from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
 from clench.grasp.mechanics.loads import (
     GRAVITY,
@@ -71,6 +72,11 @@ class SqueezePlan:
     found: SqueezeForces
     lightest: float
     any_direction: bool
+
+    def __repr__(self) -> str:
+        return described(
+            self, feasible=self.feasible, text=self.text, mass=self.mass, margin=self.margin, torques=self.torques
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, `squeeze` in schema `clench.solution/1`."""

@@ -10,6 +10,7 @@ import numpy as np
 from clench.base.argument_types import check_type
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
+from clench.base.short_repr import described
 from clench.models.command import GraspCommand, as_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -55,6 +56,9 @@ class Tracker:
         self._margin = margin
         self._hand_pose = command.hand_pose
         self._object_pose = obj.pose if command.object_pose is None else command.object_pose
+
+    def __repr__(self) -> str:
+        return described(self, hand_pose=self._hand_pose, object_pose=self._object_pose, margin=self._margin)
 
     def update(self, *, hand_pose: Pose | None = None, object_pose: Pose | None = None) -> GraspBatch:
         """Return the answer for new poses, as a batch of one; a pose that is not given is the one before.

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.base.short_repr import short_repr
 from clench.execution.hold import Hold
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -56,6 +57,8 @@ class ExportReport:
     files: tuple[Path, ...]
     confidences: tuple[float, ...]
     notes: tuple[str, ...]
+
+    __repr__ = short_repr
 
 
 def export_grasps(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described, short_repr
 from clench.models.shapes import CollisionSource, Shape
 
 from .findings import Finding, Severity
@@ -78,6 +79,8 @@ class Joint:
     open_value: float = 0.0
     open_reason: str = ""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Link:
@@ -103,6 +106,8 @@ class Link:
     pad_indentation: float = 0.0
     friction: float | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Coupling:
@@ -121,6 +126,8 @@ class Coupling:
     offset: float
     breakaway: bool = False
     reason: str = ""
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -141,6 +148,8 @@ class Finger:
     joints: tuple[int, ...]
     is_thumb: bool
     tip_link: int
+
+    __repr__ = short_repr
 
     @cached_property
     def own(self) -> NDArray[np.intp]:
@@ -189,6 +198,16 @@ class Hand:
     findings: tuple[Finding, ...] = ()
     spec_xml: str = ""
     assets: Mapping[str, bytes] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            name=self.name,
+            fingers=[finger.name for finger in self.fingers],
+            joints=len(self.joints),
+            links=len(self.links),
+            palm=self.links[self.palm].name,
+        )
 
     @classmethod
     def load(
