@@ -51,8 +51,6 @@ def approach_poses(
         UnknownNameError: a joint of the preshape that does not exist.
         ObjectError: no graspable surface, or no free pose found.
     """
-    check_type(hand, Hand, "hand")
-    check_type(obj, GraspObject, "obj")
     if count < 0:
         raise CommandError(f"approach poses: expected a count of 0 or more, got {count}.")
     return list(itertools.islice(drawn_poses(hand, obj, seed, {} if preshape is None else preshape), count))
@@ -60,6 +58,8 @@ def approach_poses(
 
 def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, float]) -> Iterator[Pose]:
     """Draw the poses of `approach_poses` one after another, without end; arguments and errors as there."""
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     if seed < 0:
         raise CommandError(f"approach poses: expected a seed of 0 or more, got {seed}.")
     q = _open_posture(hand, preshape)

@@ -112,7 +112,8 @@ def solve(
     from clench.solver.orders import settled
     from clench.solver.pareto import hand_front
 
-    from .printing import print_choice, print_forces, print_pose_error, print_solution
+    from .choice_tables import print_choice
+    from .printing import print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
     forces = forces or bool(mass or friction)

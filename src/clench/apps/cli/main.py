@@ -6,7 +6,9 @@ execution; 2 = bad input; 70 = a mistake in this program.
 
 from __future__ import annotations
 
+import functools
 import gc
+import json
 import os
 import sys
 import warnings
@@ -26,7 +28,8 @@ EXIT_INTERRUPTED = 130
 DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
 
 Exit codes: 0 = grasp or partial, and executed where asked (--strict: grasp only); 1 = any other answer, or a failed
-execution; 2 = bad input. Every command takes --json (one document on standard output) and --debug (tracebacks)."""
+execution; 2 = bad input. Every command takes --json (one document on standard output, for an error {"error": "..."})
+and --debug (tracebacks)."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -38,6 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in arguments
     arguments = [a for a in arguments if a != "--debug"]
+    say = functools.partial(_say, as_json="--json" in arguments)
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _warn
@@ -45,9 +49,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ClenchError as error:
         if debug:
             raise
-        return _say(str(error), EXIT_BAD_INPUT)
+        return say(str(error), EXIT_BAD_INPUT)
     except KeyboardInterrupt:
-        return _say("interrupted.", EXIT_INTERRUPTED)
+        return say("interrupted.", EXIT_INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has seen enough (`clench hand H | head`); what is buffered has nowhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -56,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if debug:
             raise
         what = " ".join(f"{type(error).__name__}: {error}".split())
-        return _say(f"internal error ({what}); run again with --debug to see where.", EXIT_INTERNAL)
+        return say(f"internal error ({what}); run again with --debug to see where.", EXIT_INTERNAL)
 
 
 def _run(arguments: list[str]) -> int:
@@ -90,6 +94,10 @@ def _warn(message: Warning | str, category: type[Warning], *where: Any, **more: 
     sys.stderr.write(f"clench: warning: {message}\n")
 
 
-def _say(sentence: str, code: int) -> int:
+def _say(sentence: str, code: int, *, as_json: bool) -> int:
+    """Say what went wrong on standard error, and as a document on standard output for a program that reads one."""
+    if as_json:
+        sys.stdout.write(json.dumps({"error": sentence}) + "\n")
+        sys.stdout.flush()
     sys.stderr.write(f"clench: error: {sentence}\n")
     return code

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import io
+import itertools
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from clench.base.errors import CommandError
 
 EXIT_BAD_INPUT = 2
+#: Lines of a box that are indented so far are the help of an option.
+_HELP_INDENT = 8
 
 
 def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, float] | None:
@@ -27,6 +33,9 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     Args:
         program: what the usage line starts with. command: what is called with the options it names.
         arguments: those after the program's name.
+
+    Raises:
+        CommandError: a wrong argument beside `--json`; without it, a box on standard error says what is wrong.
     """
     import tyro
 
@@ -35,13 +44,30 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
         # Deferred, so that the command's own errors are not taken for wrong arguments.
         return functools.partial(command, *values, **options)
 
+    box = io.StringIO()
     try:
-        return tyro.cli(
-            call,
-            prog=program,
-            args=list(arguments),
-            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
-        )
+        with contextlib.redirect_stderr(box) if "--json" in arguments else contextlib.nullcontext():
+            return tyro.cli(call, prog=program, args=list(arguments), config=options_style())
     except SystemExit as finished:
         code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
+        if code and "--json" in arguments:
+            raise CommandError(f"{program}: {_sentence(box.getvalue())}") from None
         return lambda: code
+
+
+def options_style() -> tuple[Any, ...]:
+    """Return how signatures become options: no `--no-x` for a flag, and no text that stands for None."""
+    import tyro
+
+    return tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone
+
+
+def _sentence(box: str) -> str:
+    """Return what a box of text says first, on one line, without its title and the help of options."""
+    lines = [line.strip("│").rstrip() for line in box.splitlines() if not line.startswith(("╭", "╰"))]
+    rules = [i for i, line in enumerate(lines) if line and set(line.strip()) <= set("─-")]
+    # Where boxes are drawn with letters alone, the title is a line above the first rule.
+    start = 0 if box.startswith("╭") or not rules else rules[0] + 1
+    first = itertools.takewhile(lambda line: line and not set(line.strip()) <= set("─-"), lines[start:])
+    text = " ".join(line.strip() for line in first if not line.startswith(" " * _HELP_INDENT))
+    return (text or "expected other arguments, see --help").rstrip(".") + "."
