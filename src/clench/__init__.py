@@ -9,9 +9,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from clench.apps.figures import draw_solution
     from clench.base.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
     from clench.base.pose import Pose
     from clench.execution.completing import complete
+    from clench.execution.convex_pieces import in_pieces
     from clench.execution.driven_hand import DrivenHand
     from clench.execution.driver import DriverError, DriverLimits, HandDriver, HandState, JointPath
     from clench.execution.drivers.orca import OrcaDriver
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from clench.models.hand.findings import Finding, FindingCode
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+    from clench.models.objects.obstacles import obstacle, table
     from clench.models.shapes import CollisionSource, ShapeKind
     from clench.solver.batch import solve_batch, solve_stream
     from clench.solver.controller import solve
@@ -123,12 +126,15 @@ _HOMES = {
     "approach_poses": "clench.grasp.approach",
     "check_hand": "clench.grasp.self_check",
     "complete": "clench.execution.completing",
+    "draw_solution": "clench.apps.figures",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
     "grasp_quality": "clench.solver.quality",
     "import_grasps": "clench.execution.formats.exchange",
+    "in_pieces": "clench.execution.convex_pieces",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
+    "obstacle": "clench.models.objects.obstacles",
     "plan_pregrasp": "clench.execution.pregrasp",
     "plan_squeeze": "clench.solver.squeezing",
     "plan_trajectory": "clench.execution.trajectory",
@@ -139,6 +145,7 @@ _HOMES = {
     "solve": "clench.solver.controller",
     "solve_batch": "clench.solver.batch",
     "solve_stream": "clench.solver.batch",
+    "table": "clench.models.objects.obstacles",
     "write_log": "clench.execution.formats.mcap_log",
 }
 
@@ -203,12 +210,15 @@ __all__ = [
     "approach_poses",
     "check_hand",
     "complete",
+    "draw_solution",
     "execute",
     "export_grasps",
     "grasp_quality",
     "import_grasps",
+    "in_pieces",
     "load_calibration",
     "load_command",
+    "obstacle",
     "plan_pregrasp",
     "plan_squeeze",
     "plan_trajectory",
@@ -219,6 +229,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "solve_stream",
+    "table",
     "write_log",
 ]
 

@@ -72,3 +72,17 @@ def read_text(path: str | Path, most: int, missing: str = "no such file.") -> st
 
 def _too_large(size: int, most: int) -> str:
     return f"is too large: it has {size / 2**20:.4g} MB; expected up to {most / 2**20:.4g} MB (docs/security.md)."
+
+
+def make_folder(path: str | Path) -> Path:
+    """Make a folder, with those above it, where it is not there; return its path.
+
+    Raises:
+        FileError: it cannot be made. CommandError: neither text nor a path.
+    """
+    folder = expanded(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(path, f"cannot be made a folder ({error.strerror or error}).") from None
+    return folder

@@ -15,6 +15,7 @@ from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
 from .parsing import as_range
+from .scene_options import with_scene
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
@@ -60,6 +61,8 @@ def solve(
     hand_file: Path | None = None,
     palm: str | None = None,
     scale: float = 1.0,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
     collision_source: Source | None = None,
     planes: int | None = None,
     order: tuple[Order, ...] = (),
@@ -85,6 +88,9 @@ def solve(
         hand_file: TOML file that overrides what was found in the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
+        obstacle: mesh or shape that stands in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be
+            given several times.
         collision_source: geometry of the hand to solve for.
         planes: curl planes per finger.
         order: in which the joints close; several are solved one by one, and the best is kept.
@@ -125,9 +131,10 @@ def solve(
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     told = size_warnings(the_object) if warn_of_size(the_hand, the_object) else ()
-    given = approaches(the_hand, the_object, seed) if command is None else [read_command(command, the_hand)]
-    asked: dict[str, Any] = {} if planes is None else {"planes": planes}
-    asked |= {} if criteria is None else {"criteria": criteria}
+    read = None if command is None else read_command(command, the_hand)
+    the_object = with_scene(the_object, None if read is None else read.object_pose, table, obstacle)
+    given = approaches(the_hand, the_object, seed) if read is None else [read]
+    asked: dict[str, Any] = {k: v for k, v in (("planes", planes), ("criteria", criteria)) if v is not None}
     commands = (in_orders(replace(one, **asked), order or ()) for one in given)
     announce()
     warm_up()

@@ -7,11 +7,13 @@ import functools
 import io
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Final
 
 from clench.base.errors import CommandError
 
 EXIT_BAD_INPUT = 2
+#: The option that may be given several times, as well as once with several values.
+_REPEATED: Final = "--obstacle"
 #: Lines of a box that are indented so far are the help of an option.
 _HELP_INDENT = 8
 
@@ -47,12 +49,28 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     box = io.StringIO()
     try:
         with contextlib.redirect_stderr(box) if "--json" in arguments else contextlib.nullcontext():
-            return tyro.cli(call, prog=program, args=list(arguments), config=options_style())
+            return tyro.cli(call, prog=program, args=_gathered(arguments), config=options_style())
     except SystemExit as finished:
         code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
         if code and "--json" in arguments:
             raise CommandError(f"{program}: {_sentence(box.getvalue())}") from None
         return lambda: code
+
+
+def _gathered(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with the values of a repeated option behind one of it."""
+    others: list[str] = []
+    values: list[str] = []
+    into = others
+    for argument in arguments:
+        if argument == _REPEATED:
+            into = values
+        elif argument.startswith(f"{_REPEATED}="):
+            values.append(argument.partition("=")[2])
+        else:
+            into = others if argument.startswith("--") else into
+            into.append(argument)
+    return [*others, _REPEATED, *values] if values or _REPEATED in arguments else others
 
 
 def options_style() -> tuple[Any, ...]:
