@@ -235,6 +235,21 @@ class Hand:
 
         return load_hand(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
 
+    def mirrored(self) -> Hand:
+        """Return the mirror image of the hand, e.g. a left hand from the model of a right one.
+
+        Every frame is mirrored at its own plane y = 0. Names, joint angles, limits, couplings and tendons stay the
+        same; the hand's name gets the suffix ``_mirrored``. A mirrored object and a mirrored pose (position
+        ``[x, -y, z]``, quaternion ``[w, -x, y, -z]``) give the same joint angles. The model for simulation is mirrored,
+        too, with six digits. A mirrored hand has no file: commands that load a hand by its name cannot load it.
+
+        Raises:
+            HandError: MuJoCo cannot compile the mirror image of the model.
+        """
+        from .mirroring import mirrored_hand
+
+        return mirrored_hand(self)
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about what looks wrong: the findings that are more than notes."""
