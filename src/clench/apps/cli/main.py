@@ -18,7 +18,7 @@ from typing import Any
 from clench import __version__
 from clench.base.errors import ClenchError, UnknownNameError
 
-from .parsing import EXIT_BAD_INPUT, parse_call
+from .parsing import EXIT_BAD_INPUT, PRINT_COMPLETION, parse_call, print_completion
 
 EXIT_INTERNAL = 70
 #: So many new objects start the first collection, and so many collections the next wider one.
@@ -29,7 +29,7 @@ DESCRIPTION = """Close a robot hand around a known object, in closed form, and c
 
 Exit codes: 0 = grasp or partial, and executed where asked (--strict: grasp only); 1 = any other answer, or a failed
 execution; 2 = bad input. Every command takes --json (one document on standard output, for an error {"error": "..."})
-and --debug (tracebacks)."""
+and --debug (tracebacks). clench --tyro-print-completion SHELL prints the completion for bash or zsh."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -75,6 +75,8 @@ def _run(arguments: list[str]) -> int:
     if name in ("-h", "--help"):
         sys.stdout.write(_overview(COMMANDS))
         return 0
+    if name == PRINT_COMPLETION:
+        return print_completion("clench", COMMANDS, arguments)
     if name not in COMMANDS:
         raise UnknownNameError("command", name, "clench", COMMANDS)
     if name == "bench" and not {"-h", "--help"} & set(rest[:1]):

@@ -6,12 +6,17 @@ import contextlib
 import functools
 import io
 import itertools
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from types import FunctionType
 from typing import Any, Final
 
 from clench.base.errors import CommandError
 
 EXIT_BAD_INPUT = 2
+#: The option that prints what a shell needs to complete commands, and the shells that are known.
+PRINT_COMPLETION: Final = "--tyro-print-completion"
+SHELLS: Final = ("bash", "zsh")
 #: The option that may be given several times, as well as once with several values.
 _REPEATED: Final = "--obstacle"
 #: Lines of a box that are indented so far are the help of an option.
@@ -55,6 +60,39 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
         if code and "--json" in arguments:
             raise CommandError(f"{program}: {_sentence(box.getvalue())}") from None
         return lambda: code
+
+
+def print_completion(program: str, commands: Mapping[str, Callable[..., int]], arguments: Sequence[str]) -> int:
+    """Print what a shell needs to complete commands and options; return the exit code.
+
+    Args:
+        program: what is completed. commands: by name. arguments: the option with the name of a shell.
+
+    Raises:
+        CommandError: a shell that is not known.
+    """
+    import tyro
+
+    if list(arguments[1:]) not in [[shell] for shell in SHELLS]:
+        given = " ".join(arguments[1:]) or "nothing"
+        raise CommandError(f"{arguments[0]}: expected a shell, one of {', '.join(SHELLS)}, got {given}.")
+    told = {name: _in_single_lines(command) for name, command in commands.items()}
+    try:
+        tyro.extras.subcommand_cli_from_dict(
+            told, prog=program, args=[PRINT_COMPLETION, arguments[1]], config=options_style()
+        )
+    except SystemExit as finished:
+        return finished.code if isinstance(finished.code, int) else 0
+    return 0
+
+
+def _in_single_lines(command: Callable[..., int]) -> Callable[..., int]:
+    """Return a command whose help has every option on one line: bash takes further lines for words to choose from."""
+    assert isinstance(command, FunctionType)
+    copied = FunctionType(command.__code__, command.__globals__, command.__name__, command.__defaults__)
+    copied.__kwdefaults__, copied.__annotations__ = command.__kwdefaults__, command.__annotations__
+    copied.__doc__ = re.sub(r"\n {12,}", " ", command.__doc__ or "")
+    return copied
 
 
 def _gathered(arguments: Sequence[str]) -> list[str]:
