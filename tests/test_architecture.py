@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.metadata
 import re
 import subprocess
 import sys
@@ -12,6 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import pytest
+
+import clench
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
@@ -323,6 +326,18 @@ def test_import_is_light_and_quick() -> None:
     assert min(float(t) for t in times) <= 0.3
 
 
+def test_a_solve_loads_only_what_it_needs() -> None:
+    # Convex pieces, cone programs, mesh files, pictures and tables have packages of their own, which take their time.
+    program = (
+        "import sys, clench as c; solve = c.solve; before = sorted({'numba', 'mujoco'} & set(sys.modules)); "
+        "solve(c.Hand.load('robonaut2'), c.GraspObject.load('mug'), c.Pose([0, 0, 0.1])); "
+        "heavy = {'matplotlib', 'coacd', 'clarabel', 'trimesh', 'rich', 'tyro', 'PIL'}; "
+        "print(before, sorted(heavy & set(sys.modules)))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[] []"
+
+
 def test_the_types_load_without_heavy_packages() -> None:
     program = (
         "import sys, clench as c; c.Hand, c.GraspObject, c.GraspCommand, c.GraspSolution, c.Record; "
@@ -332,8 +347,9 @@ def test_the_types_load_without_heavy_packages() -> None:
     assert run.stdout.strip() == "[]"
 
 
-def test_version_is_the_packaged_one() -> None:
-    import clench
-
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert clench.__version__ == project["version"]
+def test_the_version_is_written_once() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "version" not in project["project"]
+    assert project["project"]["dynamic"] == ["version"]
+    assert project["tool"]["hatch"]["version"] == {"path": "src/clench/__init__.py"}
+    assert importlib.metadata.version("clench") == clench.__version__
