@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from clench.base.errors import FileError
@@ -19,6 +20,7 @@ from .actuators import (
     stop_of,
 )
 from .interrupts import stopped_by_signals
+from .parsing import EXIT_INTERRUPTED
 from .scene_options import with_scene
 
 
@@ -139,7 +141,9 @@ def execute(
     else:
         print_report(report)
     if interrupted:
-        raise KeyboardInterrupt
+        # The report is the one document on standard output.
+        sys.stderr.write("clench: error: interrupted.\n")
+        return EXIT_INTERRUPTED
     return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
 
 

@@ -18,12 +18,11 @@ from typing import Any
 from clench import __version__
 from clench.base.errors import ClenchError, UnknownNameError
 
-from .parsing import EXIT_BAD_INPUT, PRINT_COMPLETION, parse_call, print_completion
+from .parsing import EXIT_BAD_INPUT, EXIT_INTERRUPTED, PRINT_COMPLETION, parse_call, print_completion
 
 EXIT_INTERNAL = 70
 #: So many new objects start the first collection, and so many collections the next wider one.
 GARBAGE_THRESHOLDS = (50_000, 20, 100)
-EXIT_INTERRUPTED = 130
 
 DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
 

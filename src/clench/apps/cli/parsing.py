@@ -14,6 +14,7 @@ from typing import Any, Final
 from clench.base.errors import CommandError
 
 EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
 #: The option that prints what a shell needs to complete commands, and the shells that are known.
 PRINT_COMPLETION: Final = "--tyro-print-completion"
 SHELLS: Final = ("bash", "zsh")
