@@ -4,12 +4,11 @@ import sys
 from pathlib import Path
 
 import clench
-from clench.models.objects.obstacles import table
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "clench_out")
 folder.mkdir(parents=True, exist_ok=True)
 hand = clench.Hand.load("robonaut2")
-scene = clench.GraspObject.load("mug").with_body(table(height=0.0))
+scene = clench.GraspObject.load("mug").with_body(clench.table(height=0.0))
 
 command = clench.GraspCommand(hand_pose=clench.Pose([-0.05, -0.1, 0.08], wxyz=[0.5, 0.5, 0.5, 0.5]))
 solution = clench.solve(hand, scene, command)

@@ -26,10 +26,10 @@ BRIEF = (
     "apps/test_bench_peers.py",
 )
 WHOLE = (
-    *("solve/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),
-    *("kernels/test_pressing.py", "solve/test_close_by.py", "solve/test_orders.py"),
+    *("solver/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),
+    *("kernels/test_pressing.py", "solver/test_close_by.py", "solver/test_orders.py"),
 )
-STEP_TESTS = ("grasp", "solve", "kernels/test_warming.py")
+STEP_TESTS = ("grasp", "solver", "kernels/test_warming.py")
 
 
 def run_tests(files: Sequence[str], options: Sequence[str], data: Path) -> None:

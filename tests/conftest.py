@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from clench.kernels.warming import announce, warm_up
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 from handmade import make_solution
 
 if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.find_library("EGL"):

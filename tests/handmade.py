@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clench.base.pose import Pose
-from clench.solve.solution import (
+from clench.solver.solution import (
     Candidate,
     Contact,
     ContactKind,

@@ -97,8 +97,8 @@ def test_every_tolerance_of_the_method_is_documented() -> None:
 @pytest.mark.parametrize(
     "enum",
     [
-        *("clench.solve.solution.SolutionStatus", "clench.solve.solution.FingerStatus"),
-        *("clench.solve.solution.ContactKind", "clench.solve.certificate.CertificateCode"),
+        *("clench.solver.solution.SolutionStatus", "clench.solver.solution.FingerStatus"),
+        *("clench.solver.solution.ContactKind", "clench.solver.certificate.CertificateCode"),
         *("clench.models.command.ClosingOrder", "clench.models.hand.hand.JointRole"),
         "clench.models.objects.grasp_object.BodyRole",
     ],

@@ -21,7 +21,7 @@ from clench.models.hand.findings import FindingCode
 from clench.models.hand.hand_file import read_hand_file
 from clench.planner.options import PlanArguments
 from clench.planner.rejections import Rejection
-from clench.solve.causes import CauseCode
+from clench.solver.causes import CauseCode
 from handmade import make_solution
 
 ROOT = Path(__file__).parents[1]
@@ -70,6 +70,20 @@ def test_the_driver_on_the_page_works_and_its_members_are_all() -> None:
         table = text[text.index(f"| `{kind.__name__}` |") :].split("\n\n")[0]
         for field in fields(kind):
             assert f"`{field.name}" in table
+
+
+def test_the_scene_on_the_page_is_grasped_as_often_as_it_says() -> None:
+    text = page("surroundings.md")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(code, "surroundings.md", "exec"), names)
+    assert len(names["scene"].bodies) == 3
+    assert names["batch"].counts()["grasp"] >= 8
+    (around, free) = map(int, re.findall(r"(\d+) of 100\s+poses give a grasp; without the table, (\d+) do", text)[0])
+    mug = clench.GraspObject.load("mug")
+    for obj, said in ((mug.with_body(clench.table()), around), (mug, free)):
+        poses = clench.approach_poses(names["hand"], obj, 100, seed=0)
+        assert clench.solve_batch(names["hand"], obj, poses).counts()["grasp"] == said
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[p.name for p in PAGES])

@@ -9,9 +9,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from clench.apps.figures import draw_solution
     from clench.base.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
     from clench.base.pose import Pose
     from clench.execution.completing import complete
+    from clench.execution.convex_pieces import in_pieces
     from clench.execution.driven_hand import DrivenHand
     from clench.execution.driver import DriverError, DriverLimits, HandDriver, HandState, JointPath
     from clench.execution.drivers.orca import OrcaDriver
@@ -41,21 +43,22 @@ if TYPE_CHECKING:
     from clench.models.hand.findings import Finding, FindingCode
     from clench.models.hand.hand import Hand, JointRole
     from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+    from clench.models.objects.obstacles import obstacle, table
     from clench.models.objects.stable_poses import StablePose, stable_poses
     from clench.models.shapes import CollisionSource, ShapeKind
     from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
     from clench.planner.plan_grasps import iter_grasps, plan_grasps
     from clench.planner.regions import Region
     from clench.planner.search import GraspSearch
-    from clench.solve.batch import solve_batch, solve_stream
-    from clench.solve.controller import solve
-    from clench.solve.grasp_batch import BatchContacts, GraspBatch
-    from clench.solve.grasp_kinds import grasp_kind
-    from clench.solve.pose_error import PoseErrorReport, pose_error
-    from clench.solve.quality import GraspQuality, grasp_quality
-    from clench.solve.record import Record
-    from clench.solve.sensitivity import Sensitivity, sensitivity
-    from clench.solve.solution import (
+    from clench.solver.batch import solve_batch, solve_stream
+    from clench.solver.controller import solve
+    from clench.solver.grasp_batch import BatchContacts, GraspBatch
+    from clench.solver.grasp_kinds import grasp_kind
+    from clench.solver.pose_error import PoseErrorReport, pose_error
+    from clench.solver.quality import GraspQuality, grasp_quality
+    from clench.solver.record import Record
+    from clench.solver.sensitivity import Sensitivity, sensitivity
+    from clench.solver.solution import (
         Candidate,
         Contact,
         ContactKind,
@@ -64,25 +67,25 @@ if TYPE_CHECKING:
         GraspSolution,
         SolutionStatus,
     )
-    from clench.solve.squeezing import SqueezePlan, plan_squeeze
-    from clench.solve.tracking import Tracker
+    from clench.solver.squeezing import SqueezePlan, plan_squeeze
+    from clench.solver.tracking import Tracker
 
 __version__ = "0.1.0"
 
 # One documented path per name: the module that defines it. A test holds this equal to `__all__`.
 _HOMES = {
     "Actuator": "clench.execution.executing",
-    "BatchContacts": "clench.solve.grasp_batch",
+    "BatchContacts": "clench.solver.grasp_batch",
     "Body": "clench.models.objects.grasp_object",
     "BodyRole": "clench.models.objects.grasp_object",
     "Calibration": "clench.grasp.calibration",
-    "Candidate": "clench.solve.solution",
+    "Candidate": "clench.solver.solution",
     "ClenchError": "clench.base.errors",
     "ClosingOrder": "clench.models.command",
     "CollisionSource": "clench.models.shapes",
     "CommandError": "clench.base.errors",
-    "Contact": "clench.solve.solution",
-    "ContactKind": "clench.solve.solution",
+    "Contact": "clench.solver.solution",
+    "ContactKind": "clench.solver.solution",
     "Criterion": "clench.grasp.criteria",
     "DrivenHand": "clench.execution.driven_hand",
     "DriverError": "clench.execution.driver",
@@ -93,18 +96,18 @@ _HOMES = {
     "Film": "clench.execution.filming",
     "Finding": "clench.models.hand.findings",
     "FindingCode": "clench.models.hand.findings",
-    "FingerResult": "clench.solve.solution",
-    "FingerStatus": "clench.solve.solution",
-    "GraspBatch": "clench.solve.grasp_batch",
+    "FingerResult": "clench.solver.solution",
+    "FingerStatus": "clench.solver.solution",
+    "GraspBatch": "clench.solver.grasp_batch",
     "GraspCommand": "clench.models.command",
     "GraspFormat": "clench.execution.formats.exchange",
     "GraspKind": "clench.grasp.contact_kinds",
     "GraspObject": "clench.models.objects.grasp_object",
     "GraspPlan": "clench.planner.grasp_plan",
     "GraspPosture": "clench.execution.formats.grasp_posture",
-    "GraspQuality": "clench.solve.quality",
+    "GraspQuality": "clench.solver.quality",
     "GraspSearch": "clench.planner.search",
-    "GraspSolution": "clench.solve.solution",
+    "GraspSolution": "clench.solver.solution",
     "Hand": "clench.models.hand.hand",
     "HandCriterion": "clench.grasp.criteria",
     "HandDriver": "clench.execution.driver",
@@ -119,42 +122,47 @@ _HOMES = {
     "OrcaDriver": "clench.execution.drivers.orca",
     "PlannedGrasp": "clench.planner.grasp_plan",
     "Pose": "clench.base.pose",
-    "PoseErrorReport": "clench.solve.pose_error",
+    "PoseErrorReport": "clench.solver.pose_error",
     "ReadySignal": "clench.execution.ready_signal",
-    "Record": "clench.solve.record",
+    "Record": "clench.solver.record",
     "Region": "clench.planner.regions",
     "Ros2Driver": "clench.execution.drivers.ros2",
-    "Sensitivity": "clench.solve.sensitivity",
+    "Sensitivity": "clench.solver.sensitivity",
     "ShapeKind": "clench.models.shapes",
     "SimulatedHand": "clench.execution.simulation",
-    "SolutionStatus": "clench.solve.solution",
-    "SqueezePlan": "clench.solve.squeezing",
+    "SolutionStatus": "clench.solver.solution",
+    "SqueezePlan": "clench.solver.squeezing",
     "StablePose": "clench.models.objects.stable_poses",
-    "Tracker": "clench.solve.tracking",
+    "Tracker": "clench.solver.tracking",
     "Trajectory": "clench.execution.trajectory",
     "UnknownNameError": "clench.base.errors",
     "approach_poses": "clench.grasp.approach",
     "check_hand": "clench.grasp.self_check",
     "complete": "clench.execution.completing",
+    "draw_solution": "clench.apps.figures",
     "execute": "clench.execution.executing",
     "export_grasps": "clench.execution.formats.exchange",
-    "grasp_kind": "clench.solve.grasp_kinds",
-    "grasp_quality": "clench.solve.quality",
+    "grasp_kind": "clench.solver.grasp_kinds",
+    "grasp_quality": "clench.solver.quality",
     "import_grasps": "clench.execution.formats.exchange",
+    "in_pieces": "clench.execution.convex_pieces",
     "iter_grasps": "clench.planner.plan_grasps",
     "load_calibration": "clench.grasp.calibration",
     "load_command": "clench.models.command_file",
+    "obstacle": "clench.models.objects.obstacles",
     "plan_grasps": "clench.planner.plan_grasps",
     "plan_pregrasp": "clench.execution.pregrasp",
-    "plan_squeeze": "clench.solve.squeezing",
+    "plan_squeeze": "clench.solver.squeezing",
     "plan_trajectory": "clench.execution.trajectory",
-    "pose_error": "clench.solve.pose_error",
+    "pose_error": "clench.solver.pose_error",
     "register_criterion": "clench.grasp.criterion_registry",
-    "sensitivity": "clench.solve.sensitivity",
+    "sensitivity": "clench.solver.sensitivity",
     "set_object_cache": "clench.grasp.scene",
-    "solve_batch": "clench.solve.batch",
-    "solve_stream": "clench.solve.batch",
+    "solve": "clench.solver.controller",
+    "solve_batch": "clench.solver.batch",
+    "solve_stream": "clench.solver.batch",
     "stable_poses": "clench.models.objects.stable_poses",
+    "table": "clench.models.objects.obstacles",
     "write_log": "clench.execution.formats.mcap_log",
 }
 
@@ -225,14 +233,17 @@ __all__ = [
     "approach_poses",
     "check_hand",
     "complete",
+    "draw_solution",
     "execute",
     "export_grasps",
     "grasp_kind",
     "grasp_quality",
     "import_grasps",
+    "in_pieces",
     "iter_grasps",
     "load_calibration",
     "load_command",
+    "obstacle",
     "plan_grasps",
     "plan_pregrasp",
     "plan_squeeze",
@@ -245,14 +256,12 @@ __all__ = [
     "solve_batch",
     "solve_stream",
     "stable_poses",
+    "table",
     "write_log",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "solve":
-        # The layer of this name is a package, which importing any of its modules binds here; it is callable.
-        return importlib.import_module("clench.solve")
     if name not in _HOMES:
         raise AttributeError(f"module 'clench' has no attribute {name!r}; it has: {', '.join(__all__)}")
     value = getattr(importlib.import_module(_HOMES[name]), name)

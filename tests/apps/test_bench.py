@@ -16,9 +16,9 @@ from clench.apps.bench.main import BENCHMARKS, main
 from clench.apps.bench.report import BenchReport, describe_place
 from clench.base.errors import CommandError, UnknownNameError
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-from clench.solve.alternatives import finger_sets
-from clench.solve.problem import make_problem, make_setting
-from clench.solve.solution import GraspSolution
+from clench.solver.alternatives import finger_sets
+from clench.solver.problem import make_problem, make_setting
+from clench.solver.solution import GraspSolution
 from handmade import make_solution
 
 SMALL = ["solve", "--poses", "2", "--passes", "2", "--planes", "3"]

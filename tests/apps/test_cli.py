@@ -23,8 +23,8 @@ from clench.grasp import sizes
 from clench.kernels import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource
-from clench.solve.record import Record
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.record import Record
+from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_solution
 
 

@@ -27,8 +27,8 @@ from clench.execution.formats.exchange import GraspFormat
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.command_file import load_command
 from clench.models.shapes import CollisionSource
-from clench.solve.record import Record
-from clench.solve.solution import GraspSolution
+from clench.solver.record import Record
+from clench.solver.solution import GraspSolution
 from handmade import make_solution
 
 

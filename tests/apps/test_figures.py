@@ -21,7 +21,7 @@ from clench.base.errors import FileError
 from clench.models.command import GraspCommand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.obstacles import table
-from clench.solve.solution import FingerStatus, GraspSolution
+from clench.solver.solution import FingerStatus, GraspSolution
 from handmade import make_candidate, make_contact
 
 
@@ -286,11 +286,16 @@ def test_a_finger_without_sets_has_no_picture(
     assert [f.name for f in files] == ["grasp.png"]
 
 
-def test_a_folder_that_is_missing_is_one_sentence(
+def test_a_folder_that_is_missing_is_made(
     hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
 ) -> None:
-    with pytest.raises(FileError, match=r"index_plane\.png: cannot be written \(No such file or directory\)"):
-        draw_solution(hand, ball, *answer, tmp_path / "missing")
+    command, solution = answer
+    without = replace(solution, fingers={})
+    files = clench.draw_solution(hand, ball, command, without, str(tmp_path / "new" / "deep"))
+    assert files == [tmp_path / "new" / "deep" / "grasp.png"]
+    assert files[0].is_file()
+    with pytest.raises(FileError, match=r"grasp\.png: cannot be made a folder"):
+        draw_solution(hand, ball, command, without, files[0])
 
 
 def test_drawing_leaves_global_state_alone(

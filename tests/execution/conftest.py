@@ -14,7 +14,7 @@ from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Coupling, Finger, Hand, Joint, JointRole, Link
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-from clench.solve.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
+from clench.solver.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
 from handmade import make_candidate, make_contact, make_solution
 
 BALL_RADIUS, BALL_HEIGHT = 0.02, 0.05

@@ -8,7 +8,7 @@ from chain_hands import HandBuilder, along_x, mount, turned
 from clench.grasp.scene import hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
+from clench.solver.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
 from handmade import make_candidate, make_solution
 
 Z = np.array([0.0, 0.0, 1.0])

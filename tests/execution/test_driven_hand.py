@@ -24,7 +24,7 @@ from clench.execution.joint_map import JointMap, MappedJoint
 from clench.models.hand.hand import Hand
 from clench.models.hand.tendons import TendonMap
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 OPEN = {"thumb": 0.0, "index": 0.0}
 pytestmark = pytest.mark.usefixtures("clock")

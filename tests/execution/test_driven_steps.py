@@ -13,7 +13,7 @@ from clench.execution.driver import DriverError, DriverLimits
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
 from clench.models.hand.hand import Hand
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 OPEN = {"thumb": 0.0, "index": 0.0}
 pytestmark = pytest.mark.usefixtures("clock")

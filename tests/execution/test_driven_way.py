@@ -21,7 +21,7 @@ from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_solution
 
 ENGINE = CollisionSource.ENGINE

@@ -18,7 +18,7 @@ from clench.execution.simulation import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import Shape, ShapeKind
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 FAR = GraspObject("far", (Body("far", (Shape(ShapeKind.SPHERE, (0.01, 0.0, 0.0)),)),), pose=Pose([9.0, 0.0, 0.0]))
 MOTOR = '<actuator><motor joint="thumb"/></actuator>'

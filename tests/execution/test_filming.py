@@ -17,7 +17,7 @@ from clench.execution.scene import build_scene
 from clench.execution.simulation import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 
 @pytest.mark.parametrize("hold", [None, Hold(friction=1.0, contact_model="soft", duration=0.2)])

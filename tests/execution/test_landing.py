@@ -19,7 +19,7 @@ from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 CLEARANCE = 0.005
 Grip = tuple[Hand, GraspObject, GraspSolution]

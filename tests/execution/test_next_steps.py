@@ -16,8 +16,8 @@ from clench.execution.next_steps import Phase, moved_joints, plan_after_touch, p
 from clench.execution.timing import ACCELERATION
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import DEFAULT_SPEED, Coupling, Hand
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 VELOCITY = np.array([3.0, DEFAULT_SPEED, 1.0])
 PACE = VELOCITY, np.full(3, ACCELERATION)

@@ -16,7 +16,7 @@ from clench.execution.driver import DriverError, JointPath
 from clench.execution.executing import execute
 from clench.execution.joint_map import JointMap, joint_map_from_dict
 from clench.models.hand.hand import Hand
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 pytest.importorskip("orca_core", reason="needs orca-core")
 

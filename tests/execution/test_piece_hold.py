@@ -15,7 +15,7 @@ from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 
 def waisted() -> GraspObject:

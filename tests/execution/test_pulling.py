@@ -23,9 +23,9 @@ from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import Shape, ShapeKind
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import plan_squeeze
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import plan_squeeze
 
 #: Two fingers hold a ball in every direction only if they also resist turning about the line between them.
 FIRM = Hold(friction=1.0, contact_model="soft")

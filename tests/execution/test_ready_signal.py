@@ -19,8 +19,8 @@ from clench.execution.executing import execute
 from clench.execution.ready_signal import ReadySignal
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.record import Record
-from clench.solve.solution import GraspSolution
+from clench.solver.record import Record
+from clench.solver.solution import GraspSolution
 
 DOMAIN = 1 + os.getpid() % 100
 

@@ -25,7 +25,7 @@ from clench.execution.driver import JointPath
 from clench.execution.drivers import ros2
 from clench.execution.drivers.ros2 import Ros2Driver, topic_name
 from clench.models.hand.hand import Hand
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 HERE = Path(__file__).parent
 #: Where ports of DDS are below those that the system hands out.

@@ -21,7 +21,7 @@ from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_contact
 
 BOX = TriangleMesh(

@@ -19,7 +19,7 @@ from clench.execution.step_check import squeeze_overlap, step_overlap
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 from handmade import make_contact, make_solution
 
 #: A thumb that is driven in is deeper than this at some way-point [m].

@@ -17,7 +17,7 @@ from clench.execution.report import ExecutionReport
 from clench.execution.simulation import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 SHORT = replace(FIRM, duration=0.3)
 LET_GO = {"thumb": 0.0}

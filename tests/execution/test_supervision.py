@@ -40,7 +40,7 @@ from clench.execution.supervision import (
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.hand.tendons import TendonMap
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 EXECUTION = Path(supervision.__file__).parent
 OPEN = {"thumb": 0.0, "index": 0.0}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clench.base.errors import CommandError
-from clench.execution.timing import time_path
+from clench.execution.timing import Profile, time_path
 
 
 def timed(points: list[list[float]], velocity: float = 1.0, acceleration: float = 10.0):
@@ -58,3 +58,35 @@ def test_stretching_is_even() -> None:
         at = path.stretched_at(share * 7.0, 7.0)
         np.testing.assert_allclose(at, path.at(share * path.duration), atol=1e-12)
     assert {0.0, 7.0} <= set(path.samples(7.0).tolist())
+
+
+#: Largest speeds and accelerations of a motion of length 1: ramps that just meet, almost none, and almost no cruise.
+LIMITS = [(1.0, 10.0), (1.0, 1.0), (1.0, 0.999999), (1.0, 1.000001), (100.0, 3.0), (1e-3, 1e3), (2.0, 4.0), (1e4, 1e-3)]
+
+
+@pytest.mark.parametrize(("velocity", "acceleration"), LIMITS)
+def test_a_profile_is_the_fastest_motion_inside_its_limits(velocity: float, acceleration: float) -> None:
+    profile = Profile.fastest(velocity, acceleration)
+    # The least time from rest to rest over a way of 1, by the area under the speed.
+    triangle = velocity**2 >= acceleration
+    least = 2.0 / np.sqrt(acceleration) if triangle else 1.0 / velocity + velocity / acceleration
+    assert profile.duration == pytest.approx(least, rel=1e-14)
+    times = np.linspace(0.0, profile.duration, 4001)
+    places = np.array([profile.at(t) for t in times])
+    speeds = np.diff(places) / np.diff(times)
+    changes = np.diff(speeds) / np.diff(times)[1:]
+    assert (places[0], places[-1]) == (0.0, 1.0)
+    assert speeds.min() >= 0.0
+    assert speeds.max() <= velocity * (1.0 + 1e-9)
+    assert np.abs(changes).max() <= acceleration * (1.0 + 1e-6) + 1e-9 * speeds.max() / np.diff(times)[0]
+    # One of the two limits binds nearly always.
+    binds = (np.abs(changes) > 0.999 * acceleration) | (speeds[1:] > 0.999 * velocity)
+    assert binds.mean() > 0.999
+    # The motion is the same backwards.
+    np.testing.assert_allclose(places, 1.0 - places[::-1], atol=1e-12)
+
+
+def test_a_profile_stands_still_before_and_after() -> None:
+    profile = Profile.fastest(1.0, 10.0)
+    assert [profile.at(t) for t in (-1.0, 0.0, profile.duration, 99.0)] == [0.0, 0.0, 1.0, 1.0]
+    assert profile.at(0.5 * profile.duration) == pytest.approx(0.5, rel=1e-15)

@@ -13,7 +13,7 @@ import pytest
 from clench.base.errors import CommandError, FileError
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import DEFAULT_SPEED, Coupling, Hand, Joint, JointRole
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 
 def speeds(trajectory: Trajectory) -> np.ndarray:

@@ -18,7 +18,7 @@ from clench.execution.simulation import SimulatedHand
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 pytestmark = pytest.mark.usefixtures("clock")
 

@@ -18,7 +18,7 @@ from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.hand.opposition import opposing_preshapes
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 X, Y, Z = np.eye(3)
 ENGINE = CollisionSource.ENGINE

@@ -18,7 +18,7 @@ from clench.grasp.path_check import find_path_overlap, place_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 from handmade import make_contact
 
 ENGINE = CollisionSource.ENGINE

@@ -7,12 +7,14 @@ from block_hands import block_hand
 from clench.base.errors import CommandError, ObjectError, UnknownNameError
 from clench.base.pose import Pose
 from clench.grasp.approach import BACK_OFF, MAX_TILT, approach_poses
-from clench.grasp.depths import hand_depths, travel_to_touch
+from clench.grasp.depths import first_touch, hand_depths, travel_to_touch
 from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
+from clench.models.objects.obstacles import table
 from clench.models.shapes import Shape, ShapeKind
+from clench.solver.batch import solve_batch
 
 BALL = GraspObject("ball", (Body("ball", (Shape(ShapeKind.SPHERE, (0.03, 0.0, 0.0)),)),), pose=Pose([0.4, 0.5, 0.6]))
 TABLE = Body("table", (Shape(ShapeKind.BOX, (1.0, 1.0, 0.1), Pose([0.0, 0.0, -0.13])),), role=BodyRole.OBSTACLE)
@@ -69,17 +71,52 @@ def test_the_poses_move_with_the_object():
         np.testing.assert_allclose((move @ one).matrix, other.matrix, atol=1e-12)
 
 
-def test_obstacles_stop_the_hand_but_are_not_approached():
+def touched_first(hand, obj, poses):
+    """Return the role of the body that the open hand touches first from each pose, and how far it goes until then."""
+    packed = pack_object(obj)
+    for pose in poses:
+        T_palm_object = (pose.inverse() @ obj.pose).matrix
+        travel, body = first_touch(hand, hand.open_angles(), packed, T_palm_object, hand.palm_normal)
+        yield packed.body_roles[body], travel
+
+
+def test_a_pose_that_touches_an_obstacle_first_is_drawn_again():
     hand, obj = block_hand(), BALL.with_body(TABLE)
     poses = approach_poses(hand, obj, 60, 6)
     assert min(travels(hand, obj, poses)) >= BACK_OFF[0] - 1e-9
-    # Some came from below or beside and were stopped by the table: 40 mm off the ball and more.
-    far = [np.linalg.norm(p.position - BALL.pose.position) > 0.1 for p in poses]
-    assert 5 < sum(far) < 55
-    assert not any(np.linalg.norm(p.position - BALL.pose.position) > 0.1 for p in approach_poses(hand, BALL, 60, 6))
+    roles, travelled = zip(*touched_first(hand, obj, poses), strict=True)
+    assert set(roles) == {BodyRole.GRASPABLE}
+    assert max(travelled) <= BACK_OFF[1] + 1e-9
+    # The table's upper face is 80 mm below the centre of the ball: from there the ball cannot be reached.
+    assert min(pose.position[2] for pose in poses) > BALL.pose.position[2] - 0.08
+    # Draws that touch the ball first are those without the table.
+    free = np.array([pose.wxyz_xyz for pose in approach_poses(hand, BALL, 60, 6)])
+    same = [np.abs(free - pose.wxyz_xyz).max(axis=1).min() < 1e-12 for pose in poses]
+    assert 5 < sum(same) < 55
     aims = [np.linalg.norm(np.cross(BALL.pose.position - p.position, p.rotation[:, 2])) for p in poses]
-    # The line of the palm's centre meets the ball, wherever the table stopped the hand.
     assert max(aims) <= 0.03 + 1e-9
+
+
+def test_where_obstacles_always_come_first_the_nearest_stop_is_kept():
+    # The ball stands in a box that leaves 1 mm around it: the hand is stopped by the box wherever it comes from.
+    cage = Body("cage", (Shape(ShapeKind.BOX, (0.031, 0.031, 0.031)),), role=BodyRole.OBSTACLE)
+    hand, obj = block_hand(), BALL.with_body(cage)
+    poses = approach_poses(hand, obj, 20, 6)
+    roles, travelled = zip(*touched_first(hand, obj, poses), strict=True)
+    assert set(roles) == {BodyRole.OBSTACLE}
+    assert BACK_OFF[0] - 1e-9 <= min(travelled)
+    assert max(travelled) <= BACK_OFF[1] + 1e-9
+    # The nearest of a hundred stops is over the middle of a face, 1 mm off the ball; corners are 24 mm off.
+    near = [np.linalg.norm(p.position - obj.pose.position) - t for p, t in zip(poses, travelled, strict=True)]
+    assert max(near) < 0.04
+
+
+def test_a_table_costs_few_grasps_of_a_real_hand():
+    hand, mug = Hand.load("robonaut2"), GraspObject.load("mug")
+    scene = mug.with_body(table())
+    counts = [solve_batch(hand, obj, approach_poses(hand, obj, 40, 0)).counts()["grasp"] for obj in (mug, scene)]
+    assert counts[0] >= 25
+    assert counts[1] >= 0.75 * counts[0]
 
 
 def test_a_preshape_changes_what_touches_first():

@@ -23,8 +23,8 @@ from clench.grasp.mechanics.steadiness import epsilon, epsilon_bound
 from clench.models.hand.tendons import TendonMap
 from clench.models.objects.grasp_object import BodyRole
 from clench.models.objects.mass import mass_properties
-from clench.solve.alternatives import finger_sets
-from clench.solve.problem import make_problem, make_setting
+from clench.solver.alternatives import finger_sets
+from clench.solver.problem import make_problem, make_setting
 
 MUG = clench.GraspObject.load("mug")
 SEEN = {}

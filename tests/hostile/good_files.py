@@ -16,7 +16,7 @@ from clench.base.pose_arrays import pose_rows
 from clench.execution.joint_map import JointMap
 from clench.execution.trajectory_checks import check_for_hand
 from clench.grasp.calibration import load_calibration
-from clench.solve.saved_question import SavedBatch
+from clench.solver.saved_question import SavedBatch
 from fuzz.file_trials import GRASPS, JOINT_MAP
 from fuzz.originals import CALIBRATION, COMMAND, HAND_FILE, MJCF, URDF, link_stl
 from fuzz.trials import good

@@ -12,8 +12,8 @@ from clench.base.pose import Pose
 from clench.kernels.exact import PRESSED, find_link_overlap
 from clench.models.hand.hand import JointRole
 from clench.models.shapes import Shape, ShapeKind
-from clench.solve.planning import planned
-from clench.solve.problem import make_problem
+from clench.solver.planning import planned
+from clench.solver.problem import make_problem
 
 BOX = Shape(ShapeKind.BOX, (0.01, 0.008, 0.005))
 

@@ -6,7 +6,7 @@ import os
 import stat
 from pathlib import Path
 
-from .errors import FileError
+from .errors import CommandError, FileError
 
 
 def read_file(path: str | Path, most: int, missing: str = "no such file.") -> bytes:
@@ -45,7 +45,13 @@ def read_file(path: str | Path, most: int, missing: str = "no such file.") -> by
 
 
 def expanded(path: str | Path) -> Path:
-    """Return a path with the home folder in place of its `~`, where that is known."""
+    """Return a path with the home folder in place of its `~`, where that is known.
+
+    Raises:
+        CommandError: neither text nor a path.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise CommandError(f"path: expected text or a pathlib.Path, got {type(path).__name__}.")
     try:
         return Path(path).expanduser()
     except RuntimeError:
@@ -66,3 +72,17 @@ def read_text(path: str | Path, most: int, missing: str = "no such file.") -> st
 
 def _too_large(size: int, most: int) -> str:
     return f"is too large: it has {size / 2**20:.4g} MB; expected up to {most / 2**20:.4g} MB (docs/security.md)."
+
+
+def make_folder(path: str | Path) -> Path:
+    """Make a folder, with those above it, where it is not there; return its path.
+
+    Raises:
+        FileError: it cannot be made. CommandError: neither text nor a path.
+    """
+    folder = expanded(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(path, f"cannot be made a folder ({error.strerror or error}).") from None
+    return folder

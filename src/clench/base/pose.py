@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,16 +18,25 @@ from .tolerances import LARGEST_LENGTH, QUATERNION_NORM
 FloatArray = NDArray[np.float64]
 
 
+#: The quaternion `wxyz` of frames whose axes are parallel.
+_PARALLEL: Final = (1.0, 0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, init=False, eq=False)
 class Pose:
     """Map coordinates of one frame to another: `p_a = T_a_b.apply(p_b)`.
 
+    At most one of the three rotations is given. Without a rotation, the axes of the two frames are parallel.
+
     Args:
         position: origin of frame `b` in frame `a` [m], shape (3,).
-        wxyz: unit quaternion, scalar first, shape (4,); normalised when off by less than 1e-3.
+        wxyz: unit quaternion, scalar first, shape (4,); normalised when its norm is off by less than 1e-3.
+        xyzw: the same with the scalar last, as ROS and SciPy write it.
+        rpy: roll, pitch and yaw [rad], shape (3,): turns about the fixed axes x, then y, then z of frame `a`, as in
+            URDF. The rotation matrix is `Rz(yaw) @ Ry(pitch) @ Rx(roll)`.
 
     Raises:
-        CommandError: wrong length, not finite, farther than 1e9 m, or a norm off by more than 1e-3.
+        CommandError: wrong length, not finite, farther than 1e9 m, a norm off by more than 1e-3, or two rotations.
     """
 
     wxyz_xyz: FloatArray
@@ -35,19 +44,24 @@ class Pose:
     def __init__(
         self,
         position: ArrayLike = (0.0, 0.0, 0.0),
-        wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        wxyz: ArrayLike | None = None,
         *,
+        xyzw: ArrayLike | None = None,
+        rpy: ArrayLike | None = None,
         key: str = "pose",
     ) -> None:
         xyz = checked_vector(position, 3, f"{key}.position", "[x, y, z] in metres")
-        quaternion = checked_vector(wxyz, 4, f"{key}.wxyz", "[w, x, y, z]")
-        norm = math.hypot(*quaternion)
-        if abs(norm - 1.0) > QUATERNION_NORM:
-            raise CommandError(f"{key}.wxyz: expected a unit quaternion [w, x, y, z], got norm {norm:.6g}.")
+        given = [name for name, value in (("wxyz", wxyz), ("xyzw", xyzw), ("rpy", rpy)) if value is not None]
+        if len(given) > 1:
+            raise CommandError(f"{key}: expected one rotation, wxyz, xyzw or rpy, got {' and '.join(given)}.")
+        if rpy is not None:
+            quaternion = _from_rpy(checked_vector(rpy, 3, f"{key}.rpy", "[roll, pitch, yaw] in radians"))
+        elif xyzw is not None:
+            quaternion = np.roll(_unit(xyzw, f"{key}.xyzw", "[x, y, z, w]"), 1)
+        else:
+            quaternion = _unit(_PARALLEL if wxyz is None else wxyz, f"{key}.wxyz", "[w, x, y, z]")
         if np.abs(xyz).max() > LARGEST_LENGTH:
             raise CommandError(f"{key}.position: expected metres up to {LARGEST_LENGTH:g}, got {xyz.tolist()}.")
-        if abs(norm - 1.0) > 4e-16:  # a pose read back stays the same to the bit
-            quaternion = quaternion / norm
         data = np.concatenate([quaternion, xyz])
         data.flags.writeable = False
         object.__setattr__(self, "wxyz_xyz", data)
@@ -72,6 +86,11 @@ class Pose:
     def wxyz(self) -> FloatArray:
         """Unit quaternion, scalar first, shape (4,)."""
         return self.wxyz_xyz[:4]
+
+    @property
+    def xyzw(self) -> FloatArray:
+        """Unit quaternion, scalar last, shape (4,)."""
+        return np.roll(self.wxyz, -1)
 
     @cached_property
     def rotation(self) -> FloatArray:
@@ -135,7 +154,28 @@ class Pose:
             raise CommandError(f"{key}.{unknown[0]}: unknown key; expected 'position' and 'wxyz'.")
         if "position" not in data:
             raise CommandError(f"{key}.position: missing; expected [x, y, z] in metres.")
-        return cls(data["position"], data.get("wxyz", (1.0, 0.0, 0.0, 0.0)), key=key)
+        # A null is no rotation, which is what the constructor takes None for.
+        wxyz = checked_vector(data.get("wxyz", _PARALLEL), 4, f"{key}.wxyz", "[w, x, y, z]")
+        return cls(data["position"], wxyz, key=key)
+
+
+def _unit(value: ArrayLike, key: str, order: str) -> FloatArray:
+    """Return a quaternion that is normalised, in the order that it was given, shape (4,)."""
+    quaternion = checked_vector(value, 4, key, order)
+    norm = math.hypot(*quaternion)
+    if abs(norm - 1.0) > QUATERNION_NORM:
+        raise CommandError(f"{key}: expected a unit quaternion {order}, got norm {norm:.6g}.")
+    # A pose that is read back stays the same to the bit.
+    return quaternion / norm if abs(norm - 1.0) > 4e-16 else quaternion
+
+
+def _from_rpy(rpy: FloatArray) -> FloatArray:
+    """Return the unit quaternion `wxyz` of turns about the fixed axes x, y and z [rad], shape (4,)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * rpy), np.sin(0.5 * rpy)
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    quaternion = np.array([w, x, y, z])
+    return np.asarray(quaternion / math.hypot(*quaternion))
 
 
 def invert(matrix: FloatArray) -> FloatArray:

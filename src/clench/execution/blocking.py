@@ -11,7 +11,7 @@ from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .scene import Scene
 from .step_check import placed_object

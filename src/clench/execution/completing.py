@@ -8,9 +8,9 @@ from clench.base.defaults import MASS
 from clench.grasp.mechanics.contacts import ContactModel
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.quality import grasp_quality
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import plan_squeeze
+from clench.solver.quality import grasp_quality
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import plan_squeeze
 
 from .landing import CLEARANCE
 from .pregrasp import plan_pregrasp

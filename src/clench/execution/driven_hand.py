@@ -8,12 +8,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import ClenchError, CommandError, UnknownNameError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .command_check import CommandCheck, NotFollowingError, check_tensions, command_limits
 from .driven_report import Done, report_on
@@ -79,6 +81,7 @@ class DrivenHand:
         squeeze: float = 1.0,
         stay_connected: bool = False,
     ) -> None:
+        check_type(hand, Hand, "hand")
         if not (np.isfinite(squeeze) and squeeze >= 0.0):
             raise CommandError(f"squeeze: expected a finite number of at least 0, got {squeeze!r}.")
         check_driver(driver)
@@ -95,6 +98,10 @@ class DrivenHand:
         self.stay_connected = stay_connected
         self._last_report: ExecutionReport | None = None
         supervision_of(driver)
+
+    def __repr__(self) -> str:
+        obj = None if self.obj is None else self.obj.name
+        return described(self, hand=self.hand.name, driver=self.name, obj=obj)
 
     @property
     def hand(self) -> Hand:

@@ -10,8 +10,8 @@ import numpy as np
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .blocking import modelled_blocker
 from .command_check import CommandCheck, NotFollowingError

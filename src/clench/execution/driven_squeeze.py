@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from clench.models.hand.hand import Hand
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
 from .driver import RefusedCommandError

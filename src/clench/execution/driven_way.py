@@ -10,7 +10,7 @@ import numpy as np
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .command_check import CommandCheck, slowed_down
 from .driver import HandState, RefusedCommandError

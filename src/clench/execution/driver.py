@@ -11,6 +11,7 @@ import numpy as np
 from clench.base.errors import ClenchError, CommandError
 from clench.base.numbers import real_array
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 
 
 class DriverError(ClenchError):
@@ -35,6 +36,8 @@ class HandState:
     positions: Mapping[str, float]
     ages: Mapping[str, float] = field(default_factory=dict)
 
+    __repr__ = short_repr
+
     def age(self, names: Iterable[str]) -> float:
         """Return how long ago the oldest of some joints was measured [s]."""
         return max((self.ages.get(name, 0.0) for name in names), default=0.0)
@@ -56,6 +59,8 @@ class JointPath:
     positions: FloatArray
     period: float
 
+    __repr__ = short_repr
+
     def at(self, time: float) -> dict[str, float]:
         """Return the targets at a time from the moment of sending [s]; before the first point those of the first."""
         values = [float(np.interp(time, self.times, column)) for column in self.positions.T]
@@ -74,6 +79,8 @@ class DriverLimits:
 
     positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     velocities: Mapping[str, float] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
 
 @runtime_checkable

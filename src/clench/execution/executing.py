@@ -7,12 +7,13 @@ from typing import Protocol
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, MotionError, UnknownNameError
 from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .report import ExecutionReport
 from .trajectory import Trajectory, plan_trajectory
@@ -58,6 +59,12 @@ def execute(
             step is outside a joint's limits, or `speed` is out of range.
         UnknownNameError: its pregrasp, squeeze or a next step is of a joint that the hand does not have.
     """
+    check_type(solution, GraspSolution, "solution")
+    if not hasattr(actuator, "carry_out"):
+        given = type(actuator).__name__
+        raise CommandError(
+            f"actuator: expected what moves a hand, such as clench.SimulatedHand(hand, obj), got {given}."
+        )
     if not next_steps:
         solution = replace(solution, next_steps=())
     if solution.hand != actuator.hand.name:

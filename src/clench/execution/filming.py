@@ -16,6 +16,7 @@ import numpy as np
 from clench.base.errors import ClenchError, FileError
 from clench.base.json_files import check_folder, check_writable, write_atomically
 from clench.base.opengl import import_mujoco, why_not_drawn
+from clench.base.short_repr import short_repr
 
 from .scene import Scene
 
@@ -49,6 +50,8 @@ class Film:
     _renderer: Any = field(default=None, init=False, repr=False)
     _camera: Any = field(default=None, init=False, repr=False)
     _due: float = field(default=0.0, init=False, repr=False)
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Refuse what cannot be written.

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +23,8 @@ class ExecutionHistory:
     times: FloatArray
     commanded: FloatArray
     measured: FloatArray
+
+    __repr__ = short_repr
 
     def to_dict(self) -> dict[str, Any]:
         """Return the form that reports have."""
@@ -50,6 +53,8 @@ class CommandsSent:
     last: Mapping[str, float] = field(default_factory=dict)
     time: float | None = None
     tensions: bool = False
+
+    __repr__ = short_repr
 
     def text(self) -> str:
         """Say it in a sentence."""

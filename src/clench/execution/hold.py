@@ -11,6 +11,7 @@ import numpy as np
 
 from clench.base.defaults import FRICTION, MASS
 from clench.base.errors import CommandError
+from clench.base.short_repr import described, short_repr
 from clench.grasp.mechanics.contacts import ContactModel, check_friction, friction_range
 from clench.grasp.mechanics.loads import mass_range
 
@@ -63,6 +64,8 @@ class Hold:
     planned_mass: float | tuple[float, float] | None = None
     planned_friction: float | tuple[float, float] | None = None
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
         if not (np.isfinite(self.mass) and self.mass >= LIGHTEST):
@@ -99,6 +102,8 @@ class ObjectMotion:
     distance: float
     angle: float
 
+    __repr__ = short_repr
+
     def within(self, distance: float, angle: float) -> bool:
         """Tell whether it moved less than a distance [m] and turned less than an angle [rad]."""
         return self.distance < distance and self.angle < angle
@@ -118,6 +123,8 @@ class Pulled:
     motion: ObjectMotion
     farthest: ObjectMotion
     time: float
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -161,6 +168,9 @@ class HoldReport:
     forces: Mapping[str, FingerForce] = field(default_factory=dict)
     pulls: Mapping[str, Pulled] = field(default_factory=dict)
     as_given: HoldReport | None = None
+
+    def __repr__(self) -> str:
+        return described(self, held=self.held, reason=self.reason, settings=self.settings)
 
     @property
     def touch_spread(self) -> float | None:

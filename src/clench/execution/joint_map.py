@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
 from clench.base.numbers import is_finite_number
+from clench.base.short_repr import short_repr
 from clench.base.toml_files import read_toml
 from clench.models.hand.hand import Hand
 
@@ -56,6 +57,8 @@ class JointMap:
 
     joints: Mapping[str, MappedJoint] | None = None
     source: str = "joint map"
+
+    __repr__ = short_repr
 
     @classmethod
     def load(cls, path: str | Path) -> JointMap:

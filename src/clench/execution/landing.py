@@ -11,8 +11,8 @@ from clench.base.pose import FloatArray
 from clench.grasp.mechanics.contacts import make_contacts
 from clench.grasp.mechanics.jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
 from clench.models.hand.hand import Finger, Hand, JointRole
-from clench.solve.posture import posture
-from clench.solve.solution import Contact, GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import Contact, GraspSolution
 
 #: Clearance of the pregrasp unless another is asked for [m].
 CLEARANCE: Final = 0.005

@@ -13,8 +13,8 @@ from clench.base.pose import FloatArray
 from clench.grasp.motion import next_postures
 from clench.models.command_file import check_steps
 from clench.models.hand.hand import Hand
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .closing_path import STILL, closing_path, distinct
 from .timing import TimedPath, time_path

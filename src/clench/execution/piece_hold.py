@@ -9,8 +9,8 @@ from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, ShapeKind
-from clench.solve.controller import solve
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.controller import solve
+from clench.solver.solution import GraspSolution, SolutionStatus
 
 from .convex_pieces import in_pieces
 from .drives import Drive

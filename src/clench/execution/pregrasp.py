@@ -7,14 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, MotionError
 from clench.base.pose import FloatArray, invert
 from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE
 from .step_check import placed_object
@@ -43,6 +44,10 @@ def plan_pregrasp(
     Raises:
         CommandError: a clearance that is not finite and above 0; the solution is of another hand.
     """
+    check_type(solution, GraspSolution, "solution")
+    check_type(hand, Hand, "hand")
+    if obj is not None:
+        check_type(obj, GraspObject, "obj")
     if not (np.isfinite(clearance) and clearance > 0.0):
         raise CommandError(f"clearance: expected a finite number above 0 m, got {clearance!r}.")
     if obj is not None:

@@ -12,9 +12,9 @@ from clench.base.pose import FloatArray
 from clench.grasp.mechanics.jacobian import DegreesOfFreedom, hand_jacobian
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import DOWN, SqueezePlan, plan_squeeze
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import DOWN, SqueezePlan, plan_squeeze
 
 from .drives import Drive
 from .filming import Film

@@ -11,10 +11,11 @@ from typing import Any, Final
 
 from clench.base.errors import CommandError
 from clench.base.json_files import check_writable, write_json
+from clench.base.short_repr import described
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.record import Record
-from clench.solve.solution import GraspSolution
+from clench.solver.record import Record
+from clench.solver.solution import GraspSolution
 
 from .driver import DriverError
 from .report import ExecutionReport
@@ -59,6 +60,9 @@ class ReadySignal:
         self.record = Path(record)
         self.timeout = timeout
         self._channel = _channel(to)
+
+    def __repr__(self) -> str:
+        return described(self, hand=self.hand.name, record=self.record, timeout=self.timeout)
 
     @property
     def hand(self) -> Hand:

@@ -9,7 +9,8 @@ from typing import Any
 
 from clench.base.json_files import write_json
 from clench.base.pose import FloatArray
-from clench.solve.solution import GraspSolution
+from clench.base.short_repr import described, short_repr
+from clench.solver.solution import GraspSolution
 
 from .history import CommandsSent, ExecutionHistory
 from .hold import HoldReport, ObjectMotion, Pulled
@@ -51,6 +52,8 @@ class ContactReached:
     displacement: float
     touches: bool
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class NextStepReached:
@@ -72,6 +75,8 @@ class NextStepReached:
     held: bool | None = None
     motion: ObjectMotion | None = None
     pulls: Mapping[str, Pulled] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, one of `next_steps` in schema `clench.execution/1`."""
@@ -158,6 +163,16 @@ class ExecutionReport:
     driven_by: Mapping[str, str] = field(default_factory=dict)
     next_steps: tuple[NextStepReached, ...] = ()
     sent: CommandsSent | None = None
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            actuator=self.actuator,
+            success=self.success,
+            reason=self.reason,
+            duration=self.duration,
+            largest_angle_error=self.largest_angle_error,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, schema `clench.execution/1`."""

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import described
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import Contact, FingerStatus, GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import Contact, FingerStatus, GraspSolution
 
 from .blocking import simulated_blocker
 from .drives import Drive, check_drive, sentences
@@ -68,6 +70,8 @@ class SimulatedHand:
         film: Film | None = None,
         on_step: Callable[[float, FloatArray], None] | None = None,
     ) -> None:
+        check_type(hand, Hand, "hand")
+        check_type(obj, GraspObject, "obj")
         self._hand = hand
         self.obj = obj
         self.angle_tolerance = angle_tolerance
@@ -77,6 +81,9 @@ class SimulatedHand:
         self.drive = check_drive(drive)
         self.film = film
         self.on_step = on_step
+
+    def __repr__(self) -> str:
+        return described(self, hand=self.hand.name, obj=self.obj.name, hold=self.hold, drive=self.drive)
 
     @property
     def hand(self) -> Hand:

@@ -12,8 +12,8 @@ from clench.grasp.path_check import PlacedObject, find_path_overlap, place_objec
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .next_steps import NEXT_STEP, Phase, squeeze_offsets
 

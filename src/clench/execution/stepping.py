@@ -10,7 +10,7 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .blocking import simulated_blocker
 from .filming import Film

@@ -1,11 +1,11 @@
-"""Time straight pieces of a joint path under velocity and acceleration limits (Ruckig)."""
+"""Time straight pieces of a joint path under velocity and acceleration limits."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +23,40 @@ _LONGEST: Final = 3600.0
 SAMPLE: Final = 0.02
 
 
+@dataclass(frozen=True)
+class Profile:
+    """The fastest motion from 0 to 1, at rest at both ends, under a largest speed v and a largest acceleration a.
+
+    The speed grows with a for a time r = v / a, stays at v, and falls with a. If half the way is too short to reach v,
+    the speed falls as soon as it has grown; then r = 1 / √a.
+
+    Args:
+        speed: that is reached [1/s]. ramp: r [s]. duration: of the motion [s].
+    """
+
+    speed: float
+    ramp: float
+    duration: float
+
+    @classmethod
+    def fastest(cls, velocity: float, acceleration: float) -> Profile:
+        """Return the profile for a largest speed [1/s] and a largest acceleration [1/s²]."""
+        ramp, half = velocity / acceleration, acceleration**-0.5
+        if ramp < half:
+            return cls(velocity, ramp, 1.0 / velocity + ramp)
+        return cls(acceleration * half, half, 2.0 * half)
+
+    def at(self, time: float) -> float:
+        """Return how far the motion is at a time [s], from 0 to 1."""
+        left = self.duration - time
+        if time <= 0.0 or left <= 0.0:
+            return float(left <= 0.0)
+        if min(time, left) >= self.ramp:
+            return self.speed * (time - 0.5 * self.ramp)
+        part = 0.5 * self.speed / self.ramp * min(time, left) ** 2
+        return part if time < left else 1.0 - part
+
+
 @dataclass(frozen=True, eq=False)
 class TimedPath:
     """A timed path of straight lines in joint space.
@@ -31,12 +65,12 @@ class TimedPath:
 
     Args:
         corners: ends of the lines [rad], shape (N, J). times: when they are reached [s], shape (N,), from 0.
-        profiles: how far along every line the joints are [-], N - 1 profiles of Ruckig.
+        profiles: how far along every line the joints are [-], N - 1 profiles.
     """
 
     corners: FloatArray
     times: FloatArray
-    profiles: tuple[Any, ...]
+    profiles: tuple[Profile, ...]
 
     @property
     def duration(self) -> float:
@@ -48,7 +82,7 @@ class TimedPath:
         k = int(np.searchsorted(self.times, time, side="right")) - 1
         if k < 0 or k >= len(self.profiles):
             return np.array(self.corners[0 if k < 0 else -1])
-        part = float(self.profiles[k].at_time(time - self.times[k])[0][0])
+        part = self.profiles[k].at(time - self.times[k])
         line: FloatArray = self.corners[k] + part * (self.corners[k + 1] - self.corners[k])
         return line
 
@@ -106,10 +140,8 @@ def _corners(points: FloatArray) -> FloatArray:
     return np.array(kept)
 
 
-def _profile(step: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> Any:
+def _profile(step: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> Profile:
     """Return the fastest motion from 0 to 1 along a line, at rest at both ends."""
-    import ruckig
-
     moved = np.abs(step)
     moving = moved > 0.0
     fastest = float((velocity[moving] / moved[moving]).min())
@@ -120,8 +152,4 @@ def _profile(step: FloatArray, velocity: FloatArray, acceleration: FloatArray) -
             f"The motion would take {least:.3g} s, more than {_LONGEST:g} s; expected smaller joint angles, "
             f"or higher speeds (joint velocities of the hand, speed, acceleration)."
         )
-    asked, profile = ruckig.InputParameter(1), ruckig.Trajectory(1)
-    asked.current_position, asked.target_position = [0.0], [1.0]
-    asked.max_velocity, asked.max_acceleration = [fastest], [hardest]
-    ruckig.Ruckig(1).calculate(asked, profile)
-    return profile
+    return Profile.fastest(fastest, hardest)

@@ -9,12 +9,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, FileError
 from clench.base.json_files import non_finite_path, read_json, write_json
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
@@ -61,6 +63,18 @@ class Trajectory:
     acceleration: float = ACCELERATION
     turns: tuple[tuple[str, ...], ...] = ()
     open_bodies: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            hand=self.hand,
+            object=self.object,
+            joints=len(self.joints),
+            points=len(self.times),
+            duration=self.duration,
+            pregrasp=self.pregrasp,
+            next_steps=len(self.after),
+        )
 
     @property
     def touches_at_once(self) -> bool:
@@ -182,6 +196,10 @@ def plan_trajectory(
             joint's limits; or `speed`, `acceleration` or `clearance` is out of range.
         UnknownNameError: a next step of a joint that the hand does not have.
     """
+    check_type(solution, GraspSolution, "solution")
+    check_type(hand, Hand, "hand")
+    if obj is not None:
+        check_type(obj, GraspObject, "obj")
     if solution.rounds != 1:
         raise CommandError(
             f"rounds: expected a solution of 1 round, got {solution.rounds} (0 is until rest): of joints that were "

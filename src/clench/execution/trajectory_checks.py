@@ -10,11 +10,11 @@ import numpy as np
 from clench.base.errors import CommandError, FileError
 from clench.base.pose import FloatArray
 from clench.models.hand.extremes import LARGEST_ANGLE
-from clench.solve.posture import posture
+from clench.solver.posture import posture
 
 if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
-    from clench.solve.solution import GraspSolution
+    from clench.solver.solution import GraspSolution
 
     from .trajectory import Trajectory
 

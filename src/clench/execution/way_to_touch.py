@@ -21,8 +21,8 @@ from clench.models.command import ClosingOrder
 from clench.models.hand.hand import Hand, JointRole
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .closing_path import STILL, closing_path, distinct
 from .landing import LANDING_SPEED, plan_landing

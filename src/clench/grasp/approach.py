@@ -12,13 +12,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError, ObjectError
 from clench.base.memory import in_parts
 from clench.base.pose import FloatArray, Pose, invert, quaternion_from_rotation, rotation_about
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 
-from .depths import clear_distance, hand_depths, travel_to_touch
+from .depths import clear_distance, first_touch, hand_depths
 from .scene import PackedObject, pack_object
 
 #: Largest angle between the palm's normal and the surface's [rad].
@@ -35,8 +36,10 @@ def approach_poses(
     """Draw poses of the palm, `T_world_palm`, from which the open hand can close around an object.
 
     A point of the graspable surface is drawn by area; the palm's centre is put over it with the palm's normal into the
-    surface, tilted by up to 30 degrees, and rolled at random; the open hand comes in along its normal until it first
-    touches object or obstacle, and is backed off by 1 to 25 mm. The first poses are the same for every `count`.
+    surface, tilted by up to 30 degrees, and rolled at random. The open hand comes in along its normal until it first
+    touches the object, and is backed off by 1 to 25 mm. A pose from which it touches an obstacle first is drawn again.
+    If every one of 100 draws touches an obstacle first, as around a sheet of paper on a table, the pose is the one that
+    the obstacle stopped nearest to the surface. The first poses are the same for every `count`.
 
     Args:
         hand: the hand, with its default collision source.
@@ -57,6 +60,8 @@ def approach_poses(
 
 def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, float]) -> Iterator[Pose]:
     """Draw the poses of `approach_poses` one after another, without end; arguments and errors as there."""
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     if seed < 0:
         raise CommandError(f"approach poses: expected a seed of 0 or more, got {seed}.")
     q = _open_posture(hand, preshape)
@@ -116,7 +121,8 @@ def _open_posture(hand: Hand, preshape: Mapping[str, float]) -> FloatArray:
 def _draw(
     rng: np.random.Generator, hand: Hand, q: FloatArray, packed: PackedObject, surface: _Surface, name: str
 ) -> FloatArray:
-    """Return a random `T_object_palm`, shape (4, 4), where the open hand is free."""
+    """Return a random `T_object_palm`, shape (4, 4), where the open hand is free, with the object before it."""
+    stopped: tuple[float, FloatArray | None] = np.inf, None
     for _ in range(_ATTEMPTS):
         point, normal = surface.draw(rng)
         rotation = _facing(rng, hand.palm_normal, -normal)
@@ -127,13 +133,22 @@ def _draw(
         into = rotation @ hand.palm_normal
         outside = clear_distance(hand, q, packed, invert(T_object_palm)) + BACK_OFF[1]
         T_object_palm[:3, 3] -= outside * into
-        travel = travel_to_touch(hand, q, packed, invert(T_object_palm), hand.palm_normal)
+        travel, body = first_touch(hand, q, packed, invert(T_object_palm), hand.palm_normal)
         if not np.isfinite(travel):
             continue
         T_object_palm[:3, 3] += (travel - back_off) * into
+        left = outside - travel
+        is_obstacle = packed.body_roles[body] is BodyRole.OBSTACLE
+        if is_obstacle and left >= stopped[0]:
+            continue
         depths = hand_depths(hand, q, packed, invert(T_object_palm))
-        if all(depth.place is None for depth in depths):
+        if any(depth.place is not None for depth in depths):
+            continue
+        if not is_obstacle:
             return T_object_palm
+        stopped = left, T_object_palm
+    if stopped[1] is not None:
+        return stopped[1]
     raise ObjectError(f"object '{name}': found no free approach for hand '{hand.name}' in {_ATTEMPTS} draws.")
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from clench.base.errors import ClenchError, CommandError, FileError, UnknownNameError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 from clench.base.toml_files import read_toml
 
 from .criterion_registry import check_numbers, find_criterion
@@ -40,6 +41,8 @@ class Calibration:
     scales: Mapping[str, float] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     joints: Mapping[str, float] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
     @property
     def criteria(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
@@ -50,6 +51,8 @@ class Setting:
     task: FloatArray = field(default_factory=lambda: np.empty((0, 6)))
     tip_only: bool = False
     kept: dict[Any, Any] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
 
 @runtime_checkable

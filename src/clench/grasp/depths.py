@@ -127,21 +127,41 @@ def travel_to_touch(
     Returns:
         distance [m], infinite when the hand passes the object.
     """
+    return first_touch(hand, q, packed, T_palm_object, direction, source)[0]
+
+
+def first_touch(
+    hand: Hand,
+    q: FloatArray,
+    packed: PackedObject,
+    T_palm_object: FloatArray,
+    direction: FloatArray,
+    source: CollisionSource | None = None,
+) -> tuple[float, int]:
+    """Return how far the hand moves along a direction until it touches, and the number of the body that it touches.
+
+    Args:
+        hand, q, packed, T_palm_object, direction, source: as for `travel_to_touch`.
+
+    Returns:
+        distance [m], infinite when the hand passes; index into the packed bodies, then -1.
+    """
     from clench.kernels.translation import PAIRS, first_contact
 
     stack = np.empty((PAIRS, 2), dtype=np.int32)
     T_object_palm = invert(np.asarray(T_palm_object, dtype=np.float64))
     along = T_object_palm[:3, :3] @ direction
     placed = [(mesh, T_object_palm @ T) for mesh, T in _placed(hand, q, source)]
-    best = np.inf
+    best, touched = np.inf, -1
     for mesh, T_object_link in sorted(placed, key=lambda pair: -float(pair[1][:3, 3] @ along)):
         # Links that are ahead come first: they bound the search of those behind.
         T = np.ascontiguousarray(T_object_link[:3])
-        distance, _, _ = first_contact(
+        distance, _, triangle = first_contact(
             mesh.tree, mesh.owners, T, packed.full_tree, packed.full_owners, along, best, stack
         )
-        best = min(best, distance)
-    return best
+        if distance < best:
+            best, touched = distance, int(packed.full_tree.body[triangle])
+    return best, touched
 
 
 def retreat_distance(

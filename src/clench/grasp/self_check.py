@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 
+from clench.base.argument_types import check_type
 from clench.base.tolerances import ALLOWED_PENETRATION
 from clench.base.visible_text import visible
 from clench.models.hand.allowed import adjacent_pairs
@@ -21,6 +22,7 @@ def check_hand(hand: Hand, source: CollisionSource | str | None = None) -> tuple
     Args:
         hand: see `Hand.load`. source: geometry of its links; None is the hand's default.
     """
+    check_type(hand, Hand, "hand")
     chosen = hand.default_source if source is None else CollisionSource(source)
     found = [*hand.findings, *_overlaps(hand, chosen), *check_thumbs(hand)]
     if chosen is CollisionSource.ENGINE:

@@ -9,7 +9,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from clench.base.argument_types import check_type
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import short_repr
 
 from .hand.hand import Hand
 from .shapes import CollisionSource
@@ -54,6 +56,9 @@ class GraspCommand:
         task_wrenches: what acts on the object in its task, `force` [N] and `torque` [Nm] in the world about the centre
             of mass, for the criterion about it; each is held alone.
         seed: recorded with the result; nothing random depends on it.
+
+    Raises:
+        CommandError: a pose that is no `Pose`. All other values are checked against the hand, when they are used.
     """
 
     hand_pose: Pose
@@ -77,6 +82,13 @@ class GraspCommand:
     next_steps: tuple[Mapping[str, float], ...] = ()
     task_wrenches: tuple[Mapping[str, tuple[float, ...]], ...] = ()
     seed: int | None = None
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        check_type(self.hand_pose, Pose, "hand_pose")
+        if self.object_pose is not None:
+            check_type(self.object_pose, Pose, "object_pose")
 
     def unshared(self) -> GraspCommand:
         """Return the same command, which no later change of a list or mapping that was given reaches."""
@@ -102,6 +114,18 @@ class GraspCommand:
         from .decomposition import command_from_posture
 
         return command_from_posture(hand, q, hand_pose)
+
+
+def as_command(command: GraspCommand | Pose) -> GraspCommand:
+    """Return a command as it is, and a pose as the command that asks for nothing else.
+
+    Raises:
+        CommandError: neither of the two.
+    """
+    if isinstance(command, Pose):
+        return GraspCommand(hand_pose=command)
+    check_type(command, GraspCommand, "command", also="a clench.Pose of the palm")
+    return command
 
 
 def _own(value: Any) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clench.base.argument_types import check_type
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose
 
@@ -28,6 +29,8 @@ def command_from_posture(hand: Hand, q: FloatArray | Mapping[str, float], hand_p
         CommandError: wrong length, an angle missing, not finite or outside the joint's limits (closing joints too: a
             posture in degrees is noticed there). UnknownNameError: no such joint.
     """
+    check_type(hand, Hand, "hand")
+    check_type(hand_pose, Pose, "hand_pose")
     followers = {coupling.follower for coupling in hand.couplings}
     angles = _by_joint(hand, q, followers)
     for joint, angle in angles.items():

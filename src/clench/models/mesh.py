@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import short_repr
 
 IntArray = NDArray[np.int64]
 
@@ -18,6 +19,8 @@ class TriangleMesh:
 
     vertices: FloatArray
     triangles: IntArray
+
+    __repr__ = short_repr
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
         v = np.array(vertices, dtype=np.float64).reshape(-1, 3)

@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from clench.base.pose import Pose
+from clench.base.short_repr import short_repr
 
 from .mesh import TriangleMesh
 
@@ -63,6 +64,8 @@ class Shape:
     pose: Pose = field(default_factory=Pose.identity)
     mesh: TriangleMesh | None = None
     name: str = ""
+
+    __repr__ = short_repr
 
     def to_mesh(self, deviation: float = 1e-4) -> TriangleMesh:
         """Return triangles inscribed in the shape, in the link's frame, off by at most `deviation` [m]."""

@@ -15,10 +15,10 @@ from clench.grasp.mechanics.steadiness import epsilon
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.controller import solve
-from clench.solve.holding import hold
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import SqueezePlan, plan_squeeze
+from clench.solver.controller import solve
+from clench.solver.holding import hold
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import SqueezePlan, plan_squeeze
 
 from .confidence import shipped_table
 from .grasp_plan import PlannedGrasp

@@ -10,8 +10,8 @@ from clench.base.pose import Pose
 from clench.execution.trajectory import Trajectory
 from clench.grasp.contact_kinds import GraspKind
 from clench.models.command import GraspCommand
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import SqueezePlan
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import SqueezePlan
 
 from .options import PlanOptions
 from .rejections import HELP, Rejection

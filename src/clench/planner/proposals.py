@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.pose import FloatArray
-from clench.solve.preshapes import Preshape
+from clench.solver.preshapes import Preshape
 
 from .pairs import Pairs
 

@@ -17,7 +17,7 @@ from clench.grasp.closing import core_count
 from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.preshapes import Preshape, opposition_zones
+from clench.solver.preshapes import Preshape, opposition_zones
 
 from .approach_check import Approach
 from .finishing import Finisher

@@ -17,10 +17,10 @@ from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.objects.mass import mass_properties
-from clench.solve.batch_solver import BatchSolver
-from clench.solve.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
-from clench.solve.preshapes import Preshape
-from clench.solve.solution import FingerStatus, SolutionStatus
+from clench.solver.batch_solver import BatchSolver
+from clench.solver.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
+from clench.solver.preshapes import Preshape
+from clench.solver.solution import FingerStatus, SolutionStatus
 
 from .options import PlanOptions
 from .proposals import Arm, Proposals, vary

@@ -21,7 +21,7 @@ from clench.base.pose import Pose
 from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
 from clench.execution.formats.grasp_posture import GraspPosture
 from clench.models.hand.hand import Hand
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 from handmade import make_solution
 
 ENDINGS = {GraspFormat.ISAAC_GRASP: "yaml", GraspFormat.DEXGRASPBENCH: "npy", GraspFormat.MOVEIT_GRASP: "json"}

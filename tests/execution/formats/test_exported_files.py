@@ -19,7 +19,7 @@ from clench.apps.cli.main import main
 from clench.base.errors import CommandError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 Grip = tuple[Hand, GraspObject, GraspSolution]
 

@@ -15,7 +15,7 @@ from clench.execution.formats import mcap_log
 from clench.execution.formats.mcap_log import write_log
 from clench.execution.history import ExecutionHistory
 from clench.execution.report import ExecutionReport, JointReached
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 pytest.importorskip("mcap_ros2", reason="needs mcap-ros2-support")
 

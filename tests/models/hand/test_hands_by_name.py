@@ -113,8 +113,10 @@ def test_a_file_of_the_same_name_comes_first(menagerie: Path, tmp_path, monkeypa
             r"Model 'rigt_hand' is not in 'shadow_hand' of mujoco_menagerie\. Did you mean 'right",
         ),
         ("mujoco_menagerie:shadow", r"Hand 'shadow' is not in the package mujoco_menagerie\..*Hands: .*shadow_hand"),
-        ("robot_descriptions:alegro_hand_description", r"Did you mean 'allegro_hand_description'\?"),
-        ("shadw_hand", r"Did you mean 'shadow_hand'\? Hands: patent15, robonaut2, .*allegro_hand_description"),
+        ("robot_descriptions:alegro_hand_description", r"Did you mean 'allegro_hand_mj_description'\?"),
+        ("shadw_hand", r"Did you mean 'shadow_hand'\? Hands: patent15, robonaut2, .*allegro_hand_mj_description"),
+        # Grippers that clench refuses are in both packages, and are not suggested.
+        ("robotiq_2f86", r"no such file exists\. Hands: (?!.*(robotiq|umi_gripper))"),
         ("allegro_hand_description/both", r"Model 'both' is not in .* Models: left, right"),
     ],
 )
@@ -148,6 +150,22 @@ def test_packages_that_are_not_installed(monkeypatch) -> None:
         Hand.load("mujoco_menagerie:shadow_hand")
     with pytest.raises(UnknownNameError, match=r"more hands by name need pip install 'clench\[hands\]'\. Hands: pat"):
         Hand.load("shadow_hand")
+
+
+@pytest.mark.shared
+def test_every_suggested_hand_loads(shared_data: Path, tmp_path, monkeypatch) -> None:
+    # Both packages take these hands from the Menagerie; a clone of it stands in both caches.
+    clone = tmp_path / "mujoco_menagerie"
+    clone.mkdir()
+    for robot in ("shadow_hand", "wonik_allegro"):
+        (clone / robot).symlink_to(shared_data / "hands" / f"{robot}_mjcf")
+    monkeypatch.setenv("MENAGERIE_ROOT", str(clone))
+    monkeypatch.setattr("robot_descriptions._cache.clone_to_cache", lambda *arguments, **options: str(clone))
+    suggested = named.known_names()
+    assert set(suggested) == named._LOADING
+    for name in suggested:
+        monkeypatch.delitem(sys.modules, f"robot_descriptions.{name}", raising=False)
+        assert len(Hand.load(name).fingers) in (4, 5)
 
 
 @pytest.mark.shared

@@ -16,9 +16,9 @@ from clench.base.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.batch_progress import shown
-from clench.solve.grasp_batch import GraspBatch
-from clench.solve.solution import GraspSolution
+from clench.solver.batch_progress import shown
+from clench.solver.grasp_batch import GraspBatch
+from clench.solver.solution import GraspSolution
 
 from .report import BenchReport, describe_place, timed
 

@@ -15,7 +15,7 @@ from clench.models.shapes import ShapeKind
 
 if TYPE_CHECKING:
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
+    from clench.solver.solution import GraspSolution
 
 #: Distance of a contact point from the object's surface [m]: what an independent measure is held to.
 SURFACE = 1e-9

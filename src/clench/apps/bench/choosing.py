@@ -14,8 +14,8 @@ from clench.grasp.candidates import FingerCandidate
 from clench.grasp.choice import HandChoice, choose
 from clench.grasp.criteria import Setting
 from clench.models.command import GraspCommand
-from clench.solve.alternatives import finger_sets
-from clench.solve.problem import make_problem, make_setting
+from clench.solver.alternatives import finger_sets
+from clench.solver.problem import make_problem, make_setting
 
 from .report import BenchReport, describe_place
 

@@ -15,9 +15,9 @@ from clench.grasp.scene import PackedObject, pack_object
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.grasp_batch import GraspBatch
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.grasp_batch import GraspBatch
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 from .driving import Driven, Rested
 from .engine import Engine

@@ -16,7 +16,7 @@ import numpy as np
 import clench
 from clench.base.json_files import write_atomically
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.batch_progress import shown
+from clench.solver.batch_progress import shown
 
 from .closers import OURS, SIMULATED, Closer, Ended, PeerCase, wrong_ends
 from .peer_picture import draw_peers, peer_table

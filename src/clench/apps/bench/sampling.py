@@ -13,8 +13,8 @@ from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.hand.opposition import opposing_preshapes
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.holding import hold
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.holding import hold
+from clench.solver.solution import GraspSolution, SolutionStatus
 
 #: Preshapes of the thumb that share the poses; the first is the open hand.
 PRESHAPES = 10

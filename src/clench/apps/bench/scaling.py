@@ -19,8 +19,8 @@ from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.batch_progress import shown
-from clench.solve.solution import GraspSolution
+from clench.solver.batch_progress import shown
+from clench.solver.solution import GraspSolution
 
 from .batching import stream_memory
 from .memory import solve_memory

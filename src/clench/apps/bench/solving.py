@@ -18,10 +18,10 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 from clench.models.tessellation import shape_mesh
-from clench.solve.alternatives import close_sets, decided
-from clench.solve.planning import planned
-from clench.solve.problem import make_problem
-from clench.solve.solution import GraspSolution
+from clench.solver.alternatives import close_sets, decided
+from clench.solver.planning import planned
+from clench.solver.problem import make_problem
+from clench.solver.solution import GraspSolution
 
 from .checking import Checked, Surface, check_answer
 from .report import BenchReport, describe_place, timed

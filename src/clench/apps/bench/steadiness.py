@@ -18,7 +18,7 @@ from clench.grasp.mechanics.loads import six_pulls_and_twists, weight
 from clench.grasp.mechanics.squeeze import squeeze_forces
 from clench.grasp.mechanics.steadiness import EDGES, epsilon, epsilon_bound
 from clench.grasp.mechanics.wrench_space import volume_l1
-from clench.solve.holding import hold
+from clench.solver.holding import hold
 
 from .report import BenchReport, describe_place, timed
 

@@ -19,9 +19,9 @@ from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solve.grasp_kinds import grasp_kind
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
+from clench.solver.grasp_kinds import grasp_kind
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
 
 #: Links this near touch, and fingers without anything nearer count so far away [m], as in DexGraspBench.
 NEAR, FAR = 0.002, 0.01

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from clench.base.errors import CommandError, FileError
 
 from .command_files import read_command
+from .scene_options import with_scene
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,6 +32,8 @@ def batch(
     hand_file: Path | None = None,
     palm: str | None = None,
     scale: float = 1.0,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
     planes: int | None = None,
     planes_only: bool = False,
     threads: int | None = None,
@@ -52,6 +55,9 @@ def batch(
         hand_file: TOML file that overrides what was found in the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
+        obstacle: mesh or shape that stands in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be
+            given several times.
         planes: curl planes per finger.
         planes_only: close on the planes alone; what lies between them is not looked at, and nothing is certified.
         threads: how many are used; all cores by default.
@@ -67,9 +73,9 @@ def batch(
     import clench
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
-    from clench.solve.batch import CHUNK
-    from clench.solve.batch_parts import check_batch_file
-    from clench.solve.devices import CPU, why_not
+    from clench.solver.batch import CHUNK
+    from clench.solver.batch_parts import check_batch_file
+    from clench.solver.devices import CPU, why_not
 
     from .printing import print_batch, print_files
     from .results import print_json
@@ -83,9 +89,8 @@ def batch(
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(object, scale=scale)
     warn_of_size(the_hand, the_object)
-    asked = clench.GraspCommand(hand_pose=clench.Pose.identity())
-    if command is not None:
-        asked = read_command(command, the_hand)
+    asked = clench.GraspCommand(clench.Pose.identity()) if command is None else read_command(command, the_hand)
+    the_object = with_scene(the_object, asked.object_pose, table, obstacle)
     if planes_only:
         asked = replace(asked, full_width=False)
     if planes is not None:
@@ -127,7 +132,7 @@ def batch(
 @contextmanager
 def _going_on(out: Path | None) -> Iterator[None]:
     """Say where the parts are when a batch is interrupted."""
-    from clench.solve.batch_parts import parts_folder
+    from clench.solver.batch_parts import parts_folder
 
     try:
         yield

@@ -38,7 +38,7 @@ def calibrate(
     from clench.base.json_files import check_writable, write_atomically
     from clench.grasp.calibration import calibration_of, calibration_to_toml
     from clench.grasp.fitting import fit_weights, told_right
-    from clench.solve.examples import ScoredExamples, read_examples, recorded_outcomes
+    from clench.solver.examples import ScoredExamples, read_examples, recorded_outcomes
 
     from .printing import print_files
     from .results import print_json

@@ -17,6 +17,7 @@ from .execute import execute
 from .objects import object_
 from .parsing import as_range
 from .plan_command import plan
+from .scene_options import with_scene
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
@@ -58,6 +59,8 @@ def solve(
     hand_file: Path | None = None,
     palm: str | None = None,
     scale: float = 1.0,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
     collision_source: Source | None = None,
     planes: int | None = None,
     order: tuple[Order, ...] = (),
@@ -82,6 +85,9 @@ def solve(
         hand_file: TOML file that overrides what was found in the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
+        obstacle: mesh or shape that stands in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be
+            given several times.
         collision_source: geometry of the hand to solve for.
         planes: curl planes per finger.
         order: in which the joints close; several are solved one by one, and the best is kept.
@@ -105,10 +111,11 @@ def solve(
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
     from clench.models.objects.loading import size_warnings
-    from clench.solve.orders import settled
-    from clench.solve.pareto import hand_front
+    from clench.solver.orders import settled
+    from clench.solver.pareto import hand_front
 
-    from .printing import print_choice, print_forces, print_pose_error, print_solution
+    from .choice_tables import print_choice
+    from .printing import print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
     forces = forces or bool(mass or friction)
@@ -118,8 +125,8 @@ def solve(
     the_object = clench.GraspObject.load(object, scale=scale)
     told = size_warnings(the_object) if warn_of_size(the_hand, the_object) else ()
     given = None if command is None else read_command(command, the_hand)
-    asked: dict[str, Any] = {} if planes is None else {"planes": planes}
-    asked |= {} if criteria is None else {"criteria": criteria}
+    the_object = with_scene(the_object, None if given is None else given.object_pose, table, obstacle)
+    asked: dict[str, Any] = {k: v for k, v in (("planes", planes), ("criteria", criteria)) if v is not None}
     announce()
     warm_up()
     if given is None:

@@ -127,11 +127,12 @@ def import_(
     from dataclasses import replace
 
     import clench
+    from clench.base.files import make_folder
     from clench.base.json_files import check_folder, write_json
     from clench.models.command_file import command_to_dict
 
     from .printing import print_files
-    from .results import make_folder, print_json
+    from .results import print_json
 
     check_folder(out)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from clench.base.errors import FileError
@@ -19,6 +20,8 @@ from .actuators import (
     stop_of,
 )
 from .interrupts import stopped_by_signals
+from .parsing import EXIT_INTERRUPTED
+from .scene_options import with_scene
 
 
 def execute(
@@ -31,6 +34,8 @@ def execute(
     hand_file: Path | None = None,
     palm: str | None = None,
     scale: float | None = None,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
     speed: float = 1.0,
     force: bool = False,
     skip_next_steps: bool = False,
@@ -65,6 +70,8 @@ def execute(
         hand_file: TOML file that was used to load the hand.
         palm: palm link that was used to load the hand.
         scale: that was used to load the object; what the solution says by default.
+        table: the table that the solution was computed with, see `clench solve`.
+        obstacle: obstacles that the solution was computed with, see `clench solve`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, or next steps that drive links into each other, too.
         skip_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
@@ -110,6 +117,7 @@ def execute(
         scale=the_solution.object_scale if scale is None else scale,
         collision_source=the_solution.object_collision_source,
     )
+    the_object = with_scene(the_object, the_solution.object_pose, table, obstacle)
     options = ActuatorOptions(
         controller, joint_states, interface, joint_map, config, timeout, to, record, tested, squeeze, film, drive
     )
@@ -133,7 +141,9 @@ def execute(
     else:
         print_report(report)
     if interrupted:
-        raise KeyboardInterrupt
+        # The report is the one document on standard output.
+        sys.stderr.write("clench: error: interrupted.\n")
+        return EXIT_INTERRUPTED
     return 0 if report.success and exit_code(the_solution, strict) == 0 else 1
 
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from clench.execution.hold import Hold
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.saved_question import SavedBatch
-    from clench.solve.solution import GraspSolution
+    from clench.solver.saved_question import SavedBatch
+    from clench.solver.solution import GraspSolution
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ def _contents(file: Path) -> list[tuple[str, GraspSolution | SavedBatch]]:
     """Return the solutions of a file, or the batch that it is, each with its name for messages."""
     import clench
     from clench.base.json_files import read_json
-    from clench.solve.saved_question import SavedBatch
+    from clench.solver.saved_question import SavedBatch
 
     if file.suffix == ".npz":
         return [(str(file), SavedBatch(file))]

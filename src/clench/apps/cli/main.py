@@ -6,7 +6,9 @@ execution; 2 = bad input; 70 = a mistake in this program.
 
 from __future__ import annotations
 
+import functools
 import gc
+import json
 import os
 import sys
 import warnings
@@ -16,17 +18,17 @@ from typing import Any
 from clench import __version__
 from clench.base.errors import ClenchError, UnknownNameError
 
-from .parsing import EXIT_BAD_INPUT, parse_call
+from .parsing import EXIT_BAD_INPUT, EXIT_INTERRUPTED, PRINT_COMPLETION, parse_call, print_completion
 
 EXIT_INTERNAL = 70
 #: So many new objects start the first collection, and so many collections the next wider one.
 GARBAGE_THRESHOLDS = (50_000, 20, 100)
-EXIT_INTERRUPTED = 130
 
 DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
 
 Exit codes: 0 = grasp or partial, and executed where asked (--strict: grasp only); 1 = any other answer, or a failed
-execution; 2 = bad input. Every command takes --json (one document on standard output) and --debug (tracebacks)."""
+execution; 2 = bad input. Every command takes --json (one document on standard output, for an error {"error": "..."})
+and --debug (tracebacks). clench --tyro-print-completion SHELL prints the completion for bash or zsh."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -38,6 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in arguments
     arguments = [a for a in arguments if a != "--debug"]
+    say = functools.partial(_say, as_json="--json" in arguments)
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _warn
@@ -45,9 +48,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ClenchError as error:
         if debug:
             raise
-        return _say(str(error), EXIT_BAD_INPUT)
+        return say(str(error), EXIT_BAD_INPUT)
     except KeyboardInterrupt:
-        return _say("interrupted.", EXIT_INTERRUPTED)
+        return say("interrupted.", EXIT_INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has seen enough (`clench hand H | head`); what is buffered has nowhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -56,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if debug:
             raise
         what = " ".join(f"{type(error).__name__}: {error}".split())
-        return _say(f"internal error ({what}); run again with --debug to see where.", EXIT_INTERNAL)
+        return say(f"internal error ({what}); run again with --debug to see where.", EXIT_INTERNAL)
 
 
 def _run(arguments: list[str]) -> int:
@@ -71,6 +74,8 @@ def _run(arguments: list[str]) -> int:
     if name in ("-h", "--help"):
         sys.stdout.write(_overview(COMMANDS))
         return 0
+    if name == PRINT_COMPLETION:
+        return print_completion("clench", COMMANDS, arguments)
     if name not in COMMANDS:
         raise UnknownNameError("command", name, "clench", COMMANDS)
     if name == "bench" and not {"-h", "--help"} & set(rest[:1]):
@@ -90,6 +95,10 @@ def _warn(message: Warning | str, category: type[Warning], *where: Any, **more: 
     sys.stderr.write(f"clench: warning: {message}\n")
 
 
-def _say(sentence: str, code: int) -> int:
+def _say(sentence: str, code: int, *, as_json: bool) -> int:
+    """Say what went wrong on standard error, and as a document on standard output for a program that reads one."""
+    if as_json:
+        sys.stdout.write(json.dumps({"error": sentence}) + "\n")
+        sys.stdout.flush()
     sys.stderr.write(f"clench: error: {sentence}\n")
     return code

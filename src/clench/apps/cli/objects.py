@@ -42,17 +42,17 @@ def object_(
 
 def print_object(report: ObjectReport) -> None:
     """Print what is known of an object."""
-    from .tables import new_console, new_table, plain
+    from .tables import console_out, plain, table_with
 
-    out = new_console()
-    summary = new_table("object", "", "")
+    out = console_out()
+    summary = table_with("object", "", "")
     for label, text in report.summary_rows():
         summary.add_row(plain(label), plain(text))
     out.print(summary)
     rows = report.pose_rows()
     if rows:
         title = f"stable poses on a table, {min(len(rows), _MOST_ROWS)} of {len(rows)}, the most probable first"
-        poses = new_table(title, "share", "points down", "centre [mm]", "stands on")
+        poses = table_with(title, "share", "points down", "centre [mm]", "stands on")
         for row in rows[:_MOST_ROWS]:
             poses.add_row(*map(plain, row))
         out.print(poses)

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
-from collections.abc import Callable, Sequence
+import io
+import itertools
+import re
+from collections.abc import Callable, Mapping, Sequence
+from types import FunctionType
+from typing import Any, Final
 
 from clench.base.errors import CommandError
 
 EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+#: The option that prints what a shell needs to complete commands, and the shells that are known.
+PRINT_COMPLETION: Final = "--tyro-print-completion"
+SHELLS: Final = ("bash", "zsh")
+#: The option that may be given several times, as well as once with several values.
+_REPEATED: Final = "--obstacle"
+#: Lines of a box that are indented so far are the help of an option.
+_HELP_INDENT = 8
 
 
 def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, float] | None:
@@ -27,6 +41,9 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     Args:
         program: what the usage line starts with. command: what is called with the options it names.
         arguments: those after the program's name.
+
+    Raises:
+        CommandError: a wrong argument beside `--json`; without it, a box on standard error says what is wrong.
     """
     import tyro
 
@@ -35,13 +52,79 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
         # Deferred, so that the command's own errors are not taken for wrong arguments.
         return functools.partial(command, *values, **options)
 
+    box = io.StringIO()
     try:
-        return tyro.cli(
-            call,
-            prog=program,
-            args=list(arguments),
-            config=(tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone),
-        )
+        with contextlib.redirect_stderr(box) if "--json" in arguments else contextlib.nullcontext():
+            return tyro.cli(call, prog=program, args=_gathered(arguments), config=options_style())
     except SystemExit as finished:
         code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
+        if code and "--json" in arguments:
+            raise CommandError(f"{program}: {_sentence(box.getvalue())}") from None
         return lambda: code
+
+
+def print_completion(program: str, commands: Mapping[str, Callable[..., int]], arguments: Sequence[str]) -> int:
+    """Print what a shell needs to complete commands and options; return the exit code.
+
+    Args:
+        program: what is completed. commands: by name. arguments: the option with the name of a shell.
+
+    Raises:
+        CommandError: a shell that is not known.
+    """
+    import tyro
+
+    if list(arguments[1:]) not in [[shell] for shell in SHELLS]:
+        given = " ".join(arguments[1:]) or "nothing"
+        raise CommandError(f"{arguments[0]}: expected a shell, one of {', '.join(SHELLS)}, got {given}.")
+    told = {name: _in_single_lines(command) for name, command in commands.items()}
+    try:
+        tyro.extras.subcommand_cli_from_dict(
+            told, prog=program, args=[PRINT_COMPLETION, arguments[1]], config=options_style()
+        )
+    except SystemExit as finished:
+        return finished.code if isinstance(finished.code, int) else 0
+    return 0
+
+
+def _in_single_lines(command: Callable[..., int]) -> Callable[..., int]:
+    """Return a command whose help has every option on one line: bash takes further lines for words to choose from."""
+    assert isinstance(command, FunctionType)
+    copied = FunctionType(command.__code__, command.__globals__, command.__name__, command.__defaults__)
+    copied.__kwdefaults__, copied.__annotations__ = command.__kwdefaults__, command.__annotations__
+    copied.__doc__ = re.sub(r"\n {12,}", " ", command.__doc__ or "")
+    return copied
+
+
+def _gathered(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with the values of a repeated option behind one of it."""
+    others: list[str] = []
+    values: list[str] = []
+    into = others
+    for argument in arguments:
+        if argument == _REPEATED:
+            into = values
+        elif argument.startswith(f"{_REPEATED}="):
+            values.append(argument.partition("=")[2])
+        else:
+            into = others if argument.startswith("--") else into
+            into.append(argument)
+    return [*others, _REPEATED, *values] if values or _REPEATED in arguments else others
+
+
+def options_style() -> tuple[Any, ...]:
+    """Return how signatures become options: no `--no-x` for a flag, and no text that stands for None."""
+    import tyro
+
+    return tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone
+
+
+def _sentence(box: str) -> str:
+    """Return what a box of text says first, on one line, without its title and the help of options."""
+    lines = [line.strip("│").rstrip() for line in box.splitlines() if not line.startswith(("╭", "╰"))]
+    rules = [i for i, line in enumerate(lines) if line and set(line.strip()) <= set("─-")]
+    # Where boxes are drawn with letters alone, the title is a line above the first rule.
+    start = 0 if box.startswith("╭") or not rules else rules[0] + 1
+    first = itertools.takewhile(lambda line: line and not set(line.strip()) <= set("─-"), lines[start:])
+    text = " ".join(line.strip() for line in first if not line.startswith(" " * _HELP_INDENT))
+    return (text or "expected other arguments, see --help").rstrip(".") + "."

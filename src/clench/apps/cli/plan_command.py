@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from .parsing import as_range
+from .scene_options import with_scene
 
 if TYPE_CHECKING:
     from clench.execution.hold import HoldReport
@@ -33,7 +34,8 @@ def plan(
     min_fingers: int = 2,
     approach: tuple[float, float, float] | None = None,
     approach_angle: float = 45.0,
-    table: bool = False,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
     pose_sigma: float | None = None,
     apart: float | None = None,
     effort: int | None = None,
@@ -63,7 +65,8 @@ def plan(
         min_fingers: fingers that touch at least.
         approach: direction in the world in which the palm comes.
         approach_angle: how far the palm may come from another direction [degrees].
-        table: put a table under the object.
+        table: a table under the object, at its lowest point, or with its top at this height [m].
+        obstacle: other things, each as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz (docs/surroundings.md).
         pose_sigma: the object may be off by this standard deviation [m], with 0.6 degrees for every millimetre.
         apart: two grasps differ by at least this, as a root mean square over all links [m]; 0.02 by default.
         effort: proposals per grasp; the best one of so many is returned; 40 by default.
@@ -80,10 +83,8 @@ def plan(
 
     import clench
     from clench.base.json_files import check_folder
-    from clench.execution.scene import lowest
     from clench.grasp.sizes import warn_of_size
     from clench.kernels.warming import announce, warm_up
-    from clench.models.objects.obstacles import table as table_under
 
     from .plan_table import print_plan
     from .printing import print_files
@@ -114,8 +115,7 @@ def plan(
         from clench.execution.convex_pieces import in_pieces
 
         the_object = in_pieces(the_object, show_progress=not json)
-    if table:
-        the_object = the_object.with_body(table_under(lowest(the_object)))
+    the_object = with_scene(the_object, None, table, obstacle)
     warn_of_size(the_hand, the_object)
     announce()
     warm_up()
@@ -136,7 +136,7 @@ def plan(
 def _searched(hand: Hand, obj: GraspObject, count: int, asked: dict[str, Any]) -> GraspPlan:
     """Return the plan; a bar on standard error counts the grasps that are found."""
     import clench
-    from clench.solve.batch_progress import shown
+    from clench.solver.batch_progress import shown
 
     search = clench.iter_grasps(hand, obj, count, **asked)
     with shown(count, None) as advance:
@@ -160,9 +160,7 @@ def _held(grasp: PlannedGrasp, hand: Hand, obj: GraspObject, friction: Any) -> H
 
 def _write(found: GraspPlan, document: dict[str, Any], folder: Path) -> list[Path]:
     """Write the plan, and the solution and trajectory of every grasp; return the paths of the files."""
-    from clench.base.json_files import write_json
-
-    from .results import make_folder
+    from clench.base.json_files import make_folder, write_json
 
     make_folder(folder)
     write_json(folder / "plan.json", document, "plan")

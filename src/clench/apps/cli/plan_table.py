@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .tables import new_console, new_table, plain
+from .tables import console_out, plain, table_with
 
 
 def print_plan(document: Mapping[str, Any], text: str) -> None:
     """Print planned grasps, the best ones first, and what became of the other proposals; see `clench plan --json`."""
-    console = new_console()
+    console = console_out()
     columns = ["", "kind", "preshape", "palm [mm]", "epsilon", "holds", "links", "torque [Nm]"]
     tried = any("hold" in grasp for grasp in document["grasps"])
-    table = new_table(f"{document['hand']} on {document['object']}", *columns, *(["held"] if tried else []))
+    table = table_with(f"{document['hand']} on {document['object']}", *columns, *(["held"] if tried else []))
     for number, grasp in enumerate(document["grasps"], start=1):
         solution = grasp["solution"]
         place = " ".join(f"{1e3 * x:.0f}" for x in solution["hand_pose"]["position"])

@@ -9,25 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .tables import new_console as _console
-from .tables import new_table as _table
+from .tables import console_out as _console
 from .tables import plain as _plain
+from .tables import table_with as _table
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from clench.execution.formats.exchange import ExportReport
     from clench.execution.hold import HoldReport
     from clench.execution.report import ExecutionReport, NextStepReached
     from clench.models.hand.report import HandReport
-    from clench.solve.pareto import HandSets
-    from clench.solve.pose_error import PoseErrorReport
-    from clench.solve.record import RecordEntry
-    from clench.solve.solution import Candidate, FingerResult, GraspSolution
-
-#: Rows of a table that may be long.
-_MOST_ROWS = 10
+    from clench.solver.pose_error import PoseErrorReport
+    from clench.solver.record import RecordEntry
+    from clench.solver.solution import FingerResult, GraspSolution
 
 
 def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequence[Path]) -> None:
@@ -77,7 +72,9 @@ def print_forces(solution: GraspSolution) -> None:
     console.print(_plain(squeeze["text"]))
     if not squeeze["forces"]:
         return
-    table = _table("squeeze, forces on the object", "finger", "link", "friction", "force [N]", "x", "y", "z")
+    table = _table(
+        "squeeze, forces on the object", "finger", "link", "friction [-]", "force [N]", "x [N]", "y [N]", "z [N]"
+    )
     for contact, mu, force in zip(squeeze["contacts"], squeeze["friction"], squeeze["forces"], strict=True):
         numbers = [f"{mu:g}", f"{float(np.linalg.norm(force)):.2f}", *(f"{f:.2f}" for f in force)]
         table.add_row(*map(_plain, (contact["finger"], contact["link"], *numbers)))
@@ -201,41 +198,12 @@ def _print_steps(console: Console, steps: Sequence[NextStepReached]) -> None:
     console.print(table)
 
 
-def print_choice(solution: GraspSolution) -> None:
-    """Print what counted, the sets of every finger, and the sentences; nothing where the solution does not say."""
-    from clench.solve.pareto import hand_front
-
-    out, choice = _console(), solution.choice
-    if choice is None:
-        out.print("The solution does not say how its sets were chosen.")
-        return
-    out.print(_criteria_table(choice))
-    if choice["unused"]:
-        out.print(f"said nothing about any set: {_plain(', '.join(choice['unused']))}")
-    for name, finger in solution.fingers.items():
-        if name in choice["fingers"]:
-            out.print(_finger_table(finger, choice))
-            out.print(_plain(f"{name}: {choice['fingers'][name]['text']}"))
-            if choice["fingers"][name]["closed_again"]:
-                out.print(_plain(f"{name} met another finger and was closed again; its sum is that of before."))
-    if "orders" in choice:
-        out.print(_orders_table(choice["orders"]))
-        out.print(_plain(choice["orders"]["text"]))
-    front = hand_front(solution)
-    if len(front) > 1:
-        out.print(_front_table(front))
-    for name, value in choice["final_hand_scores"].items():
-        out.print(_plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
-    out.print(f"[bold]{_plain(choice['text'])}[/bold]")
-    if choice["combinations_tried"] and choice.get("proved"):
-        judged, every = choice["combinations_tried"], choice["combinations"]
-        out.print(f"No combination of one set per finger is better ({judged} of {every} had to be judged).")
-
-
 def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
     """Print a list of recorded solves."""
     console = _console()
-    table = _table(f"{len(entries)} of {total} solves", "id", "time", "hand", "object", "status", "touching", "seed")
+    table = _table(
+        f"{len(entries)} of {total} solves", "id", "time [UTC]", "hand", "object", "status", "touching", "seed"
+    )
     for e in entries:
         seed = "" if e.seed is None else str(e.seed)
         row = (str(e.id), e.time[:19], e.hand, e.object, e.status.value, str(e.touching_fingers), seed)
@@ -261,7 +229,7 @@ def print_weights(weights: Mapping[str, float], sentence: str) -> None:
     """Print fitted weights, and a sentence about them."""
     console = _console()
     if weights:
-        table = _table("fitted weights", "criterion", "weight")
+        table = _table("fitted weights", "criterion", "weight [-]")
         for name, weight in weights.items():
             table.add_row(_plain(name), f"{weight:.4g}")
         console.print(table)
@@ -298,58 +266,6 @@ def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tup
     plane = "full width" if chosen.plane is None else f"plane {chosen.plane + 1}"
     angles = " ".join(f"{np.rad2deg(a):.1f}" for a in chosen.joint_angles.values())
     return name, finger.status.value, plane, ", ".join(links) or finger.reason, angles
-
-
-def _criteria_table(choice: Mapping[str, Any]) -> Table:
-    result = _table(
-        f"criteria ({choice['calibration']})", "criterion", "unit", "better", "weight", "counts as 1", "limit"
-    )
-    for name, c in choice["criteria"].items():
-        limit = "" if c["limit"] is None else f"{c['limit']:g}"
-        result.add_row(*map(_plain, (name, c["unit"], c["better"], f"{c['weight']:g}", f"{c['scale']:g}", limit)))
-    return result
-
-
-def _finger_table(finger: FingerResult, choice: Mapping[str, Any]) -> Table:
-    """List a finger's sets: the scores that counted, the weighted sum, and how each ended."""
-    said = choice["fingers"][finger.name]
-    names = [n for n in choice["criteria"] if any(n in c.scores for c in finger.candidates)]
-    title = f"{finger.name} (* chosen, 2 runner-up, P on the Pareto front, x may not be taken)"
-    result = _table(title, "", "set", "posture", *(n.replace("_", " ") for n in names), "sum", "status")
-    for i, candidate in enumerate(finger.candidates):
-        mark = "*" if i == finger.chosen else "2" if i == said["runner_up"] else ""
-        mark += "P" if i in said["pareto"] else ""
-        mark += "x" if candidate.feasible is False else ""
-        where = "full" if candidate.plane is None else f"plane {candidate.plane + 1}"
-        scores = [_score(candidate, name) for name in names]
-        row = (mark, where, str(candidate.posture), *scores, f"{said['totals'][i]:.4f}", candidate.status.value)
-        result.add_row(*map(_plain, row))
-    return result
-
-
-def _orders_table(orders: Mapping[str, Any]) -> Table:
-    """List the closing orders that were solved, or why they could not be."""
-    result = _table("closing orders (* chosen)", "", "order", "status", "sum")
-    for name, said in orders["compared"].items():
-        status, total = (said["refused"], "") if "refused" in said else (said["status"], f"{said['total']:.4f}")
-        result.add_row(*map(_plain, ("*" if name == orders["chosen"] else "", name, status, total)))
-    return result
-
-
-def _front_table(front: Sequence[HandSets]) -> Table:
-    """List combinations over all fingers that no other beats in every criterion, by the numbers of their sets."""
-    title = f"Pareto front of the hand, {len(front)} combinations by weighted sum (* chosen; sets from 0)"
-    names = [n.replace("_", " ") for n in front[0].scores]
-    result = _table(title, "", *front[0].sets, *names, "sum")
-    for entry in front[:_MOST_ROWS]:
-        scores = [f"{v:.4g}" for v in entry.scores.values()]
-        row = ("*" if entry.chosen else "", *map(str, entry.sets.values()), *scores, f"{entry.total:.4f}")
-        result.add_row(*map(_plain, row))
-    return result
-
-
-def _score(candidate: Candidate, name: str) -> str:
-    return f"{candidate.scores[name]:.4g}" if name in candidate.scores else ""
 
 
 def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:

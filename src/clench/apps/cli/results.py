@@ -6,14 +6,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.base.errors import FileError, MotionError
+from clench.base.errors import MotionError
+from clench.base.files import make_folder
 from clench.base.json_files import encode_document
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
+    from clench.solver.solution import GraspSolution
 
 
 def print_json(document: dict[str, Any]) -> None:
@@ -48,18 +49,6 @@ def write_results(
             (folder / "trajectory.json").unlink(missing_ok=True)
             sys.stderr.write(f"clench: no trajectory was written. {error}\n")
     return [*written, *draw_solution(hand, obj, command, solution, folder)]
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, with those above it.
-
-    Raises:
-        FileError: it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(folder, f"cannot be made a folder ({error.strerror or error}).") from None
 
 
 def exit_code(solution: GraspSolution, strict: bool) -> int:

@@ -1,4 +1,4 @@
-"""Tables and text for people, on standard output."""
+"""Make tables for people, on standard output; every text in them is shown as it is."""
 
 from __future__ import annotations
 
@@ -11,19 +11,15 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def new_console() -> Console:
-    """Return a console that writes to standard output."""
+def console_out() -> Console:
+    """Return what prints on standard output."""
     from rich.console import Console
 
     return Console(highlight=False, soft_wrap=False)
 
 
-def new_table(title: str, *columns: str) -> Table:
-    """Return a table without rows.
-
-    Args:
-        title: above it. columns: their headings.
-    """
+def table_with(title: str, *columns: str) -> Table:
+    """Return an empty table with heads of columns, which name the units of numbers."""
     from rich.table import Table
 
     table = Table(title=plain(title), title_justify="left", show_header=any(columns))

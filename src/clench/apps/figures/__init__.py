@@ -6,11 +6,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clench.base.files import make_folder
+
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solve.solution import GraspSolution
+    from clench.solver.solution import GraspSolution
 
 __all__ = ["draw_solution"]
 
@@ -22,20 +24,21 @@ def draw_solution(
 
     Args:
         hand, obj, command: what was solved. solution: the answer.
-        directory: an existing folder; `<finger>_plane.png`, `<finger>_sets.png` and `grasp.png` are written there.
+        directory: a folder, which is made where it is not there; `<finger>_plane.png`, `<finger>_sets.png` and
+            `grasp.png` are written to it.
 
     Returns:
         the files written; a finger without sets (nothing to close) has no picture of its own.
 
     Raises:
-        FileError: a file cannot be written.
+        FileError: the folder cannot be made, or a file cannot be written.
     """
     from .curl_plane import draw_finger
     from .finger_scenes import FingerScenes
     from .hand_view import draw_hand
     from .set_grid import draw_sets
 
-    folder = Path(directory)
+    folder = make_folder(directory)
     files = []
     for name, result in solution.fingers.items():
         if not 0 <= result.chosen < len(result.candidates):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.solve.solution import Candidate, FingerResult
+from clench.solver.solution import Candidate, FingerResult
 
 from . import style
 from .finger_scenes import FingerScenes

@@ -14,9 +14,9 @@ from clench.grasp.plan import FingerPlan, LinkOutline
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
-from clench.solve.planning import planned
-from clench.solve.problem import make_problem
-from clench.solve.solution import Candidate, Contact, GraspSolution
+from clench.solver.planning import planned
+from clench.solver.problem import make_problem
+from clench.solver.solution import Candidate, Contact, GraspSolution
 
 from .loops import Loop, join_segments, outline_loops
 from .plane_scene import JointMotion, LinkSection, PlaneContact, PlaneScene, SectionCurve, along_y, turned

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.solution import Contact, GraspSolution
+from clench.solver.solution import Contact, GraspSolution
 
 from . import style
 from .raster import Camera, Image, halved, rasterise

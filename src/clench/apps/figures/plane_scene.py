@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.solve.solution import Contact
+from clench.solver.solution import Contact
 
 from .loops import Loop
 

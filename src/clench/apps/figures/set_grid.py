@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.solve.solution import Candidate, FingerResult, FingerStatus
+from clench.solver.solution import Candidate, FingerResult, FingerStatus
 
 from . import style
 from .curl_plane import draw_plane, frame_plane, overlap, set_name

@@ -14,7 +14,7 @@ from clench.models.hand.hand import Hand, JointRole
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, ShapeKind
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from . import style
 

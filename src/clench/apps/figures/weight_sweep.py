@@ -16,8 +16,8 @@ from clench.grasp.criterion_registry import find_criterion
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.examples import solve_scores
-from clench.solve.solution import GraspSolution
+from clench.solver.examples import solve_scores
+from clench.solver.solution import GraspSolution
 
 from . import style
 from .hand_view import render, viewpoints

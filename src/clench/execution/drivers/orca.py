@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from clench.base.errors import CommandError, FileError
+from clench.base.short_repr import described
 from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
 
 
@@ -45,6 +46,9 @@ class OrcaDriver:
                 )
         except (ValueError, KeyError, OSError) as error:
             raise FileError(config or f"orca-core's model {version or ''}".strip(), f"{error}") from None
+
+    def __repr__(self) -> str:
+        return described(self, name=self.name)
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from clench.base.errors import CommandError, UnknownNameError
+from clench.base.short_repr import described
 from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
 
 #: In this time a hand that was told to stop is back where it was measured [s].
@@ -119,6 +120,9 @@ class Ros2Driver:
         self._stamps: dict[str, int] = {}
         #: When, and the path from there on, where it began among its points.
         self._sent: tuple[float, JointPath] | None = None
+
+    def __repr__(self) -> str:
+        return described(self, topic=self.topic, joint_states=self.state_topic, domain=self.domain)
 
     @property
     def name(self) -> str:

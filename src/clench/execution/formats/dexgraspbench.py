@@ -16,7 +16,7 @@ from clench.base.files import read_file
 from clench.base.json_files import write_atomically
 from clench.base.numbers import real_array
 from clench.base.pose import FloatArray, Pose
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 from .grasp_posture import BASE, GraspPosture
 from .inert_pickle import read_pickled_arrays

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.base.short_repr import short_repr
 from clench.execution.hold import Hold
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.grasp_batch import GraspBatch
-from clench.solve.solution import GraspSolution, SolutionStatus
+from clench.solver.grasp_batch import GraspBatch
+from clench.solver.solution import GraspSolution, SolutionStatus
 
 from .dexgraspbench import object_folder, read_dexgraspbench, write_dexgraspbench
 from .grasp_posture import BASE, GraspPosture
@@ -56,6 +57,8 @@ class ExportReport:
     files: tuple[Path, ...]
     confidences: tuple[float, ...]
     notes: tuple[str, ...]
+
+    __repr__ = short_repr
 
 
 def export_grasps(

@@ -8,10 +8,11 @@ from typing import Final
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose, invert
+from clench.base.short_repr import short_repr
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
-from clench.solve.posture import posture
+from clench.solver.posture import posture
 
 #: How files call the frame of the hand's own model file.
 BASE: Final = "world"
@@ -35,6 +36,8 @@ class GraspPosture:
     joint_angles: Mapping[str, float] | Sequence[float] = ()
     confidence: float | None = None
     root: str | None = None
+
+    __repr__ = short_repr
 
     def command(self, hand: Hand) -> GraspCommand:
         """Return a command that keeps the posture joints and closes the others anew (docs/method.md section 1).

@@ -11,7 +11,7 @@ from typing import Any, Final
 from clench.base.errors import CommandError
 from clench.base.json_files import encode_document, write_atomically
 from clench.execution.report import ExecutionReport
-from clench.solve.solution import GraspSolution
+from clench.solver.solution import GraspSolution
 
 MEASURED: Final = "/joint_states"
 COMMANDED: Final = "/clench/command"

@@ -20,9 +20,9 @@ from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solve.posture import posture
-from clench.solve.solution import GraspSolution
-from clench.solve.squeezing import plan_squeeze
+from clench.solver.posture import posture
+from clench.solver.solution import GraspSolution
+from clench.solver.squeezing import plan_squeeze
 
 from .grasp_posture import BASE
 

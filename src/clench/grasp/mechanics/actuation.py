@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 
 from .held import HeldObject
 from .loads import check_loads
@@ -78,6 +79,8 @@ class Actuation:
     worst_tension: float | None
     plans: tuple[HoldingForces | None, ...]
     reason: str
+
+    __repr__ = short_repr
 
 
 def actuation(held: HeldObject, loads: ArrayLike, least: Effort | str = Effort.TORQUE) -> Actuation:

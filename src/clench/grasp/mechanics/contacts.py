@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from clench.base.defaults import FRICTION
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body
 
@@ -66,6 +67,8 @@ class ContactSet:
     friction: FloatArray
     torsion: FloatArray | None = None
     links: NDArray[np.int64] | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         count = len(self.positions)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 from clench.models.hand.hand import Hand
 
 from .contacts import ContactSet
@@ -36,6 +37,8 @@ class HeldObject:
     dofs: DegreesOfFreedom
     jacobian: FloatArray
     drive: TendonDrive | None = None
+
+    __repr__ = short_repr
 
     @cached_property
     def grasp_map(self) -> FloatArray:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from clench.base.defaults import LOAD_RESERVE
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 
 from .actuation import Effort, HoldingForces, HoldingProgram, solve_first
 from .binding import why_not
@@ -51,6 +52,8 @@ class SqueezeForces:
     reason: str
     reserve: float = 1.0
     loss: float = 0.0
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clench.base.pose import FloatArray
+from clench.base.short_repr import short_repr
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
@@ -68,6 +69,8 @@ class Ball:
 
     radius: float
     weakest: FloatArray | None
+
+    __repr__ = short_repr
 
 
 def epsilon_l1(wrenches: FloatArray) -> Ball:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from clench.base.short_repr import short_repr
 from clench.base.visible_text import visible
 
 
@@ -97,6 +98,8 @@ class Finding:
     joints: tuple[str, ...] = ()
     links: tuple[str, ...] = ()
     numbers: Mapping[str, float] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
 
 def in_hand_file(table: str, name: str, line: str) -> str:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, UnknownNameError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described, short_repr
 from clench.models.shapes import CollisionSource, Shape
 
 from .findings import Finding, Severity
@@ -78,6 +79,8 @@ class Joint:
     open_value: float = 0.0
     open_reason: str = ""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Link:
@@ -103,6 +106,8 @@ class Link:
     pad_indentation: float = 0.0
     friction: float | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Coupling:
@@ -121,6 +126,8 @@ class Coupling:
     offset: float
     breakaway: bool = False
     reason: str = ""
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -141,6 +148,8 @@ class Finger:
     joints: tuple[int, ...]
     is_thumb: bool
     tip_link: int
+
+    __repr__ = short_repr
 
     @cached_property
     def own(self) -> NDArray[np.intp]:
@@ -190,6 +199,16 @@ class Hand:
     spec_xml: str = ""
     assets: Mapping[str, bytes] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return described(
+            self,
+            name=self.name,
+            fingers=[finger.name for finger in self.fingers],
+            joints=len(self.joints),
+            links=len(self.links),
+            palm=self.links[self.palm].name,
+        )
+
     @classmethod
     def load(
         cls,
@@ -215,6 +234,21 @@ class Hand:
         from .loading import load_hand
 
         return load_hand(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
+
+    def mirrored(self) -> Hand:
+        """Return the mirror image of the hand, e.g. a left hand from the model of a right one.
+
+        Every frame is mirrored at its own plane y = 0. Names, joint angles, limits, couplings and tendons stay the
+        same; the hand's name gets the suffix ``_mirrored``. A mirrored object and a mirrored pose (position
+        ``[x, -y, z]``, quaternion ``[w, -x, y, -z]``) give the same joint angles. The model for simulation is mirrored,
+        too, with six digits. A mirrored hand has no file: commands that load a hand by its name cannot load it.
+
+        Raises:
+            HandError: MuJoCo cannot compile the mirror image of the model.
+        """
+        from .mirroring import mirrored_hand
+
+        return mirrored_hand(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from clench.base.errors import FileError, UnknownNameError
 from clench.base.file_limits import MODEL_BYTES
+from clench.base.files import expanded
 from clench.base.xml_files import check_xml, read_xml
 
 from .mesh_files import MeshStore
@@ -66,7 +67,7 @@ def find_model(model: str | Path) -> tuple[Path, bool]:
         UnknownNameError: neither a name nor a path. FileError: no such file, or another kind of file.
         HandError: a name whose files cannot be had, see `find_named`.
     """
-    path = Path(model)
+    path = expanded(model)
     if not str(model).strip():
         raise UnknownNameError("hand", str(model), "the built-in hands", builtin_names())
     if os.path.isfile(path):

@@ -15,6 +15,11 @@ from clench.base.errors import HandError, UnknownNameError
 MENAGERIE: Final = "mujoco_menagerie"
 DESCRIPTIONS: Final = "robot_descriptions"
 _INSTALL: Final = "pip install 'clench[hands]'"
+#: Hands whose models were loaded and solved, so that messages may suggest them. The packages also have grippers with
+#: prismatic fingers or closed linkages, which clench refuses, and models that were not tried.
+_LOADING: Final = frozenset(
+    {"shadow_hand", "wonik_allegro", "shadow_hand_mj_description", "allegro_hand_mj_description"}
+)
 
 
 def find_named(model: str) -> Path | None:
@@ -44,16 +49,20 @@ def find_named(model: str) -> Path | None:
         if name in names(hands=False):
             return find(name, variant)
         if package:
-            raise UnknownNameError("hand", name, f"the package {package}", names(hands=True))
+            raise UnknownNameError("hand", name, f"the package {package}", _suggested(names(hands=True)))
     return None
 
 
 def known_names() -> tuple[str, ...]:
-    """Return the names of hands that installed packages know."""
+    """Return the names in installed packages of hands that load; see `_LOADING`."""
     return (
-        *(_menagerie_names(hands=True) if _installed(MENAGERIE) else ()),
-        *(_description_names(hands=True) if _installed(DESCRIPTIONS) else ()),
+        *(_suggested(_menagerie_names(hands=True)) if _installed(MENAGERIE) else ()),
+        *(_suggested(_description_names(hands=True)) if _installed(DESCRIPTIONS) else ()),
     )
+
+
+def _suggested(names: list[str]) -> list[str]:
+    return [name for name in names if name in _LOADING]
 
 
 def how_to_get_more() -> str:

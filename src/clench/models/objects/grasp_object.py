@@ -11,8 +11,10 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
+from clench.base.argument_types import check_type
 from clench.base.errors import ObjectError
 from clench.base.pose import Pose
+from clench.base.short_repr import described, short_repr
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape
 
@@ -45,6 +47,8 @@ class Body:
     pieces: Sequence[TriangleMesh] = ()
     closed: bool = True
     friction: float | None = None
+
+    __repr__ = short_repr
 
     def moved(self, pose: Pose) -> Body:
         """Return the body with all of its geometry mapped by a pose."""
@@ -90,8 +94,13 @@ class GraspObject:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        check_type(self.pose, Pose, "pose")
         if not any(body.role is BodyRole.GRASPABLE for body in self.bodies):
             raise ObjectError(f"{self.name}: expected at least one graspable body, got obstacles only.")
+
+    def __repr__(self) -> str:
+        bodies = {body.name: body.role.value for body in self.bodies}
+        return described(self, name=self.name, bodies=bodies, pose=self.pose, scale=self.scale)
 
     @classmethod
     def load(

@@ -83,7 +83,9 @@ def load_object(
     body = scaled_body(body, factor)
     for shape in body.shapes:
         check_size(shape, path.name if path else name)
-    read = GraspObject(name, (in_source(body, source),), pose or Pose.identity(), source, warnings, path, factor)
+    read = GraspObject(
+        name, (in_source(body, source),), Pose.identity() if pose is None else pose, source, warnings, path, factor
+    )
     return replace(read, warnings=(*warnings, *size_warnings(read)))
 
 
@@ -103,7 +105,7 @@ def object_from_shape(
     check_size(made, body.name)
     body = in_source(body, source)
     warnings += unit_warnings(_body_points(body), body.name)
-    return GraspObject(body.name, (body,), pose or Pose.identity(), source, warnings)
+    return GraspObject(body.name, (body,), Pose.identity() if pose is None else pose, source, warnings)
 
 
 def object_from_meshes(
@@ -128,7 +130,7 @@ def object_from_meshes(
     if not bodies:
         raise ObjectError(f"{name}: expected at least one part (vertices, triangles, pose, role).")
     warnings.extend(unit_warnings(np.vstack([_body_points(body) for body in bodies]), name))
-    return GraspObject(name, tuple(bodies), pose or Pose.identity(), source, tuple(warnings))
+    return GraspObject(name, tuple(bodies), Pose.identity() if pose is None else pose, source, tuple(warnings))
 
 
 def shape_body(shape: Shape, role: BodyRole = BodyRole.GRASPABLE) -> Body:

@@ -1,0 +1,37 @@
+"""Check the types of arguments that users mix up."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from .errors import CommandError
+
+#: How users make an object of each public type, by the name of the type.
+_MADE_BY: Final = {
+    "Hand": "clench.Hand.load",
+    "GraspObject": "clench.GraspObject.load",
+    "GraspCommand": "clench.GraspCommand(hand_pose=clench.Pose([x, y, z], wxyz=[w, x, y, z]))",
+    "GraspSolution": "clench.solve(hand, obj, command)",
+    "Pose": "clench.Pose([x, y, z], wxyz=[w, x, y, z])",
+}
+
+
+def check_type(value: object, kind: type, key: str, *, also: str = "") -> None:
+    """Check that an argument has the type that a function expects.
+
+    Args:
+        value: the argument. kind: one of the public types. key: name of the argument. also: another accepted type.
+
+    Raises:
+        CommandError: another type; the sentence says how to make the expected one.
+    """
+    if isinstance(value, kind):
+        return
+    maker = _MADE_BY[kind.__name__]
+    if kind.__name__ == "GraspCommand" and isinstance(value, str):
+        maker = f"clench.load_command({value!r})"
+    elif maker.endswith(".load"):
+        maker = f"{maker}({value!r})" if isinstance(value, str) else f"{maker}(name or path)"
+    expected = f"a clench.{kind.__name__}" + (f" or {also}" if also else "")
+    shown = repr(value) if isinstance(value, str) else type(value).__name__
+    raise CommandError(f"{key}: expected {expected}, got {shown}; {maker} makes one.")

@@ -1,0 +1,1 @@
+"""The solver: three inputs in, one solution out; saved, loaded and recorded."""

@@ -1,0 +1,292 @@
+"""The solution: what was computed, judged and chosen, as immutable values (schema `clench.solution/1`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clench.base.deferring import DeferredMapping, LateFields
+from clench.base.pose import FloatArray, Pose
+from clench.base.short_repr import described, short_repr
+
+
+class SolutionStatus(StrEnum):
+    """Name the answers of a solve."""
+
+    GRASP = "grasp"
+    """every finger asked for touches, or a thumb and at least one finger that opposes it"""
+    PARTIAL = "partial"
+    """some fingers touch"""
+    NO_CONTACT = "no_contact"
+    """no finger touches"""
+    BLOCKED = "blocked"
+    """palm, a fixed link or every finger overlaps the object before anything moves"""
+
+
+class FingerStatus(StrEnum):
+    """Name how a finger ended."""
+
+    TOUCH = "touch"
+    LIMIT = "limit"
+    """every closing joint reached its limit without touching"""
+    BLOCKED = "blocked"
+    """a link of the finger overlaps the object before anything moves, or would on its plane alone"""
+    NO_MOTION = "no_motion"
+    """no closing joint can move"""
+    MISSED = "missed"
+    """another link touched before the tip, which alone was to touch"""
+
+
+class ContactKind(StrEnum):
+    """Name the touching features, link side first."""
+
+    SIDE = "side"
+    """side of the link on a vertex of the object (the tangent case of the patent)"""
+    TIP = "tip"
+    """rounded end of the link's outline on the object"""
+    EDGE = "edge"
+    """corner of the link's outline on the object, or an edge of its mesh on one of the object's"""
+    FACE = "face"
+    """face of the link's mesh on a corner of the object"""
+    VERTEX = "vertex"
+    """corner of the link's mesh on the object"""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Describe where a link touches; positions and normals in the world frame.
+
+    Args:
+        finger, link: names. body: the touched body of the object.
+        stops_joint: the joint whose motion this contact stopped, or None.
+        plane: index of the curl plane, None between the planes; offset: place along the family's y axis [m].
+        kind: see `ContactKind`. passed: a later motion opened it by more than 1 µm.
+        position: [m], shape (3,). normal: unit, out of the object, shape (3,).
+        gap: distance left at the final posture [m].
+        curve_angle: tangent angle of the object's perimeter curve [rad]; link_angle: sum of the joint angles [rad].
+    """
+
+    finger: str
+    link: str
+    body: str
+    stops_joint: str | None
+    plane: int | None
+    offset: float | None
+    kind: ContactKind
+    passed: bool
+    position: FloatArray
+    normal: FloatArray
+    gap: float
+    curve_angle: float | None
+    link_angle: float | None
+
+    __repr__ = short_repr
+
+    def _key(self) -> tuple[object, ...]:
+        values = (getattr(self, f.name) for f in fields(self))
+        return tuple(tuple(v.tolist()) if isinstance(v, np.ndarray) else v for v in values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Contact) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One alternative set of a finger: contacts and joint angles on one plane, or over the full width.
+
+    Args:
+        plane: index of the curl plane, None for the full width; offset: its place [m].
+        order: closing order. posture: index of the posture alternative (0 = as commanded).
+        joint_angles: of the finger's joints [rad], by name.
+        status, reason: how it ended.
+        feasible: whether it and its path penetrate nothing; None when not checked.
+        penetration: largest depth over its final posture [m]; None when not checked.
+        scores: criterion name to value. contacts: in stage order.
+    """
+
+    plane: int | None
+    offset: float | None
+    order: str
+    posture: int
+    joint_angles: Mapping[str, float]
+    status: FingerStatus
+    reason: str
+    feasible: bool | None
+    penetration: float | None
+    scores: Mapping[str, float]
+    contacts: tuple[Contact, ...]
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True)
+class FingerResult(LateFields):
+    """A finger's answer: how it ended, its alternative sets, and the chosen one.
+
+    Args:
+        name: of the finger. status, reason: how it ended. chosen: index of the chosen candidate.
+        cause: why it does not touch: ``"code"`` (see `clench.solver.causes.CauseCode`), ``"text"`` and numbers;
+            None when it touches.
+    """
+
+    name: str
+    status: FingerStatus
+    reason: str
+    chosen: int
+    candidates: tuple[Candidate, ...]
+    cause: Mapping[str, Any] | None = None
+
+    def __repr__(self) -> str:
+        return described(self, name=self.name, status=self.status, reason=self.reason, chosen=self.chosen)
+
+    @classmethod
+    def deferred(
+        cls,
+        name: str,
+        best: Candidate,
+        chosen: int,
+        candidates: Callable[[], tuple[Candidate, ...]],
+        cause: Mapping[str, Any] | None,
+    ) -> FingerResult:
+        """Return a finger that ends as its best candidate does; all candidates are made when they are first read."""
+        values = {"name": name, "status": best.status, "reason": best.reason, "chosen": chosen, "cause": cause}
+        return cls.with_late(lambda _: candidates(), **values, _made={chosen: best})
+
+    @property
+    def made(self) -> Mapping[int, Candidate]:
+        """The candidates that have been made, by index: the chosen one, if there is one, and all once they are read."""
+        some: Mapping[int, Candidate] | None = self.__dict__.get("_made")
+        return dict(enumerate(self.candidates)) if some is None or "candidates" in self.__dict__ else some
+
+    @property
+    def best(self) -> Candidate | None:
+        """The chosen candidate, or None; the others are not made for it."""
+        return self.made.get(self.chosen)
+
+
+@dataclass(frozen=True)
+class GraspSolution(LateFields):
+    """The answer of `clench.solve`; `to_dict` gives the documented JSON form.
+
+    Args:
+        hand, object: names. hand_model, object_model: what to load to execute it again (path or built-in name).
+        object_scale: what the lengths of the object's model were multiplied by [-].
+        status, reason: the answer; `reason` has at least ``"code"`` and ``"text"``.
+        hand_pose: `T_world_palm`; object_pose: `T_world_object`.
+        decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
+        joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
+        certified, certificate: whether the certificate of docs/method.md section 5 holds, and ``"text"`` with what is
+            promised, or why nothing is; ``"deviation"`` of what is swept as polyhedra [m].
+        choice: why these sets: what counted, totals, runners-up, and sentences (docs/calibration.md).
+        max_penetration: over the whole width and all links [m], None when not computed.
+        speeds: how fast free joints closed relative to each other in an order where all move at once; 1 if not named.
+        rounds: how often the joints were gone through, 0 for until rest.
+        next_steps: postures [rad] by joint name that the hand goes to after the grasp, as commanded.
+        joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
+    """
+
+    clench_version: str
+    hand: str
+    object: str
+    hand_model: str
+    object_model: str
+    geometry_hash: str
+    seed: int | None
+    status: SolutionStatus
+    reason: Mapping[str, Any]
+    hand_pose: Pose
+    object_pose: Pose
+    decomposition: Mapping[str, Mapping[str, float]]
+    joint_angles: Mapping[str, float]
+    open_angles: Mapping[str, float]
+    certified: bool
+    collision_source: str
+    object_collision_source: str
+    max_penetration: float | None
+    fingers: Mapping[str, FingerResult]
+    contacts: tuple[Contact, ...]
+    certificate: Mapping[str, Any] | None = field(default_factory=lambda: None)
+    quality: Mapping[str, Any] | None = None
+    squeeze: Mapping[str, Any] | None = None
+    pregrasp: Mapping[str, float] | None = None
+    choice: Mapping[str, Any] | None = None
+    timing: Mapping[str, float] = field(default_factory=dict)
+    joint_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    speeds: Mapping[str, float] = field(default_factory=dict)
+    rounds: int = 1
+    next_steps: tuple[Mapping[str, float], ...] = ()
+    object_scale: float = field(default_factory=lambda: 1.0)
+
+    def __repr__(self) -> str:
+        return described(
+            self,
+            hand=self.hand,
+            object=self.object,
+            status=self.status,
+            certified=self.certified,
+            fingers={name: finger.status.value for name, finger in self.fingers.items()},
+            contacts=len(self.contacts),
+            hand_pose=self.hand_pose,
+        )
+
+    @classmethod
+    def deferred(cls, make: Callable[[], GraspSolution], **known: Any) -> GraspSolution:
+        """Return a solution of which some fields are known; the others are made when one of them is first read.
+
+        Args:
+            make: returns the whole solution, always the same. known: see `with_late`.
+        """
+        late = {"choice": DeferredMapping(lambda: make().choice or {})}
+        return cls.with_late(lambda name: getattr(make(), name), **{**late, **known})
+
+    def violations(self) -> tuple[str, ...]:
+        """Return a sentence for everything that makes the solution unfit to execute."""
+        from .judging import violations
+
+        return violations(self)
+
+    def is_valid(self) -> bool:
+        """Return whether there is no violation and the status is `grasp` or `partial`."""
+        return self.status in (SolutionStatus.GRASP, SolutionStatus.PARTIAL) and not self.violations()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the documented JSON form, schema `clench.solution/1`."""
+        from .documents import solution_to_dict
+
+        return solution_to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: Any, source: str = "solution") -> GraspSolution:
+        """Read the documented JSON form; `source` names it in messages.
+
+        Raises:
+            FileError: unknown schema, missing or malformed keys.
+        """
+        from .documents import solution_from_dict
+
+        return solution_from_dict(data, source)
+
+    def save(self, path: str | Path) -> None:
+        """Write the JSON form, atomically."""
+        from .documents import save_solution
+
+        save_solution(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> GraspSolution:
+        """Read a file written by `save`.
+
+        Raises:
+            FileError: missing, not JSON, or not a solution.
+        """
+        from .documents import load_solution
+
+        return load_solution(path)

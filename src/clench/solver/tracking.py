@@ -1,0 +1,93 @@
+"""Follow a moving object or wrist: one command, packed once, answered cycle after cycle."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from clench.base.argument_types import check_type
+from clench.base.errors import CommandError
+from clench.base.pose import Pose
+from clench.base.short_repr import described
+from clench.models.command import GraspCommand, as_command
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+
+from .batch_solver import BatchSolver
+from .grasp_batch import GraspBatch
+
+#: By how much another plane's weighted sum has to be better before a finger leaves the one it has [-].
+MARGIN: Final = 0.05
+
+
+class Tracker:
+    """Answer one command for poses that change from cycle to cycle.
+
+    Every answer is computed anew and promises what one of `clench.solve` does: nothing is carried over from the cycle
+    before but, without the full width, the plane that a finger is on. A finger stays there unless another plane's
+    weighted sum is better by `margin`, or it no longer touches there and does on another. With the full width there is
+    one set per finger and nothing to choose, and the answer has the bits of `clench.solve`.
+
+    Args:
+        hand, obj: as for `clench.solve`.
+        command: what is asked for, at the first pose, with one open posture per finger and order `proximal-first`; or
+            the first pose.
+        margin: see above [-]; 0 chooses as `clench.solve` does.
+
+    Raises:
+        CommandError: a command with several postures or another order, and see `clench.solve`.
+    """
+
+    def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand | Pose, *, margin: float = MARGIN) -> None:
+        if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0.0 <= margin < math.inf:
+            raise CommandError(f"margin: expected a finite number of at least 0, got {margin!r}.")
+        check_type(hand, Hand, "hand")
+        check_type(obj, GraspObject, "obj")
+        command = as_command(command)
+        self._solver = BatchSolver(hand, obj, command)
+        if self._solver.packed is None:
+            raise CommandError(
+                "Tracker: expected a command with one open posture per finger, order 'proximal-first', 1 round, joints "
+                "that do not break away, and without check_sets; without full_width also criteria that are "
+                "range_of_motion, touching_links and limit_distance alone. Use clench.solve for this one."
+            )
+        self._margin = margin
+        self._hand_pose = command.hand_pose
+        self._object_pose = obj.pose if command.object_pose is None else command.object_pose
+
+    def __repr__(self) -> str:
+        return described(self, hand_pose=self._hand_pose, object_pose=self._object_pose, margin=self._margin)
+
+    def update(self, *, hand_pose: Pose | None = None, object_pose: Pose | None = None) -> GraspBatch:
+        """Return the answer for new poses, as a batch of one; a pose that is not given is the one before.
+
+        Args:
+            hand_pose: as the command means it. object_pose: `T_world_object`.
+
+        Raises:
+            CommandError: what is given is no pose.
+        """
+        for pose, key in ((hand_pose, "hand_pose"), (object_pose, "object_pose")):
+            if pose is not None:
+                check_type(pose, Pose, key)
+        self._hand_pose = hand_pose or self._hand_pose
+        self._object_pose = object_pose or self._object_pose
+        answer = self._solver.solve_one(self._hand_pose, self._object_pose)
+        self._stay(answer)
+        return answer
+
+    def _stay(self, answer: GraspBatch) -> None:
+        """Keep the planes that the fingers are on; see the class."""
+        packed = self._solver.packed
+        assert packed is not None
+        if packed.wanted.whole or not self._margin:
+            return
+        from clench.kernels.batch_judging import SAME_TOTAL
+
+        entries = np.arange(len(packed.wanted.present))
+        planes = answer.planes[0, : len(entries)]
+        here = (packed.items.entry == entries[:, None]) & (packed.items.low == planes[:, None])
+        wanted = packed.wanted._replace(present=here.argmax(axis=1), margin=self._margin / SAME_TOTAL)
+        self._solver.packed = packed.wanting(wanted)
