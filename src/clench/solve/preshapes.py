@@ -23,6 +23,8 @@ from clench.models.hand.pads import Pad, closing_joints_of, closing_limit, finge
 from clench.models.objects.grasp_object import GraspObject
 
 from .batch_solver import BatchSolver
+from .preshape_cache import Entry, cache_key, keep_preshapes, read_preshapes
+from .preshape_names import name_preshapes
 
 #: Preshapes of a hand at most; the first one is the open hand.
 PRESHAPES = 24
@@ -49,7 +51,7 @@ class Preshape:
     """A preshape of a hand, and the zones on the way from there.
 
     Args:
-        name: "open", or "preshape-1" and so on.
+        name: "open", or what it looks like, see `name_preshapes`.
         angles: what it sets, by joint name [rad]: posture joints and open values of closing joints.
         center, axis: of its zones in the palm frame, shapes (Z, 3): the middle [m], and the unit vector from the one
             side (thumb) to the other.
@@ -76,7 +78,8 @@ class _Pads:
 def opposition_zones(hand: Hand, fingers: tuple[str, ...] | None = None) -> tuple[Preshape, ...]:
     """Return the preshapes of a hand whose pads come to face each other, with their zones; the open hand first.
 
-    They are the same for every call, and found once per hand: nothing random depends on a seed of the caller.
+    They are the same for every call, and found once per hand: nothing random depends on a seed of the caller. Later
+    processes read them from the cache folder (see `clench.solve.preshape_cache`).
 
     Args:
         hand: the hand. fingers: names of those that close; None is all of them.
@@ -84,7 +87,12 @@ def opposition_zones(hand: Hand, fingers: tuple[str, ...] | None = None) -> tupl
     names = tuple(finger.name for finger in hand.fingers) if fingers is None else fingers
     kept = _kept(hand)
     if names not in kept:
-        kept[names] = _find_zones(hand, names)
+        key = cache_key(hand, names)
+        entries = read_preshapes(key, hand.joint_names)
+        if entries is None:
+            entries = list(_find_zones(hand, names))
+            keep_preshapes(key, entries)
+        kept[names] = _named(hand, entries)
     return kept[names]
 
 
@@ -93,13 +101,26 @@ def _kept(hand: Hand) -> dict[tuple[str, ...], tuple[Preshape, ...]]:
     return {}
 
 
-def _find_zones(hand: Hand, names: tuple[str, ...]) -> tuple[Preshape, ...]:
+def _named(hand: Hand, entries: list[Entry]) -> tuple[Preshape, ...]:
+    """Return preshapes with names and arrays."""
+    zones = [np.array(entry.zones, dtype=np.float64).reshape(-1, 8) for entry in entries]
+    outer = {hand.joints[j].name for f in hand.fingers if not f.is_thumb for j in closing_joints_of(hand, f)}
+    bent = [not outer.isdisjoint(entry.angles) for entry in entries]
+    names = name_preshapes([(rows[:, 6], rows[:, 7], is_bent) for rows, is_bent in zip(zones, bent, strict=True)])
+    return tuple(
+        Preshape(name, dict(entry.angles), rows[:, :3], rows[:, 3:6], rows[:, 6], rows[:, 7])
+        for name, entry, rows in zip(names, entries, zones, strict=True)
+    )
+
+
+def _find_zones(hand: Hand, names: tuple[str, ...]) -> Iterator[Entry]:
+    """Yield the open hand and the best preshapes of every aperture; nothing where no two sides face each other."""
     pads, sides = finger_pads(hand), list(_sides(hand, names))
-    if not sides:
-        return ()
     places = {pad.finger: k for k, pad in enumerate(pads)}
     sides = [(one, [f for f in other if f in places]) for one, other in sides if one in places]
     sides = [(one, other) for one, other in sides if other]
+    if not sides:
+        return
     postures, shapes = _draw(hand)
     found = _move(hand, pads, postures)
     candidates = []
@@ -107,7 +128,10 @@ def _find_zones(hand: Hand, names: tuple[str, ...]) -> tuple[Preshape, ...]:
         here = _Pads(*(column[number] for column in (found.point, found.normal, found.moving)))
         zones = [_zones(here, places[one], [places[f] for f in other]) for one, other in sides]
         candidates.append((shape, *(np.concatenate(columns) for columns in zip(*zones, strict=True))))
-    return tuple(_named(hand, names, candidates))
+    for number in _chosen(hand, names, candidates):
+        start, center, axis, aperture, quality = candidates[number]
+        rows = np.column_stack([center, axis, aperture, quality]).tolist()
+        yield Entry(_angles(hand, start) if number else {}, [tuple(row) for row in rows])
 
 
 def _sides(hand: Hand, names: tuple[str, ...]) -> Iterator[tuple[int, list[int]]]:
@@ -196,8 +220,11 @@ def _zones(pads: _Pads, one: int, others: list[int]) -> tuple[FloatArray, FloatA
     return center[well], axis.reshape(-1, 3)[well], aperture.ravel()[well], quality[well]
 
 
-def _named(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray, ...]]) -> Iterator[Preshape]:
-    """Yield the open hand and the best candidates of every aperture, without those that close without a certificate."""
+def _chosen(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray, ...]]) -> list[int]:
+    """Return the open hand and the best candidates of every aperture, without those that close without a certificate.
+
+    The best of every aperture come first, then the second best, and so on.
+    """
     best = np.full((len(candidates), len(APERTURES) - 1), -np.inf)
     for number, (_, _, _, aperture, quality) in enumerate(candidates):
         if len(aperture):
@@ -219,9 +246,7 @@ def _named(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray
                     kept += 1
                 else:
                     refused.add(number)
-    for name, number in enumerate(chosen):
-        start, *zones = candidates[number]
-        yield Preshape(f"preshape-{name}" if name else "open", _angles(hand, start) if name else {}, *zones)
+    return chosen
 
 
 def _apart(candidates: list[tuple[FloatArray, ...]], chosen: list[int], number: int) -> bool:
