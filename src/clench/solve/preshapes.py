@@ -18,7 +18,7 @@ from clench.base.keeping import kept_while_alive
 from clench.base.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
-from clench.models.hand.hand import Hand, JointRole
+from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.hand.pads import Pad, closing_joints_of, closing_limit, finger_pads
 from clench.models.objects.grasp_object import GraspObject
 
@@ -52,7 +52,7 @@ class Preshape:
 
     Args:
         name: "open", or what it looks like, see `name_preshapes`.
-        angles: what it sets, by joint name [rad]: posture joints and open values of closing joints.
+        angles: what it sets, by joint name [rad]: every posture joint, and open values of closing joints.
         center, axis: of its zones in the palm frame, shapes (Z, 3): the middle [m], and the unit vector from the one
             side (thumb) to the other.
         aperture: distance of the pads [m], shape (Z,). quality: how well they oppose, -1 to 1, shape (Z,).
@@ -107,15 +107,23 @@ def _named(hand: Hand, entries: list[Entry]) -> tuple[Preshape, ...]:
     outer = {hand.joints[j].name for f in hand.fingers if not f.is_thumb for j in closing_joints_of(hand, f)}
     bent = [not outer.isdisjoint(entry.angles) for entry in entries]
     names = name_preshapes([(rows[:, 6], rows[:, 7], is_bent) for rows, is_bent in zip(zones, bent, strict=True)])
+    opened = {name: hand.joints[hand.joint_index(name)].open_value for name in posture_joints(hand)}
     return tuple(
-        Preshape(name, dict(entry.angles), rows[:, :3], rows[:, 3:6], rows[:, 6], rows[:, 7])
+        Preshape(name, {**opened, **entry.angles}, rows[:, :3], rows[:, 3:6], rows[:, 6], rows[:, 7])
         for name, entry, rows in zip(names, entries, zones, strict=True)
     )
 
 
+def posture_joints(hand: Hand, fingers: tuple[Finger, ...] | None = None) -> list[str]:
+    """Return the posture joints of some fingers that follow no other joint; of all fingers by default."""
+    followers = {c.follower for c in hand.couplings}
+    own = [j for finger in (hand.fingers if fingers is None else fingers) for j in finger.joints if j not in followers]
+    return [hand.joints[j].name for j in own if hand.joints[j].role is JointRole.POSTURE]
+
+
 def _find_zones(hand: Hand, names: tuple[str, ...]) -> Iterator[Entry]:
     """Yield the open hand and the best preshapes of every aperture; nothing where no two sides face each other."""
-    pads, sides = finger_pads(hand), list(_sides(hand, names))
+    pads, sides = finger_pads(hand), list(opposing_sides(hand, names))
     places = {pad.finger: k for k, pad in enumerate(pads)}
     sides = [(one, [f for f in other if f in places]) for one, other in sides if one in places]
     sides = [(one, other) for one, other in sides if other]
@@ -134,7 +142,7 @@ def _find_zones(hand: Hand, names: tuple[str, ...]) -> Iterator[Entry]:
         yield Entry(_angles(hand, start) if number else {}, [tuple(row) for row in rows])
 
 
-def _sides(hand: Hand, names: tuple[str, ...]) -> Iterator[tuple[int, list[int]]]:
+def opposing_sides(hand: Hand, names: tuple[str, ...]) -> Iterator[tuple[int, list[int]]]:
     """Yield one finger and the fingers that it may oppose: a thumb and some others; without a thumb, any two sides."""
     closing = [k for k, finger in enumerate(hand.fingers) if finger.name in names]
     thumbs = [k for k in closing if hand.fingers[k].is_thumb]

@@ -13,6 +13,7 @@ from clench.models.command import GraspCommand
 
 from .batch_solver import BatchSolver
 from .grasp_batch import GraspBatch
+from .posture_choice import first_choice
 
 if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
@@ -32,7 +33,8 @@ class Tracker:
 
     Args:
         hand, obj: as for `clench.solve`.
-        command: what is asked for, at the first pose; one open posture per finger and order `proximal-first`.
+        command: what is asked for, at the first pose; one open posture per finger and order `proximal-first`. If it
+            leaves the posture to clench, the best posture at the first pose is kept.
         margin: see above [-]; 0 chooses as `clench.solve` does.
 
     Raises:
@@ -42,7 +44,7 @@ class Tracker:
     def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand, *, margin: float = MARGIN) -> None:
         if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0.0 <= margin < math.inf:
             raise CommandError(f"margin: expected a finite number of at least 0, got {margin!r}.")
-        self._solver = BatchSolver(hand, obj, command)
+        self._solver = BatchSolver(hand, obj, first_choice(hand, obj, command))
         if self._solver.packed is None:
             raise CommandError(
                 "Tracker: expected a command with one open posture per finger, order 'proximal-first', 1 round, joints "

@@ -30,12 +30,14 @@ def draw_solution(
     Raises:
         FileError: a file cannot be written.
     """
+    from clench.solve.orders import settled
+
     from .curl_plane import draw_finger
     from .finger_scenes import FingerScenes
     from .hand_view import draw_hand
     from .set_grid import draw_sets
 
-    folder = Path(directory)
+    folder, command = Path(directory), settled(command, solution)
     files = []
     for name, result in solution.fingers.items():
         if not 0 <= result.chosen < len(result.candidates):
