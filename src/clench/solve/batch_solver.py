@@ -142,7 +142,9 @@ class BatchSolver:
 
         def run(rows: tuple[FloatArray, FloatArray]) -> GraspSolution:
             hand_pose, object_pose = (Pose(row[4:], row[:4]) for row in rows)
-            return solve_posture(asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose))
+            return solve_posture(
+                asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose)
+            )
 
         with ThreadPoolExecutor(threads, thread_name_prefix="clench-batch") as pool:
             solutions = list(pool.map(run, zip(hand_rows, object_rows, strict=True)))

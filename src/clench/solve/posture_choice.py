@@ -1,4 +1,4 @@
-"""The posture that clench chooses: the preshapes of the hand are closed at every pose, and compared (docs/preshapes.md).
+"""The posture that clench chooses: the hand closes from its preshapes at every pose (docs/preshapes.md).
 
 A status that is better goes first, then what is certified, then what is inside the limits of the calibration, then the
 weighted sum of the criteria. Motion counts from the open hand, that of posture joints too. Of equal closings, the one
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from clench.base.deferring import DeferredMapping
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.calibration import calibration_of
+from clench.grasp.closing import core_count, share_out
 from clench.grasp.explaining import say_what_decided
 from clench.grasp.motion import open_posture
 from clench.models.command import GraspCommand
@@ -83,9 +84,7 @@ class PostureSolver:
         ClenchError: see `clench.solve`.
     """
 
-    def __init__(
-        self, hand: Hand, obj: GraspObject, command: GraspCommand, options: tuple[PostureOption, ...]
-    ) -> None:
+    def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand, options: tuple[PostureOption, ...]) -> None:
         self._hand, self._obj, self._command, self.options = hand, obj, command, options
         self._solvers = [self._solver(option) for option in options]
         self._calibration = calibration_of(command.criteria)
@@ -111,30 +110,38 @@ class PostureSolver:
         self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int, device: str = CPU
     ) -> GraspBatch:
         """Return the answers, each from the posture that is best at its pose; see `BatchSolver.solve`."""
-        answers = [solver.solve(hand_rows, object_rows, threads, device) for solver in self._solvers]
+        answers = GraspBatch.joined([s.solve(hand_rows, object_rows, threads, device) for s in self._solvers])
         _, order = self._compare(answers)
-        rows = order[:, 0] * len(hand_rows) + np.arange(len(hand_rows))
-        best = GraspBatch.joined(answers).taken(rows)
+        best = answers.taken(order[:, 0] * len(hand_rows) + np.arange(len(hand_rows)))
         return replace(best, question=self.names["question"], preshape_codes=order[:, 0].astype(np.int16))
 
     def choose_one(self) -> tuple[PostureOption, Mapping[str, Any]]:
         """Return the best posture at the pose of the command, and what was compared as plain values."""
-        row = np.array([self._command.hand_pose.wxyz_xyz])
-        scores, order = self._compare([solver.solve(row, None, 1) for solver in self._solvers])
+        row, answers = np.array([self._command.hand_pose.wxyz_xyz]), dict[int, GraspBatch]()
+
+        def run(k: int) -> None:
+            answers[k] = self._solvers[k].solve(row, None, 1)
+
+        share_out(run, range(len(self._solvers)), core_count())
+        scores, order = self._compare(GraspBatch.joined([answers[k] for k in range(len(self._solvers))]))
         ranked = order[0].tolist()
         return self.options[ranked[0]], DeferredMapping(lambda: self._explain(scores, ranked))
 
-    def _compare(self, answers: list[GraspBatch]) -> tuple[Scores, NDArray[np.intp]]:
-        """Return the scores, and the numbers of the postures at every pose, best first, shape (N, K)."""
+    def _compare(self, answers: GraspBatch) -> tuple[Scores, NDArray[np.intp]]:
+        """Return the scores, and the numbers of the postures at every pose, best first, shape (N, K).
+
+        Args:
+            answers: from one posture after another, at all poses.
+        """
+        count = len(self.options)
+        poses = len(answers) // count
 
         def solve(n: int, k: int) -> GraspSolution:
-            row, there = answers[k].hand_poses[n], answers[k].object_poses[n]
-            poses = {"hand_pose": Pose(row[4:], row[:4]), "object_pose": Pose(there[4:], there[:4])}
-            return solve_posture(
-                self._hand, self._obj, replace(self._command, preshape=self.options[k].angles, **poses)
-            )
+            row, there = answers.hand_poses[k * poses + n], answers.object_poses[k * poses + n]
+            asked = replace(self._command, preshape=self.options[k].angles)
+            return solve_posture(self._hand, self._obj, asked.at(_pose(row), _pose(there)))
 
-        scores = self._scorer.score(answers, solve)
+        scores = self._scorer.score(answers, count, solve)
         steps = np.floor(scores.total / _SAME + 0.5)
         known = (~np.isnan(scores.values)).sum(axis=2)
         away = np.broadcast_to(self._away, steps.shape)
@@ -179,6 +186,12 @@ class PostureSolver:
             return f"{before} because more criteria have a value."
         lead = float(scores.total[0, best] - scores.total[0, second])
         if lead < _SAME:
-            return f"{ours} and {theirs} both end as {statuses[0]} and score the same; {ours} is nearer to the open hand."
+            return (
+                f"{ours} and {theirs} both end as {statuses[0]} and score the same; {ours} is nearer to the open hand."
+            )
         gains = {n: self._calibration.worth(n, a[n]) - self._calibration.worth(n, b[n]) for n in a if n in b}
         return f"{ours} leads {theirs} by {lead:.3g}; {say_what_decided(gains, a, b)}"
+
+
+def _pose(row: FloatArray) -> Pose:
+    return Pose(row[4:], row[:4])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -62,27 +63,29 @@ class PostureScorer:
     opened: FloatArray
     calibration: Calibration
 
-    def score(self, answers: list[GraspBatch], solve: Callable[[int, int], GraspSolution]) -> Scores:
+    def score(self, answers: GraspBatch, count: int, solve: Callable[[int, int], GraspSolution]) -> Scores:
         """Return the scores of closings of the same poses.
 
         The criteria that always count are read from the arrays. Any other one takes a whole solution of every closing
         that is as good as the best by status and certificate.
 
         Args:
-            answers: by closing. solve: returns the solution of a pose and a closing, by their numbers.
+            answers: K closings of all N poses one after another, K·N in all. count: K.
+            solve: returns the solution of a pose and a closing, by their numbers.
         """
         names = self.calibration.criteria
-        place = np.stack([_PLACE[answer.status_codes] for answer in answers], axis=1)
-        certified = np.stack([answer.certified for answer in answers], axis=1)
-        inside = np.ones(place.shape, dtype=np.bool_)
-        values = np.full((*place.shape, len(names)), np.nan)
-        for k, answer in enumerate(answers):
-            measured = self._measure(answer)
-            for p, name in enumerate(names):
-                if name in ALWAYS:
-                    of_fingers = measured[ALWAYS.index(name)]
-                    values[:, k, p] = of_fingers.sum(axis=1)
-                    inside[:, k] &= self.calibration.inside(name, of_fingers).all(axis=1)
+        shape = (count, len(answers) // count)
+        place = _PLACE[answers.status_codes].reshape(shape).T
+        certified = answers.certified.reshape(shape).T
+        within = np.ones(len(answers), dtype=np.bool_)
+        columns = np.full((len(answers), len(names)), np.nan)
+        measured = self._measure(answers)
+        for p, name in enumerate(names):
+            if name in ALWAYS:
+                of_fingers = measured[ALWAYS.index(name)]
+                columns[:, p] = of_fingers.sum(axis=1)
+                within &= self.calibration.inside(name, of_fingers).all(axis=1)
+        inside, values = within.reshape(shape).T.copy(), columns.reshape(*shape, len(names)).transpose(1, 0, 2)
         others = [p for p, name in enumerate(names) if name not in ALWAYS]
         if others:
             rank = 2 * place + ~certified
@@ -92,39 +95,48 @@ class PostureScorer:
                 for p in others:
                     values[n, k, p] = scores.get(names[p], np.nan)
                     inside[n, k] &= self._inside(names[p], solution)
-        worth = np.array([self.calibration.worth(name, 1.0) for name in names])
-        counted = np.where(np.isnan(values), 0.0, values)
         total = np.zeros(place.shape)
-        for p in range(len(names)):
-            total += worth[p] * counted[:, :, p]
+        for p, name in enumerate(names):
+            total += self.calibration.worth(name, 1.0) * np.nan_to_num(values[:, :, p])
         idle = place >= _TOUCHING
         return Scores(place, certified, inside | idle, values, np.where(idle, 0.0, total))
 
-    def _measure(self, answer: GraspBatch) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _measure(self, answers: GraspBatch) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return range of motion [rad], touching links and limit distance of every finger, (N, F) each, as `ALWAYS`."""
-        count, q = (len(answer), len(self.fingers)), answer.joint_angles
-        motion, left = np.zeros(count), np.ones(count)
+        q = answers.joint_angles
+        weight, end, span = self._joints
+        motion: FloatArray = (np.abs(q - self.opened)[:, None] * weight).sum(axis=2)
+        left: FloatArray = (np.abs(end - q[:, None]) / span).min(axis=2, initial=1.0)
+        return motion, self._touching(answers), left
+
+    @cached_property
+    def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Weight, limit in the closing direction [rad] and range [rad] of every finger's joints, (F, J) each.
+
+        A joint of another finger has no weight, and no limit that is near; neither has one without a range.
+        """
+        shape = (len(self.fingers), len(self.hand.joints))
+        weight, end, span = np.zeros(shape), np.full(shape, np.inf), np.ones(shape)
         for f, finger in enumerate(self.fingers):
             for j in finger.joints:
                 joint = self.hand.joints[j]
-                motion[:, f] += self.calibration.joints.get(joint.name, 1.0) * np.abs(q[:, j] - self.opened[j])
-                span = joint.upper - joint.lower
-                if joint.role is JointRole.CLOSING and span > 0.0:
-                    end = joint.upper if joint.direction > 0 else joint.lower
-                    left[:, f] = np.minimum(left[:, f], np.abs(end - q[:, j]) / span)
-        return motion, self._touching(answer), left
+                weight[f, j] = self.calibration.joints.get(joint.name, 1.0)
+                if joint.role is JointRole.CLOSING and joint.upper > joint.lower:
+                    end[f, j] = joint.upper if joint.direction > 0 else joint.lower
+                    span[f, j] = joint.upper - joint.lower
+        return weight, end, span
 
-    def _touching(self, answer: GraspBatch) -> FloatArray:
+    def _touching(self, answers: GraspBatch) -> FloatArray:
         """Return how many links of every finger touch the object, shape (N, F)."""
-        contacts = answer.contacts
+        contacts = answers.contacts
         graspable = np.array([body.role is BodyRole.GRASPABLE for body in self.obj.bodies])
-        owner = np.repeat(np.arange(len(answer)), np.diff(contacts.first))
+        owner = np.repeat(np.arange(len(answers)), np.diff(contacts.first))
         keep = ~contacts.passed & graspable[contacts.body]
-        rows = np.stack([owner[keep], contacts.finger[keep], contacts.link[keep]], axis=1).reshape(-1, 3)
-        different = np.unique(rows, axis=0)
-        touching = np.zeros((len(answer), len(self.fingers)))
-        np.add.at(touching, (different[:, 0], different[:, 1]), 1.0)
-        return touching
+        links = len(self.hand.links)
+        place = owner[keep] * len(self.fingers) + contacts.finger[keep]
+        different = np.unique(place * links + contacts.link[keep]) // links
+        shape = (len(answers), len(self.fingers))
+        return np.bincount(different, minlength=shape[0] * shape[1]).astype(np.float64).reshape(shape)
 
     def _inside(self, name: str, solution: GraspSolution) -> bool:
         """Say whether all values of a criterion are inside its limit; one that is not known is not."""
