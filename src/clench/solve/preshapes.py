@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,17 @@ class Preshape:
     axis: FloatArray
     aperture: FloatArray
     quality: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values: name, angles, range of the aperture [m], and aperture and quality of the best zone."""
+        best = int(self.quality.argmax()) if len(self.quality) else None
+        return {
+            "name": self.name,
+            "angles": dict(self.angles),
+            "aperture_range": None if best is None else [float(self.aperture.min()), float(self.aperture.max())],
+            "aperture": None if best is None else float(self.aperture[best]),
+            "quality": None if best is None else float(self.quality[best]),
+        }
 
 
 @dataclass(frozen=True, eq=False)
