@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 
 #: Sums that differ by less are equal [-].
 _SAME: Final = 1e-9
-#: Curl planes of closings over the full width, which close on none.
-_FEW: Final = 1
 
 
 def posture_solver(hand: Hand, obj: GraspObject, command: GraspCommand) -> BatchSolver | PostureSolver:
@@ -86,20 +84,12 @@ class PostureSolver:
 
     def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand, options: tuple[PostureOption, ...]) -> None:
         self._hand, self._obj, self._command, self.options = hand, obj, command, options
-        self._solvers = [self._solver(option) for option in options]
+        self._solvers = [BatchSolver(hand, obj, replace(command, preshape=o.angles)) for o in options]
         self._calibration = calibration_of(command.criteria)
         first = self._solvers[0]
         opened = open_posture(hand, replace(command, preshape=options[0].angles))
         self._scorer = PostureScorer(hand, obj, tuple(first.moving), opened, self._calibration)
         self._away = np.array([distance_from_open(hand, option, options[0]) for option in options])
-
-    def _solver(self, option: PostureOption) -> BatchSolver:
-        asked = replace(self._command, preshape=option.angles)
-        # Over the full width no plane is closed, so that fewer are planned.
-        quick = BatchSolver(self._hand, self._obj, replace(asked, planes=_FEW)) if asked.full_width else None
-        if quick is not None and quick.packed is not None and quick.packed.wanted.whole:
-            return quick
-        return BatchSolver(self._hand, self._obj, asked)
 
     @cached_property
     def names(self) -> dict[str, Any]:

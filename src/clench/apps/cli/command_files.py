@@ -19,11 +19,12 @@ def read_command(path: Path, hand: Hand) -> GraspCommand:
         FileError: the command file, or the calibration file that it names. CommandError: what is wrong in it.
     """
     from clench.grasp.calibration import calibration_of
-    from clench.models.command_file import check_command, load_command
+    from clench.models.command_file import load_command
+    from clench.solve.checked import checked
 
     command = load_command(path)
     try:
-        check_command(hand, command)
+        checked(hand, command)
         calibration_of(command.criteria)
     except FileError:
         raise  # names the calibration file
