@@ -13,7 +13,7 @@ import clench
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
 from clench.grasp import criterion_registry
-from clench.solve import alternatives, controller, packing
+from clench.solve import alternatives, packing, single
 from clench.solve.planning import planned
 from clench.solve.problem import make_problem
 
@@ -29,8 +29,8 @@ ASKED: dict[str, dict[str, Any]] = {
 
 def in_full(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let solves close all sets, choose among them, and say everything at once."""
-    monkeypatch.setattr(controller, "solve_directly", lambda *given: None)
-    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
+    monkeypatch.setattr(single, "solve_directly", lambda *given: None)
+    monkeypatch.setattr(single, "decided", lambda problem, calibration: None)
 
 
 def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.GraspCommand]) -> list[dict[str, Any]]:

@@ -11,8 +11,7 @@ import pytest
 import clench
 from clench.base.errors import ClenchError, CommandError
 from clench.base.pose import Pose
-from clench.solve import batch as batching
-from clench.solve import batch_progress
+from clench.solve import batch_progress, posture_choice
 from clench.solve.batch_solver import BatchSolver
 from clench.solve.grasp_batch import GraspBatch
 
@@ -235,7 +234,7 @@ def test_a_bar_appears_after_a_while(
 def test_every_shipped_form_of_hand_is_packed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Postures that repeat are planned once, however the poses are mixed."""
     made = []
-    monkeypatch.setattr(batching, "BatchSolver", lambda *a: made.append(a) or BatchSolver(*a))
+    monkeypatch.setattr(posture_choice, "BatchSolver", lambda *a: made.append(a) or BatchSolver(*a))
     hand, obj = HANDS["robonaut2"], clench.GraspObject.load("ball")
     yaw = next(j.name for j in hand.joints if j.role is clench.JointRole.POSTURE and j.lower < 0.0 < j.upper)
     far = [Pose([k, 5.0, 0.0]) for k in range(6)]

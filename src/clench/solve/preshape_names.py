@@ -26,6 +26,8 @@ def name_preshapes(shapes: Sequence[tuple[FloatArray, FloatArray, bool]]) -> lis
     Args:
         shapes: apertures [m] and qualities [-] of its zones, shape (Z,) each, and whether fingers are bent.
     """
+    if not shapes:
+        return []
     taken: set[str] = {OPEN}
     names = [OPEN]
     for aperture, quality, bent in shapes[1:]:
