@@ -216,7 +216,7 @@ def test_solve_without_command_draws_an_approach_pose(solver: FakeSolver) -> Non
     solver.answer = make_solution(status=SolutionStatus.GRASP)
     main([*SOLVE, "--seed", "5", "--planes", "3", "--order", "proximal-first", "--scale", "0.001", "--palm", "p"])
     (command,) = solver.commands
-    assert command == GraspCommand(hand_pose=clench.Pose([0, 0, 0]), seed=5, planes=3, preshape="open")
+    assert command == GraspCommand(hand_pose=clench.Pose([0, 0, 0]), seed=5, planes=3)
     assert solver.loaded[0] == ("pincer", {"hand_file": None, "palm": "p", "collision_source": None})
     assert solver.loaded[1] == ("ball", {"scale": 0.001})
 

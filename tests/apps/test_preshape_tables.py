@@ -97,7 +97,7 @@ def test_files_and_documents_agree(tmp_path, capsys) -> None:
         ("", "preshape: expected a name, got ''."),
         (
             3,
-            "preshape: expected an object of names with a number in rad each, 'open', or the name of a preshape, got 3.",
+            "preshape: expected an object of names with a number in rad each, 'open', or the name of a preshape, ",
         ),
     ],
 )

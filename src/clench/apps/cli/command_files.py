@@ -19,12 +19,14 @@ def read_command(path: Path, hand: Hand) -> GraspCommand:
         FileError: the command file, or the calibration file that it names. CommandError: what is wrong in it.
     """
     from clench.grasp.calibration import calibration_of
-    from clench.models.command_file import load_command
-    from clench.solve.checked import checked
+    from clench.models.command_file import check_command, load_command
+    from clench.solve.postures import preshape_angles
 
     command = load_command(path)
     try:
-        checked(hand, command)
+        check_command(hand, command)
+        if isinstance(command.preshape, str):
+            preshape_angles(hand, command.preshape)
         calibration_of(command.criteria)
     except FileError:
         raise  # names the calibration file
