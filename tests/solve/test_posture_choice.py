@@ -197,7 +197,11 @@ def test_batches_and_streams_have_the_bits_of_solves(asked: dict[str, Any], tmp_
     assert np.array_equal(streamed, batch.joint_angles)
     assert batch.solution(1).joint_angles == singles[1].joint_angles
     assert "preshapes" not in (batch.solution(1).choice or {})
-    # Solved again from the file, the grasps are the same.
+    # The file has the angles that were chosen. Solved again from it, the grasps are the same.
+    arrays = np.load(tmp_path / "b.npz")
+    for i, single in enumerate(singles):
+        angles = dict(zip(arrays["preshape_joints"].tolist(), arrays["preshape_angles"][:, i].tolist(), strict=True))
+        assert angles.items() >= said(single)["angles"].items()
     grasps = [s for s in singles if s.status == "grasp"]
     again = list(SavedBatch(tmp_path / "b.npz").solutions(HAND, MUG))
     assert [s.joint_angles for s in again] == [s.joint_angles for s in grasps]

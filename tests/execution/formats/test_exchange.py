@@ -238,7 +238,7 @@ def test_missing_angles_are_accepted(tmp_path: Path, pincer: Hand) -> None:
     (tmp_path / "g.yaml").write_text(yaml.safe_dump(document))
     (grasp,) = import_grasps(tmp_path / "g.yaml")
     assert grasp.confidence is None
-    assert grasp.command(pincer) == clench.GraspCommand(Pose([0, 0, 1]), object_pose=Pose.identity(), preshape="open")
+    assert grasp.command(pincer) == clench.GraspCommand(Pose([0, 0, 1]), object_pose=Pose.identity())
 
 
 @pytest.mark.parametrize(
