@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -120,6 +121,7 @@ def test_documents_keep_it(tmp_path) -> None:
     again = clench.GraspSolution.load(tmp_path / "s.json")
     assert said(again) == said(solution)
     assert dict(again.timing) == dict(solution.timing)
+    assert said(pickle.loads(pickle.dumps(solution))) == said(solution)
 
 
 @pytest.mark.parametrize(
