@@ -220,3 +220,14 @@ def test_the_forces_page_holds_a_ball_and_names_every_key() -> None:
     documented = set(re.findall(r"`(\w+)`", text))
     for part in (full.quality, full.quality["actuation"], full.squeeze):
         assert set(part) <= documented
+
+
+def test_the_preshapes_page_tells_the_choice_and_names_every_key() -> None:
+    text = page("preshapes.md")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(code, "preshapes.md", "exec"), names)
+    said = names["solution"].choice["preshapes"]
+    assert f'["chosen"]  # "{said["chosen"]}"' in code
+    documented = set(re.findall(r"`(\w+)`", text))
+    assert set(said) | set(said["compared"]["open"]) <= documented

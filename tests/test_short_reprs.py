@@ -50,6 +50,8 @@ def instances(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     weights = folder / "weights.toml"
     weights.write_text("[weights]\nrange_of_motion = 1.0\n")
     made += [clench.load_calibration(weights)]
+    search = clench.iter_grasps(hand, mug, 1, most=64, path=False)
+    made += [*search, search, search.plan(), clench.stable_poses(mug)[0], clench.Region.sphere([0, 0, 0], 0.1)]
     return {type(each).__name__: each for each in made}
 
 

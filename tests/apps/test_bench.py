@@ -28,7 +28,7 @@ SMALL = ["solve", "--poses", "2", "--passes", "2", "--planes", "3"]
 def problem() -> tuple[clench.Hand, clench.GraspObject, GraspSolution]:
     hand, obj = clench.Hand.load("patent15"), clench.GraspObject.load("mug")
     pose = clench.approach_poses(hand, obj, 1, 0)[0]
-    return hand, obj, clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=2))
+    return hand, obj, clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=2, preshape="open"))
 
 
 def wrong(solution: GraspSolution, again: GraspSolution, obj: clench.GraspObject) -> list[str]:
@@ -192,7 +192,7 @@ def test_a_wrong_choice_is_not_timed(monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_the_check_of_choices_sees_one_that_is_not_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
     hand, obj = clench.Hand.load("patent15"), clench.GraspObject.load("mug")
     pose = clench.approach_poses(hand, obj, 1, 0)[0]
-    command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1))
+    command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1), preshape="open")
     problem = make_problem(hand, obj, command)
     groups = [[c for c in g if c.plane is None] for g in finger_sets(problem)]
     setting = make_setting(problem, choosing.ADDITIVE)

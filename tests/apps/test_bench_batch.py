@@ -38,7 +38,7 @@ def test_a_stream_that_grows_is_an_error(monkeypatch: pytest.MonkeyPatch, capsys
 def test_wrong_answers_are_seen() -> None:
     hand, obj = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
     poses = clench.approach_poses(hand, obj, 2, 0)
-    command = clench.GraspCommand(hand_pose=poses[0], planes=1)
+    command = clench.GraspCommand(hand_pose=poses[0], planes=1, preshape="open")
     batch = clench.solve_batch(hand, obj, poses, command)
     alone = [clench.solve(hand, obj, replace(command, hand_pose=pose)) for pose in poses]
     assert list(batching.wrong_answers(batch, alone)) == []

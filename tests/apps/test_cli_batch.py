@@ -28,7 +28,7 @@ def test_approach_poses_by_seed(tmp_path: Path, capsys: pytest.CaptureFixture[st
     with np.load(out) as data:
         np.testing.assert_array_equal(data["hand_poses"], [p.wxyz_xyz for p in poses])
         for pose, angles in zip(poses, data["joint_angles"], strict=True):
-            alone = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=2))
+            alone = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=2, preshape="open"))
             assert list(alone.joint_angles.values()) == angles.tolist()
 
 

@@ -28,7 +28,7 @@ from handmade import make_candidate, make_contact
 def grasp(hand: clench.Hand, obj: clench.GraspObject, **options: object) -> tuple[GraspCommand, GraspSolution]:
     """Return a command and its solution that touches with at least one finger."""
     for pose in clench.approach_poses(hand, obj, 8, 0):
-        command = GraspCommand(hand_pose=pose, **options)  # type: ignore[arg-type]
+        command = GraspCommand(hand_pose=pose, **{"preshape": "open", **options})  # type: ignore[arg-type]
         solution = clench.solve(hand, obj, command)
         if solution.contacts:
             return command, solution
@@ -240,7 +240,9 @@ def test_a_finger_of_two_families_is_drawn_where_it_touches(shared_data: Path, t
 
 
 def test_answers_without_contact_are_drawn(hand: clench.Hand, ball: clench.GraspObject, tmp_path: Path) -> None:
-    far = GraspCommand(hand_pose=clench.Pose([1.0, 0.0, 0.0]), planes=1, fingers=("ring",), full_width=False)
+    far = GraspCommand(
+        hand_pose=clench.Pose([1.0, 0.0, 0.0]), planes=1, fingers=("ring",), full_width=False, preshape="open"
+    )
     solution = clench.solve(hand, ball, far)
     assert not solution.contacts
     files = draw_solution(hand, ball, far, solution, tmp_path)
@@ -252,7 +254,7 @@ def test_a_finger_that_overlaps_at_the_start_is_drawn(
     hand: clench.Hand, ball: clench.GraspObject, tmp_path: Path
 ) -> None:
     tip = hand.link_poses(hand.open_angles())[hand.link_index("index_distal")][:3, 3]
-    inside = GraspCommand(hand_pose=clench.Pose(-tip), planes=2, fingers=("index",))
+    inside = GraspCommand(hand_pose=clench.Pose(-tip), planes=2, fingers=("index",), preshape="open")
     solution = clench.solve(hand, ball, inside)
     assert solution.fingers["index"].status is FingerStatus.BLOCKED
     assert all(size_of(f)[0] <= 1600 for f in draw_solution(hand, ball, inside, solution, tmp_path))

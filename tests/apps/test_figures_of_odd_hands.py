@@ -20,5 +20,5 @@ def test_joints_in_one_place_are_drawn(second: list[float], tmp_path: Path) -> N
     axes = [[0.0, -1.0, 0.0], second, [0.0, -1.0, 0.0]]
     hand = HandBuilder().finger("index", shapes, [0.0, 0.05, 0.04], axes=axes, upper=1.5).hand()
     ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.01, 0.05]))
-    command = clench.GraspCommand(hand_pose=Pose.identity(), order=clench.ClosingOrder.TOGETHER)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), order=clench.ClosingOrder.TOGETHER, preshape="open")
     assert draw_solution(hand, ball, command, clench.solve(hand, ball, command), tmp_path)

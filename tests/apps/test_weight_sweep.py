@@ -15,6 +15,7 @@ COMMAND = clench.GraspCommand(
     yaw_grid=(0.0, 0.2),
     open_variants=(0.0, 0.3),
     criteria={"range_of_motion": 1.0},
+    preshape="open",
 )
 
 
@@ -35,7 +36,7 @@ def test_a_figure_of_the_sweep(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("criteria", "weights"), [("steady", [1.0, 2.0]), ({"range_of_motion": 1.0}, [1.0])])
 def test_what_cannot_be_swept(criteria: object, weights: list[float]) -> None:
-    command = clench.GraspCommand(hand_pose=clench.Pose.identity(), criteria=criteria)  # type: ignore[arg-type]
+    command = clench.GraspCommand(hand_pose=clench.Pose.identity(), criteria=criteria, preshape="open")  # type: ignore[arg-type]
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     with pytest.raises(CommandError, match="weights by name, and at least two weights"):
         sweep_weight(hand, mug, command, "limit_distance", weights)

@@ -58,7 +58,9 @@ def judge(name: str, mesh: str, poses: int, seed: int, order: str = ClosingOrder
     except clench.ClenchError:
         return {"counted": {"unreachable": poses}, "wrong": []}
     for number, pose in enumerate(drawn):
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, order=ClosingOrder(order)))
+        solution = clench.solve(
+            hand, obj, clench.GraspCommand(hand_pose=pose, order=ClosingOrder(order), preshape="open")
+        )
         counted["solves"] += 1
         counted["certified"] += solution.certified
         counted["gap"] += any(abs(c.gap) > 1e-9 for c in solution.contacts if not c.passed)

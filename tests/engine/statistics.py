@@ -144,10 +144,12 @@ def solve_all(
     """Yield solutions from approach poses with the checks of their contacts, and the depth left by `fine` planes."""
     judge = Judge(hand, obj)
     for pose in clench.approach_poses(hand, obj, poses, seed):
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=planes))
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=planes, preshape="open"))
         depth = None
         if fine is not None:
-            depth = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=fine)).max_penetration
+            depth = clench.solve(
+                hand, obj, clench.GraspCommand(hand_pose=pose, planes=fine, preshape="open")
+            ).max_penetration
         yield solution, list(judge.contacts(solution)), depth
 
 

@@ -50,7 +50,7 @@ def test_contact_points_lie_on_object_and_link(shared_data, model):
         obj = clench.GraspObject.load(shared_data / OBJECTS[name])
         judge = Judge(hand, obj)
         for pose in clench.approach_poses(hand, obj, 2, seed=5):
-            for check in judge.contacts(clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))):
+            for check in judge.contacts(clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))):
                 assert check.to_object <= ONE_MICROMETRE, check
                 assert check.to_link <= ONE_MICROMETRE, check
                 seen += 1
@@ -69,7 +69,7 @@ def test_a_certified_grasp_overlaps_nothing_and_stops_at_what_it_touches(shared_
         obj = clench.GraspObject.load(shared_data / OBJECTS[name])
         collisions = Collisions(hand, obj)
         for pose in clench.approach_poses(hand, obj, poses, seed=1):
-            solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+            solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))
             if solution.certified:
                 seen += collisions.check(solution)
     assert seen >= least
@@ -86,7 +86,7 @@ def test_a_certified_grasp_of_fingers_that_move_at_once_overlaps_nothing(shared_
     obj = clench.GraspObject.load(shared_data / OBJECTS["mug"])
     collisions, seen = Collisions(hand, obj), 0
     for pose in clench.approach_poses(hand, obj, 2, seed=1):
-        command = clench.GraspCommand(hand_pose=pose, order=clench.ClosingOrder.TOGETHER)
+        command = clench.GraspCommand(hand_pose=pose, order=clench.ClosingOrder.TOGETHER, preshape="open")
         solution = clench.solve(hand, obj, command)
         if solution.certified:
             counted, wrong = collisions.wrong_at_once(solution)
@@ -104,7 +104,7 @@ def test_nothing_is_left_between_the_planes(shared_data, model):
     plane, full = [], []
     for pose in clench.approach_poses(hand, obj, 4, seed=0):
         for full_width, depths in ((False, plane), (True, full)):
-            command = clench.GraspCommand(hand_pose=pose, planes=3, full_width=full_width)
+            command = clench.GraspCommand(hand_pose=pose, planes=3, full_width=full_width, preshape="open")
             solution = clench.solve(hand, obj, command)
             q = np.array([solution.joint_angles[name] for name in hand.joint_names])
             T_palm_object = np.linalg.inv(solution.hand_pose.matrix) @ solution.object_pose.matrix
@@ -123,7 +123,7 @@ def test_depth_is_there_where_the_engine_sees_a_collision(shared_data):
     judge = Judge(hand, obj)
     seen = set()
     for pose in clench.approach_poses(hand, obj, 6, seed=2):
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, full_width=False))
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, full_width=False, preshape="open"))
         q = np.array([solution.joint_angles[name] for name in hand.joint_names])
         T_object_palm = np.linalg.inv(solution.object_pose.matrix) @ solution.hand_pose.matrix
         collides = False

@@ -30,7 +30,7 @@ def grip() -> Grip:
     """A grasp in which index and middle finger touch with two links each."""
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball", collision_source="engine")
     pose = clench.approach_poses(hand, ball, 5, 1)[4]
-    return hand, ball, clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+    return hand, ball, clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
 
 
 def gap_of(grip: Grip, link: str, q: FloatArray) -> float:

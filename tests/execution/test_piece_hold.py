@@ -32,7 +32,7 @@ def waisted() -> GraspObject:
 def grip() -> tuple[Hand, GraspObject, GraspSolution]:
     hand, obj = clench.Hand.load("robonaut2"), waisted()
     for pose in clench.approach_poses(hand, obj, 30, 1):
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))
         if solution.is_valid() and clench.plan_squeeze(solution, hand, obj, gravity=None).feasible:
             return hand, obj, solution
     raise AssertionError("no grip found")
@@ -58,6 +58,6 @@ def test_the_grasp_that_is_tested_fits_the_pieces(grip: tuple[Hand, GraspObject,
 def test_an_object_that_is_convex_is_tested_as_it_is() -> None:
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
     pose = clench.approach_poses(hand, ball, 5, 1)[4]
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
     report = hold_as_collided(solution, hand, ball, Hold(duration=0.2), plan_trajectory(solution, hand, obj=ball))
     assert report.as_given is None

@@ -20,7 +20,7 @@ from clench.models.shapes import CollisionSource
 def grip():
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
     pose = clench.approach_poses(hand, ball, 1, 1)[0]
-    return hand, ball, clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+    return hand, ball, clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
 
 
 def gaps(hand, ball, solution, angles) -> dict[str, float]:

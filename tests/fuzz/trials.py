@@ -32,7 +32,7 @@ def good() -> tuple[clench.Hand, clench.GraspObject, clench.GraspSolution, dict[
         model = model_in(Path(folder), URDF)
         hand = clench.Hand.load(model)
     obj = clench.GraspObject.load("sphere:r=0.02")
-    command = clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.05]), planes=2)
+    command = clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.05]), planes=2, preshape="open")
     return hand, obj, clench.solve(hand, obj, command), mesh_files()
 
 
@@ -46,7 +46,9 @@ def model_in(folder: Path, text: str, suffix: str = ".urdf") -> Path:
 
 def solved(hand: clench.Hand, obj: clench.GraspObject, rng: Rng) -> Any:
     """Return a solution's document, for a random pose near the object."""
-    command = clench.GraspCommand(hand_pose=Pose(rng.normal(scale=0.05, size=3)), planes=int(rng.integers(1, 4)))
+    command = clench.GraspCommand(
+        hand_pose=Pose(rng.normal(scale=0.05, size=3)), planes=int(rng.integers(1, 4)), preshape="open"
+    )
     return document_of(clench.solve(hand, obj, command))
 
 
@@ -163,7 +165,7 @@ def calibration_file(rng: Rng, folder: Path) -> Trial:
 
     def run() -> Any:
         hand, obj, _, _ = good()
-        command = clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.05]), planes=1, criteria=path)
+        command = clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.05]), planes=1, criteria=path, preshape="open")
         return document_of(clench.solve(hand, obj, command))
 
     return Trial("calibration file", run, ("weights.toml",))
@@ -209,7 +211,9 @@ def path_argument(rng: Rng, folder: Path) -> Trial:
             clench.load_command,
             clench.GraspSolution.load,
             lambda p: clench.Hand.load("patent15", hand_file=p),
-            lambda p: clench.solve(*good()[:2], clench.GraspCommand(Pose.identity(), criteria=Path(p))),
+            lambda p: clench.solve(
+                *good()[:2], clench.GraspCommand(Pose.identity(), criteria=Path(p), preshape="open")
+            ),
             _recorded,
             _saved,
         ],

@@ -78,7 +78,9 @@ def command_value(rng: Rng, folder: Path) -> Trial:
         value = 20
 
     def run() -> Any:
-        command = replace(clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.05]), planes=1), **{key: value})
+        command = replace(
+            clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.05]), planes=1, preshape="open"), **{key: value}
+        )
         return document_of(clench.solve(hand, obj, command))
 
     return Trial(
@@ -94,7 +96,9 @@ def far_and_near(rng: Rng, folder: Path) -> Trial:
         scale = float(10.0 ** pick(rng, [rng.uniform(-12, 12), rng.uniform(-2, 2)]))
         shape = pick(rng, SHAPES) if scale < ROUND_SCALE else "box:x=0.03,y=0.03,z=0.05"
         obj = clench.GraspObject.load(shape, scale=scale, pose=a_pose(rng))
-        answer = document_of(clench.solve(hand, obj, clench.GraspCommand(hand_pose=a_pose(rng), planes=1)))
+        answer = document_of(
+            clench.solve(hand, obj, clench.GraspCommand(hand_pose=a_pose(rng), planes=1, preshape="open"))
+        )
         if rng.random() < 0.1:
             answer["poses"] = [p.wxyz_xyz for p in clench.approach_poses(hand, obj, 1, int(rng.integers(1000)))]
         return answer
@@ -159,7 +163,7 @@ def posture_value(rng: Rng, folder: Path) -> Trial:
             lambda: clench.approach_poses(hand, obj, int(rng.integers(-1, 2)), int(rng.integers(-5, 5)), preshape=q),
             lambda: clench.sensitivity(replace(solution, object_pose=a_pose(rng)), hand, obj).to_dict(),
             lambda: clench.pose_error(
-                hand, obj, clench.GraspCommand(a_pose(rng), planes=1), *numbers(rng, 2)
+                hand, obj, clench.GraspCommand(a_pose(rng), planes=1, preshape="open"), *numbers(rng, 2)
             ).to_dict(),
             lambda: clench.plan_trajectory(solution, hand, speed=numbers(rng, 1)[0]).to_dict(),
         ],

@@ -55,7 +55,7 @@ def test_a_link_of_boxes_in_a_large_box(place, inside, parts):
 
 def test_a_ball_inside_a_link_between_the_planes_blocks_it():
     obj = GraspObject.from_shape(Shape(ShapeKind.SPHERE, SPHERE), pose=Pose([0.04, 0.006, 0.0]), name="ball")
-    solution = clench.solve(thick(), obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))
+    solution = clench.solve(thick(), obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open"))
     assert solution.status == "blocked"
     assert solution.fingers["index"].status == "blocked"
     assert not solution.certified
@@ -65,7 +65,7 @@ def test_nothing_is_certified_with_a_link_inside_another():
     palm = Shape(ShapeKind.BOX, (0.1, 0.05, 0.05), Pose([0.05, 0, 0]))
     hand = HandBuilder(palm).finger("index", [along_x(0.002, 0.02), along_x(0.002, 0.02)], [0.03, 0.03]).hand()
     obj = GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
-    solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity()))
+    solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
     assert not solution.certified
     assert "lies inside" in solution.certificate["text"]
 

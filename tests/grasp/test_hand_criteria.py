@@ -55,7 +55,7 @@ def chosen(monkeypatch):
 
 def mug_command(**changes):
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
-    return clench.GraspCommand(hand_pose=pose, criteria={"spy": 1.0}, **changes)
+    return clench.GraspCommand(hand_pose=pose, criteria={"spy": 1.0}, **{"preshape": "open", **changes})
 
 
 def score(name, sets, setting):
@@ -93,7 +93,7 @@ def test_the_steadiest_of_all_combinations_is_chosen(seed):
     """Every combination of three open values per finger is judged by itself: none is better than the chosen one."""
     hand = clench.Hand.load("patent15")
     pose = clench.approach_poses(hand, MUG, seed + 1, 0)[seed]
-    command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1, 0.2))
+    command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1, 0.2), preshape="open")
     problem = make_problem(hand, MUG, command)
     calibration = Calibration("steady", {"range_of_motion": 0.2, "steadiness": 1.0})
     setting = make_setting(problem, calibration)
@@ -120,7 +120,7 @@ def pincer(height=0.035, **changes):
 
 
 def held_ball(chosen, hand):
-    command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"spy": 1.0})
+    command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"spy": 1.0}, preshape="open")
     sets, setting, _ = chosen(hand, clench.GraspObject.load("sphere:r=0.02"), command)
     return sets, setting
 
@@ -268,7 +268,7 @@ def test_criteria_of_the_hand_say_nothing_without_an_object():
 def test_presets_choose(preset):
     hand = clench.Hand.load("robonaut2")
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
-    command = clench.GraspCommand(hand_pose=pose, criteria=preset, yaw_grid=(0.0, 0.1), planes=1)
+    command = clench.GraspCommand(hand_pose=pose, criteria=preset, yaw_grid=(0.0, 0.1), planes=1, preshape="open")
     solution = clench.solve(hand, MUG, command)
     assert solution.choice["calibration"] == preset
     assert solution.is_valid()
@@ -281,7 +281,9 @@ def test_weight_on_steadiness_never_makes_the_grip_less_steady():
     bounds = []
     for weight in (0.0, 0.1, 1.0, 10.0):
         criteria = {"range_of_motion": 1.0, "steadiness": weight} if weight else {"range_of_motion": 1.0}
-        command = clench.GraspCommand(hand_pose=pose, criteria=criteria, yaw_grid=(0.0, 0.15, -0.15), planes=1)
+        command = clench.GraspCommand(
+            hand_pose=pose, criteria=criteria, yaw_grid=(0.0, 0.15, -0.15), planes=1, preshape="open"
+        )
         scores = clench.solve(hand, MUG, command).choice["hand_scores"]
         bounds.append(scores.get("steadiness", 0.0))
     assert bounds[1:] == sorted(bounds[1:])
@@ -303,7 +305,7 @@ def test_clearance_is_the_gap_to_obstacles_alone():
     ball = clench.GraspObject.load("sphere:r=0.02")
     wall = clench.GraspObject.load("box:x=0.02,y=0.2,z=0.02").bodies[0].moved(Pose([0.09, 0.0, 0.03]))
     scene = replace(ball, bodies=(*ball.bodies, replace(wall, name="wall", role=BodyRole.OBSTACLE)))
-    command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"clearance": 1.0})
+    command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"clearance": 1.0}, preshape="open")
     solution = clench.solve(hand, scene, command)
     index = solution.fingers["index"]
     chosen = index.candidates[index.chosen]

@@ -58,7 +58,9 @@ def test_what_is_left_out_never_touches(seed):
 
 def test_a_ball_between_fingers_side_by_side_is_closed_on_as_before():
     ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.03, 0.01, 0.035]))
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=1, order=clench.ClosingOrder.TOGETHER)
+    command = clench.GraspCommand(
+        hand_pose=Pose.identity(), planes=1, order=clench.ClosingOrder.TOGETHER, preshape="open"
+    )
     solution = clench.solve(two_fingers([0.0, 0.02, 0.0]), ball, command)
     assert solution.certified
     assert {c.finger for c in solution.contacts} == {"index", "thumb"}

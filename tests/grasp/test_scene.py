@@ -179,7 +179,7 @@ def packed_once_solved(number):
     packed = []
     for k in range(number):
         obj = GraspObject.load(f"box:x=0.0{k + 1},y=0.02,z=0.02")
-        command = clench.GraspCommand(hand_pose=Pose([0, 0, -0.3]), full_width=False, planes=1)
+        command = clench.GraspCommand(hand_pose=Pose([0, 0, -0.3]), full_width=False, planes=1, preshape="open")
         clench.solve(block_hand(), obj, command)
         packed.append(weakref.ref(pack_object(obj)))
 

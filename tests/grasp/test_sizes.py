@@ -10,7 +10,7 @@ from clench.apps.cli.main import main
 from clench.grasp.sizes import hand_size
 from clench.models.objects.grasp_object import BodyRole
 
-INSIDE = clench.GraspCommand(hand_pose=clench.Pose([0.05, 0.02, 0.01]))
+INSIDE = clench.GraspCommand(hand_pose=clench.Pose([0.05, 0.02, 0.01]), preshape="open")
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_a_large_table_is_no_mistake(hand):
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        clench.solve(hand, scene, clench.GraspCommand(hand_pose=clench.Pose([-0.05, -0.1, 0.3])))
+        clench.solve(hand, scene, clench.GraspCommand(hand_pose=clench.Pose([-0.05, -0.1, 0.3]), preshape="open"))
 
 
 def test_the_command_line_says_it_once(tmp_path, capsys):

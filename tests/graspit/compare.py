@@ -95,7 +95,9 @@ class Comparison:
         """Close the hand as in a case and explain every finger."""
         placed = case["hand_pose_in_object"]
         pose = clench.Pose(placed["t"], wxyz=np.array(placed["q_wxyz"]) / np.linalg.norm(placed["q_wxyz"]))
-        command = clench.GraspCommand(hand_pose=pose, order=clench.ClosingOrder.TOGETHER, planes=1, measure=False)
+        command = clench.GraspCommand(
+            hand_pose=pose, order=clench.ClosingOrder.TOGETHER, planes=1, measure=False, preshape="open"
+        )
         solution = clench.solve(self.hand, self.obj, command)
         ours = np.array([solution.joint_angles[n] for n in self.hand.joint_names])
         theirs = np.array(case["joints_final"])

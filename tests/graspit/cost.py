@@ -37,7 +37,7 @@ def times_of(hand: Hand, obj: clench.GraspObject, poses: list[clench.Pose], pass
     for _ in range(passes + 1):  # the first one loads kernels and plans the hand
         for i, pose in enumerate(poses):
             for k, order in enumerate(ORDERS):
-                command = clench.GraspCommand(hand_pose=pose, order=order, measure=False)
+                command = clench.GraspCommand(hand_pose=pose, order=order, measure=False, preshape="open")
                 began = time.process_time()
                 solution = clench.solve(hand, obj, command)
                 _ = solution.status, solution.joint_angles, solution.certified

@@ -34,7 +34,7 @@ def good_solution() -> str:
     import clench
 
     hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
-    commands = [clench.GraspCommand(pose) for pose in clench.approach_poses(hand, ball, 16, 0)]
+    commands = [clench.GraspCommand(pose, preshape="open") for pose in clench.approach_poses(hand, ball, 16, 0)]
     found = next(s for s in (clench.solve(hand, ball, c) for c in commands) if s.status == "grasp")
     named = replace(clench.complete(found, hand, ball), hand_model="patent15", object_model="ball")
     return json.dumps(named.to_dict())

@@ -97,7 +97,9 @@ def _arrays(folder: Path) -> dict[str, bytes]:
     rows = np.tile([1.0, 0, 0, 0, 0, 0, -0.05], (2, 1))
     poses, grasps = io.BytesIO(), io.BytesIO()
     np.save(poses, rows)
-    clench.solve_batch(hand, obj, rows, clench.GraspCommand(clench.Pose.identity(), planes=1)).save(folder / "b.npz")
+    clench.solve_batch(hand, obj, rows, clench.GraspCommand(clench.Pose.identity(), planes=1, preshape="open")).save(
+        folder / "b.npz"
+    )
     qpos = np.tile([0.0, 0.0, -0.05, 1.0, 0.0, 0.0, 0.0, 0.1, 0.08, 0.2], (2, 1))
     document = {"grasp_qpos": qpos, "obj_pose": np.array([0.0, 0, 0, 1, 0, 0, 0]), "obj_scale": 1.0}
     np.save(grasps, np.array(document, dtype=object), allow_pickle=True)

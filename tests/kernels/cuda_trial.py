@@ -19,7 +19,7 @@ def main() -> None:
         obj = clench.GraspObject.load(name)
         poses = clench.approach_poses(hand, obj, 3, seed=1)
         for full in (False, True):
-            command = clench.GraspCommand(hand_pose=poses[0], planes=2, full_width=full)
+            command = clench.GraspCommand(hand_pose=poses[0], planes=2, full_width=full, preshape="open")
             cpu, device = (clench.solve_batch(hand, obj, poses, command, threads=2, device=d) for d in ("cpu", "cuda"))
             same = all(np.array_equal(getattr(cpu, column), getattr(device, column)) for column in COLUMNS)
             kinds = "certified" if full else "planes"

@@ -23,7 +23,9 @@ def overlap(one, other, R, offset):
     roles = [JointRole.POSTURE, JointRole.CLOSING]
     builder = HandBuilder(palm=one).finger("index", [other, along_x(0.001, 0.01)], [0.5, 0.01], upper=0.1, roles=roles)
     hand = replace(builder.hand(), allowed_pairs=((1, 2),))
-    problem = make_problem(hand, clench.GraspObject.load("ball"), clench.GraspCommand(hand_pose=Pose.identity()))
+    problem = make_problem(
+        hand, clench.GraspObject.load("ball"), clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
+    )
     poses = np.tile(np.eye(4)[:3], (3, 1, 1))
     poses[1, :, :3], poses[1, :, 3] = R, offset
     poses[2, :, 3] = [1.0, 0.0, 0.0]

@@ -19,7 +19,7 @@ def test_every_parameter_has_a_sample(kernel):
 
 def test_what_is_compiled_is_what_a_solve_calls():
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
-    clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE)).to_dict()
+    clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE, preshape="open")).to_dict()
     values = warming.sample_values()
     called = (
         *(batch_solving.solve_poses, family_section.cut_first_families, overlap.find_overlaps, closing.close_items),
@@ -36,10 +36,10 @@ def test_what_is_compiled_is_what_a_solve_calls():
 
 def test_the_first_call_says_that_it_compiles(monkeypatch, capsys):
     hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
-    clench.solve(hand, ball, clench.GraspCommand(Pose([5, 0, 0])))
+    clench.solve(hand, ball, clench.GraspCommand(Pose([5, 0, 0]), preshape="open"))
     capsys.readouterr()
     warming.announce.cache_clear()
-    clench.solve(hand, ball, clench.GraspCommand(Pose([5, 0, 0])))
+    clench.solve(hand, ball, clench.GraspCommand(Pose([5, 0, 0]), preshape="open"))
     assert capsys.readouterr().err == ""  # they are compiled by now
     monkeypatch.setattr(warming, "_is_cold", lambda kernel=None: True)
     warming.announce.cache_clear()

@@ -22,7 +22,7 @@ def test_a_corner_stops_a_finger_that_would_be_past_it_a_thousandth_of_a_radian_
 @pytest.mark.parametrize("off", [-1e-3, -1e-6, 0.0, 1e-6, 1e-3])
 def test_the_oracle_finds_a_joint_that_stops_early_or_late(off):
     case = make_case(1)
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, measure=False)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, measure=False, preshape="open")
     solution = clench.solve(case.hand, case.obj, command)
     answer = np.array([solution.joint_angles[name] for name in case.hand.joint_names])
     answer[0] += off

@@ -357,6 +357,7 @@ def _judge(case: Case, oracle: Oracle, seed: int, order: str) -> Judged:
             order=clench.ClosingOrder("together" if order == "speeds" else order),
             speeds={case.hand.joint_names[i]: float(speeds[i]) for i in free} if order == "speeds" else {},
             measure=False,
+            preshape="open",
         ),
     )
     start = case.hand.open_angles()

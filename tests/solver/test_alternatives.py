@@ -13,7 +13,7 @@ import clench
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
 from clench.grasp import criterion_registry
-from clench.solver import alternatives, controller, packing
+from clench.solver import alternatives, packing, single
 from clench.solver.planning import planned
 from clench.solver.problem import make_problem
 
@@ -29,8 +29,8 @@ ASKED: dict[str, dict[str, Any]] = {
 
 def in_full(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let solves close all sets, choose among them, and say everything at once."""
-    monkeypatch.setattr(controller, "solve_directly", lambda *given: None)
-    monkeypatch.setattr(controller, "decided", lambda problem, calibration: None)
+    monkeypatch.setattr(single, "solve_directly", lambda *given: None)
+    monkeypatch.setattr(single, "decided", lambda problem, calibration: None)
 
 
 def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.GraspCommand]) -> list[dict[str, Any]]:
@@ -40,7 +40,10 @@ def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.
 def commands(hand: clench.Hand, obj: clench.GraspObject, **asked: Any) -> list[clench.GraspCommand]:
     """Return commands at approach poses, and at one inside the object."""
     poses = clench.approach_poses(hand, obj, 3, 0)
-    return [clench.GraspCommand(hand_pose=p, **asked) for p in (*poses, Pose(obj.pose.position, poses[0].wxyz))]
+    return [
+        clench.GraspCommand(hand_pose=p, **{"preshape": "open", **asked})
+        for p in (*poses, Pose(obj.pose.position, poses[0].wxyz))
+    ]
 
 
 @pytest.mark.parametrize("model", ASKED)
@@ -56,7 +59,7 @@ def test_documents_are_those_of_a_choice_among_all_sets(name: str, model: str, m
 def test_fingers_that_the_others_made_close_again_are_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
     hand, obj = HANDS["patent15"], clench.GraspObject.load("cylinder:r=0.004,h=0.2")
     poses = clench.approach_poses(hand, obj, 12, 0)
-    asked = [clench.GraspCommand(hand_pose=pose, planes=2, criteria="steady") for pose in poses]
+    asked = [clench.GraspCommand(hand_pose=pose, planes=2, criteria="steady", preshape="open") for pose in poses]
     late = documents(hand, obj, asked)
     assert any(f["closed_again"] for d in late for f in d["choice"]["fingers"].values())
     in_full(monkeypatch)
@@ -150,7 +153,7 @@ def test_changes_of_what_was_given_do_not_reach_what_is_read_later(full_width: b
     pose = commands(hand, obj)[0].hand_pose
     fingers, grid, preshape = ["thumb", "index"], [0.0], {hand.joints[hand.fingers[0].joints[-1]].name: 0.1}
     given: dict[str, Any] = {"fingers": fingers, "open_variants": grid, "preshape": preshape}
-    command = clench.GraspCommand(hand_pose=pose, planes=2, full_width=full_width, **given)
+    command = clench.GraspCommand(hand_pose=pose, planes=2, full_width=full_width, **{"preshape": "open", **given})
     right = documents(hand, obj, [command])[0]
     solution = clench.solve(hand, obj, command)
     fingers.reverse()
@@ -171,7 +174,7 @@ def test_problems_are_packed_once_whatever_their_criteria_are(monkeypatch: pytes
         for _ in range(2):
             for preshape in several:
                 asked: dict[str, Any] = {"criteria": dict(criteria), "preshape": preshape, "full_width": full_width}
-                clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=4, **asked))
+                clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, planes=4, **{"preshape": "open", **asked}))
     assert len(made) == 2 * len(several)
 
 

@@ -11,8 +11,7 @@ import pytest
 import clench
 from clench.base.errors import ClenchError, CommandError
 from clench.base.pose import Pose
-from clench.solver import batch as batching
-from clench.solver import batch_progress
+from clench.solver import batch_progress, posture_choice
 from clench.solver.batch_solver import BatchSolver
 from clench.solver.grasp_batch import GraspBatch
 
@@ -68,7 +67,7 @@ def assert_equal_batches(a: GraspBatch, b: GraspBatch) -> None:
 def test_the_bits_of_single_solves(name: str, model: str, full_width: bool) -> None:
     hand, obj = HANDS[name], clench.GraspObject.load(model)
     poses = some_poses(hand, obj)
-    command = clench.GraspCommand(hand_pose=poses[0], full_width=full_width, planes=3)
+    command = clench.GraspCommand(hand_pose=poses[0], full_width=full_width, planes=3, preshape="open")
     batch = clench.solve_batch(hand, obj, poses, command)
     assert not batch.one_by_one.any()
     assert batch.status[-2] == "no_contact"
@@ -93,7 +92,7 @@ def test_poses_in_any_form() -> None:
     hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
     poses = some_poses(hand, obj)
     rows = np.array([np.concatenate([1.0001 * p.wxyz, p.position]) for p in poses])
-    command = clench.GraspCommand(hand_pose=Pose.identity(), full_width=False, planes=2)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), full_width=False, planes=2, preshape="open")
     again = [Pose(p.position, 1.0001 * p.wxyz) for p in poses]
     assert_equal_batches(clench.solve_batch(hand, obj, again, command), clench.solve_batch(hand, obj, rows, command))
     matrices = np.array([p.matrix for p in poses])
@@ -111,7 +110,7 @@ def test_objects_preshapes_and_root_links_of_their_own() -> None:
     yaw = next(j.name for j in hand.joints if j.role is clench.JointRole.POSTURE and j.lower < 0.0 < j.upper)
     turns = [0.05, 0.0, 0.05]
     root = hand.links[hand.palm].name
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=2, root_link=root)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=2, root_link=root, preshape="open")
     batch = clench.solve_batch(hand, obj, poses, command, object_poses=there, preshapes={yaw: turns})
     alone = [
         clench.solve(hand, obj, replace(command, hand_pose=p, object_pose=o, preshape={yaw: t}))
@@ -136,7 +135,7 @@ def test_objects_preshapes_and_root_links_of_their_own() -> None:
 def test_what_no_kernel_covers_is_solved_one_by_one(asked: dict[str, object]) -> None:
     hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
     poses = some_poses(hand, obj, 1)[::2]
-    command = clench.GraspCommand(hand_pose=poses[0], planes=1, **asked)  # type: ignore[arg-type]
+    command = clench.GraspCommand(hand_pose=poses[0], planes=1, **{"preshape": "open", **asked})  # type: ignore[arg-type]
     batch = clench.solve_batch(hand, obj, poses, command)
     assert batch.one_by_one.all()
     assert_same_bits(batch, [clench.solve(hand, obj, replace(command, hand_pose=pose)) for pose in poses])
@@ -146,7 +145,7 @@ def test_fingers_that_meet_are_closed_anew() -> None:
     """Fingers of a hand around something thin run into each other; the thumb, asked for last, gives way."""
     hand, obj = HANDS["patent15"], clench.GraspObject.load("cylinder:r=0.004,h=0.2")
     poses = some_poses(hand, obj, 6)
-    command = clench.GraspCommand(hand_pose=poses[0], planes=2)
+    command = clench.GraspCommand(hand_pose=poses[0], planes=2, preshape="open")
     alone = [clench.solve(hand, obj, replace(command, hand_pose=pose)) for pose in poses]
     assert any(f.get("closed_again") for s in alone for f in (s.choice or {})["fingers"].values())
     assert_same_bits(clench.solve_batch(hand, obj, poses, command), alone)
@@ -235,11 +234,11 @@ def test_a_bar_appears_after_a_while(
 def test_every_shipped_form_of_hand_is_packed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Postures that repeat are planned once, however the poses are mixed."""
     made = []
-    monkeypatch.setattr(batching, "BatchSolver", lambda *a: made.append(a) or BatchSolver(*a))
+    monkeypatch.setattr(posture_choice, "BatchSolver", lambda *a: made.append(a) or BatchSolver(*a))
     hand, obj = HANDS["robonaut2"], clench.GraspObject.load("ball")
     yaw = next(j.name for j in hand.joints if j.role is clench.JointRole.POSTURE and j.lower < 0.0 < j.upper)
     far = [Pose([k, 5.0, 0.0]) for k in range(6)]
-    command = clench.GraspCommand(hand_pose=far[0], planes=1, full_width=False)
+    command = clench.GraspCommand(hand_pose=far[0], planes=1, full_width=False, preshape="open")
     clench.solve_batch(hand, obj, far, command, preshapes={yaw: [0.0, 0.01] * 3})
     assert len(made) == 2
 

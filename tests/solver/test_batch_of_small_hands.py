@@ -35,12 +35,14 @@ def pincer(second: float = 1.2):
 @pytest.mark.parametrize("model", ["box:x=0.02,y=0.03,z=0.012", "sphere:r=0.014"])
 def test_a_batch_gives_what_single_solves_give(model, full_width):
     hand, obj, pose = pincer(), clench.GraspObject.load(model), Pose.identity()
-    command = clench.GraspCommand(hand_pose=pose, full_width=full_width, planes=2, measure=False)
+    command = clench.GraspCommand(hand_pose=pose, full_width=full_width, planes=2, measure=False, preshape="open")
     hands = [Pose(-place.position) for place in POSES.values()]
     batch = clench.solve_batch(hand, obj, hands, command)
     assert not batch.one_by_one.any()
     alone = [
-        clench.solve(hand, obj, clench.GraspCommand(hand_pose=p, full_width=full_width, planes=2, measure=False))
+        clench.solve(
+            hand, obj, clench.GraspCommand(hand_pose=p, full_width=full_width, planes=2, measure=False, preshape="open")
+        )
         for p in hands
     ]
     for i, solution in enumerate(alone):

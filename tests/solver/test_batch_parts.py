@@ -12,7 +12,7 @@ from clench.models.command import GraspCommand
 from clench.solver.batch_parts import parts_folder
 from clench.solver.batch_solver import BatchSolver
 
-PLANES = GraspCommand(hand_pose=clench.Pose.identity(), planes=2)
+PLANES = GraspCommand(hand_pose=clench.Pose.identity(), planes=2, preshape="open")
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,9 @@ def ball(position, radius: float = 0.01) -> clench.GraspObject:
 
 
 def solved(hand: Hand, obj: clench.GraspObject, **changes: Any) -> clench.GraspSolution:
-    return clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, **changes))
+    return clench.solve(
+        hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, **{"preshape": "open", **changes})
+    )
 
 
 def cause(solution: clench.GraspSolution, finger: str = "index") -> dict[str, Any]:

@@ -67,9 +67,9 @@ def test_a_change_of_what_was_given_is_seen_and_reaches_nothing_that_was_kept():
 
 def test_a_change_deep_inside_reaches_nothing_that_was_kept():
     force = [0.0, 0.0, -2.0]
-    first = checked(HAND, GraspCommand(HERE, task_wrenches=({"force": force},)))
+    first = checked(HAND, GraspCommand(HERE, task_wrenches=({"force": force},), preshape="open"))
     force[2] = -20.0
-    assert checked(HAND, GraspCommand(HERE, task_wrenches=({"force": [0.0, 0.0, -2.0]},))) is first
+    assert checked(HAND, GraspCommand(HERE, task_wrenches=({"force": [0.0, 0.0, -2.0]},), preshape="open")) is first
     assert first.command.task_wrenches == ({"force": (0.0, 0.0, -2.0)},)
 
 
@@ -85,7 +85,7 @@ def test_criteria_that_write_to_what_they_are_given_change_no_later_solve():
     from clench.grasp.calibration import calibration_of
     from clench.solver.problem import make_problem, make_setting
 
-    problem = make_problem(HAND, clench.GraspObject.load("ball"), GraspCommand(HERE))
+    problem = make_problem(HAND, clench.GraspObject.load("ball"), GraspCommand(HERE, preshape="open"))
     before = problem.start.copy()
     make_setting(problem, calibration_of(None)).start[:] = 7.0
     assert np.array_equal(problem.start, before)
@@ -107,18 +107,18 @@ def test_values_that_may_change_unseen_are_checked_every_time():
 
 
 def test_few_are_kept():
-    again = checked(HAND, GraspCommand(HERE, seed=77))
+    again = checked(HAND, GraspCommand(HERE, seed=77, preshape="open"))
     for planes in range(1, 100):
-        checked(HAND, GraspCommand(HERE, planes=planes))
-        assert checked(HAND, GraspCommand(HERE, seed=77)) is again
+        checked(HAND, GraspCommand(HERE, planes=planes, preshape="open"))
+        assert checked(HAND, GraspCommand(HERE, seed=77, preshape="open")) is again
     assert len(module._kept) == 64
 
 
 def test_a_solution_has_the_poses_of_its_own_command():
     ball, moved = clench.GraspObject.load("sphere:r=0.03"), Pose([1.0, 2.0, 3.0])
     for pose in clench.approach_poses(HAND, ball, 3, 1):
-        here = clench.solve(HAND, ball, GraspCommand(pose))
-        there = clench.solve(HAND, ball, GraspCommand(moved @ pose, object_pose=moved))
+        here = clench.solve(HAND, ball, GraspCommand(pose, preshape="open"))
+        there = clench.solve(HAND, ball, GraspCommand(moved @ pose, object_pose=moved, preshape="open"))
         assert np.array_equal(here.hand_pose.matrix, pose.matrix)
         assert np.array_equal(there.hand_pose.matrix, (moved @ pose).matrix)
         assert np.array_equal(there.object_pose.matrix, moved.matrix)

@@ -21,7 +21,9 @@ def test_a_link_that_rolls_on_what_it_touches_still_touches_it(planes, tilt):
     axes = [-Y, turned(Y, tilt) @ X]
     shapes = [None, along_x(RADIUS, LENGTH)]
     hand = HandBuilder().finger("index", shapes, [0.0, LENGTH], axes=axes, upper=1.0).hand()
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.07, 0.0, 0.04]), planes=planes)
+    command = clench.GraspCommand(
+        hand_pose=Pose.identity(), object_pose=Pose([0.07, 0.0, 0.04]), planes=planes, preshape="open"
+    )
     solution = clench.solve(hand, GraspObject.load("box:x=0.04,y=0.08,z=0.02"), command)
     # The capsule's side meets the edge at (0.09, 0.03): r sin(α - θ) = radius.
     expected = np.arctan2(0.03, 0.09) - np.arcsin(RADIUS / np.hypot(0.03, 0.09))
@@ -39,7 +41,7 @@ def test_a_finger_slides_past_a_parallel_one_however_close(gap):
     link = Shape(ShapeKind.BOX, (0.02, 0.01, 0.004), Pose([0.02, 0.0, 0.0]))
     builder = HandBuilder().finger("one", [link], [0.04], upper=1.2)
     hand = builder.finger("other", [link], [0.04], upper=1.2, base=mount((0.0, 0.02 + gap, 0.0))).hand()
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.03, 0.01, 0.03]))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.03, 0.01, 0.03]), preshape="open")
     solution = clench.solve(hand, GraspObject.load("box:x=0.02,y=0.06,z=0.02"), command)
     assert solution.certified
     assert solution.status == "grasp"
@@ -52,7 +54,7 @@ def test_a_link_that_ends_with_its_side_flush_to_a_face_overlaps_nothing(turn):
         "index", [Shape(ShapeKind.BOX, (0.03, 0.01, 0.005), Pose([0.03, 0.0, 0.0]))], [0.06], upper=0.3
     )
     pose = Pose([0.05, 0.02, 0.03], wxyz=[np.cos(turn / 2), 0.0, np.sin(turn / 2), 0.0])
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=pose)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=pose, preshape="open")
     solution = clench.solve(hand.hand(), GraspObject.from_shape(Shape(ShapeKind.BOX, (0.01, 0.01, 0.02))), command)
     assert solution.joint_angles["index_0"] == 0.3
     assert solution.certified, solution.certificate
@@ -65,7 +67,7 @@ def test_links_that_share_a_ring_of_edges_and_most_of_their_volume_are_refused(c
     builder = HandBuilder(palm=one).finger("idle", [None, along_x(0.002, 0.02)], [0.1, 0.02], upper=0.1)
     hand = builder.finger("spinning", [other], [0.02], axes=[Z], upper=0.1).hand()
     hand = replace(hand, allowed_pairs=())
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.1, 0.1, 0.3]))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.1, 0.1, 0.3]), preshape="open")
     assert not clench.solve(hand, GraspObject.load("ball"), command).certified
 
 
@@ -75,7 +77,7 @@ def test_fingers_of_one_section_that_lie_in_each_other_are_refused():
     opposite = mount((0.06, 0.0, 0.0), turned(np.array([0.0, 0.0, 1.0]), np.pi))
     builder = HandBuilder().finger("one", [link], [0.04], upper=1.2)
     hand = builder.finger("other", [link], [0.04], upper=1.2, base=opposite).hand()
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.03, 0.0, 0.05]))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=Pose([0.03, 0.0, 0.05]), preshape="open")
     solution = clench.solve(
         hand,
         GraspObject.load("ball"),

@@ -16,7 +16,7 @@ X, Y, _ = np.eye(3)
 
 
 def command(**changes):
-    return clench.GraspCommand(**{"hand_pose": Pose.identity(), "planes": 1, **changes})
+    return clench.GraspCommand(**{"hand_pose": Pose.identity(), "planes": 1, "preshape": "open", **changes})
 
 
 def upright(radius, center):

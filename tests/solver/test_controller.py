@@ -15,7 +15,7 @@ BALL = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.045, 0.004, 0.035])
 
 
 def command(**changes):
-    return clench.GraspCommand(**{"hand_pose": Pose.identity(), **changes})
+    return clench.GraspCommand(**{"hand_pose": Pose.identity(), "preshape": "open", **changes})
 
 
 def yawed_hand(**options):

@@ -84,8 +84,8 @@ def assert_same(first, second, flipped=False):
 @given(motion=poses, number=st.integers(0, 2))
 def test_rigid_motion_of_everything(motion, number):
     hand, obj = two_fingers(), OBJECTS[number]
-    here = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity()))
-    there = clench.solve(hand, obj.posed(motion @ obj.pose), clench.GraspCommand(hand_pose=motion))
+    here = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
+    there = clench.solve(hand, obj.posed(motion @ obj.pose), clench.GraspCommand(hand_pose=motion, preshape="open"))
     assert_same(here, there)
     if number:
         return  # where a flat side lies on a flat face any of the equal contacts may be named
@@ -97,8 +97,10 @@ def test_rigid_motion_of_everything(motion, number):
 @pytest.mark.parametrize("obj", OBJECTS, ids=lambda o: o.name)
 def test_mirror_image(obj):
     hand = two_fingers()
-    right = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity()))
-    left = clench.solve(mirrored_hand(hand), mirrored_object(obj), clench.GraspCommand(hand_pose=Pose.identity()))
+    right = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
+    left = clench.solve(
+        mirrored_hand(hand), mirrored_object(obj), clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
+    )
     assert any(f.status == "touch" for f in right.fingers.values())
     assert_same(right, left, flipped=True)
 
@@ -107,7 +109,7 @@ def test_mirror_image(obj):
 @pytest.mark.parametrize("obj", OBJECTS, ids=lambda o: o.name)
 def test_scale(obj, factor):
     hand = two_fingers()
-    command = clench.GraspCommand(hand_pose=Pose.identity())
+    command = clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
     assert_same(
         clench.solve(hand, obj, command), clench.solve(scaled_hand(hand, factor), scaled_object(obj, factor), command)
     )
@@ -123,7 +125,9 @@ def test_the_same_bits_again_and_in_many_threads():
     hand = two_fingers()
     turns = [Pose([0.001 * k, 0.0, 0.0]) for k in range(6)]
     work = [
-        (obj, clench.GraspCommand(hand_pose=turn, planes=3 + k % 3)) for k, turn in enumerate(turns) for obj in OBJECTS
+        (obj, clench.GraspCommand(hand_pose=turn, planes=3 + k % 3, preshape="open"))
+        for k, turn in enumerate(turns)
+        for obj in OBJECTS
     ]
     alone = [document(clench.solve(hand, obj, command)) for obj, command in work]
     assert alone == [document(clench.solve(hand, obj, command)) for obj, command in work]
@@ -134,7 +138,7 @@ def test_the_same_bits_again_and_in_many_threads():
 
 def test_a_plan_that_was_kept_gives_what_a_new_hand_gives():
     """Neither the order of solves nor what was solved before plays a part."""
-    hand, command = two_fingers(), clench.GraspCommand(hand_pose=Pose.identity())
+    hand, command = two_fingers(), clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
     first = [document(clench.solve(two_fingers(), obj, command)) for obj in OBJECTS]
     for obj, expected in [*zip(OBJECTS[::-1], first[::-1], strict=True), *zip(OBJECTS, first, strict=True)]:
         assert document(clench.solve(hand, obj, command)) == expected
@@ -148,9 +152,13 @@ def test_real_hands_moved_and_scaled(shared_data, model):
     motion = Pose([0.3, -0.7, 1.1], wxyz=np.array([0.5, -0.1, 0.7, 0.5]))
     small, smaller = scaled_hand(hand, 0.01), scaled_object(obj, 0.01)
     for pose in clench.approach_poses(hand, obj, 2, seed=3):
-        here = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
-        assert_same(here, clench.solve(hand, obj.posed(motion), clench.GraspCommand(hand_pose=motion @ pose)))
-        assert_same(here, clench.solve(small, smaller, clench.GraspCommand(hand_pose=scaled_pose(pose, 0.01))))
+        here = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))
+        assert_same(
+            here, clench.solve(hand, obj.posed(motion), clench.GraspCommand(hand_pose=motion @ pose, preshape="open"))
+        )
+        assert_same(
+            here, clench.solve(small, smaller, clench.GraspCommand(hand_pose=scaled_pose(pose, 0.01), preshape="open"))
+        )
 
 
 @pytest.mark.shared
@@ -160,5 +168,9 @@ def test_real_hands_mirrored(shared_data, model):
     obj = clench.GraspObject.load(shared_data / TORUS)
     left, image = mirrored_hand(hand), mirrored_object(obj)
     for pose in clench.approach_poses(hand, obj, 2, seed=3):
-        here = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
-        assert_same(here, clench.solve(left, image, clench.GraspCommand(hand_pose=mirrored_pose(pose))), flipped=True)
+        here = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))
+        assert_same(
+            here,
+            clench.solve(left, image, clench.GraspCommand(hand_pose=mirrored_pose(pose), preshape="open")),
+            flipped=True,
+        )

@@ -17,10 +17,12 @@ def test_an_open_shell_blocks_what_stands_in_it_whatever_is_far_away(beside):
     shell = clench.GraspObject.from_meshes([(0.2 * CORNERS, np.array(FACES))], pose=Pose([0.23, 0.0, 0.0]))
     if beside is not None:
         shell = shell.with_object(clench.GraspObject.load(beside), pose=Pose([5.0, 5.0, 5.0]))
-    hand, command = one_link(0.008, 0.1), clench.GraspCommand(hand_pose=Pose.identity(), planes=3)
+    hand, command = one_link(0.008, 0.1), clench.GraspCommand(hand_pose=Pose.identity(), planes=3, preshape="open")
     solution = clench.solve(hand, shell, command)
     assert solution.status == "blocked"
     assert solution.fingers["index"].status == "blocked"
-    checked = clench.solve(hand, shell, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True))
+    checked = clench.solve(
+        hand, shell, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True, preshape="open")
+    )
     assert checked.fingers["index"].status == "blocked"
     assert clench.solve_batch(hand, shell, [Pose.identity()], command).status[0] == "blocked"

@@ -17,7 +17,9 @@ RADIUS = 0.007
 
 
 def solve(hand, obj, **changes):
-    return clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, **changes))
+    return clench.solve(
+        hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, **{"preshape": "open", **changes})
+    )
 
 
 def bar(x, z, r=0.004):
@@ -345,7 +347,7 @@ def test_the_change_with_the_pose_is_not_guessed_for_paths_that_cannot_be_found_
 def test_sets_with_joints_that_break_away_are_judged_where_these_were_held():
     """The actuator goes to its limit on every plane; where the first joint was held tells the sets apart."""
     ball = clench.GraspObject.load("sphere:r=0.004", pose=Pose([0.03, 0.005, 0.02]))
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True, preshape="open")
     (sets,) = finger_sets(make_problem(breaking(True), ball, command))
     full = next(c for c in sets if c.plane is None)
     free = [c for c in sets if c.q[0] > full.q[0] + 1e-3]
@@ -381,8 +383,11 @@ def summed(solution):
 def test_of_several_orders_the_best_solution_is_kept(orders):
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
-    command = clench.GraspCommand(hand_pose=pose, planes=1, criteria=WEIGHTS, orders=orders)
-    alone = {o: clench.solve(hand, mug, clench.GraspCommand(pose, planes=1, criteria=WEIGHTS, order=o)) for o in orders}
+    command = clench.GraspCommand(hand_pose=pose, planes=1, criteria=WEIGHTS, orders=orders, preshape="open")
+    alone = {
+        o: clench.solve(hand, mug, clench.GraspCommand(pose, planes=1, criteria=WEIGHTS, order=o, preshape="open"))
+        for o in orders
+    }
     solution = clench.solve(hand, mug, command)
     said = solution.choice["orders"]
     statuses = ["grasp", "partial", "no_contact", "blocked"]
@@ -436,12 +441,16 @@ def test_an_order_that_the_hand_does_not_allow_is_left_out_and_said():
 
 def test_a_record_has_one_entry_and_an_error_of_the_pose_keeps_the_order(tmp_path):
     hand, rod = three_links(upper=1.2), bar(0.06, 0.02)
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, orders=("proximal-first", "together"))
+    command = clench.GraspCommand(
+        hand_pose=Pose.identity(), planes=3, orders=("proximal-first", "together"), preshape="open"
+    )
     with clench.Record(tmp_path / "r.sqlite") as record:
         solution = clench.solve(hand, rod, command, record=record)
         assert len(record) == 1
     report = clench.pose_error(hand, rod, command, 1e-3, 0.0, solution=solution)
-    single = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, order=solution.choice["orders"]["chosen"])
+    single = clench.GraspCommand(
+        hand_pose=Pose.identity(), planes=3, order=solution.choice["orders"]["chosen"], preshape="open"
+    )
     assert report.measured == pytest.approx(clench.pose_error(hand, rod, single, 1e-3, 0.0).measured)
 
 
@@ -460,7 +469,7 @@ def test_an_order_without_a_value_is_not_inside_its_limit():
     )
     loose = make_solution(choice={"criteria": {}, "final_hand_scores": {}})
     found = {"proximal-first": loose, "together": strained}
-    command = clench.GraspCommand(hand_pose=Pose.identity(), orders=tuple(found))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), orders=tuple(found), preshape="open")
     said = best_order(command, lambda single: found[single.order]).choice["orders"]
     assert said["chosen"] == "together"
     assert said["text"] == "together comes before proximal-first because it has a value for every criterion."

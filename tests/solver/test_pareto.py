@@ -58,7 +58,9 @@ def test_it_is_that_of_all_combinations(seed: int) -> None:
 def test_the_chosen_sets_lead_the_front_of_a_solve() -> None:
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
-    command = clench.GraspCommand(hand_pose=pose, planes=1, yaw_grid=(0.0, 0.1, -0.1), open_variants=(0.0, 0.2))
+    command = clench.GraspCommand(
+        hand_pose=pose, planes=1, yaw_grid=(0.0, 0.1, -0.1), open_variants=(0.0, 0.2), preshape="open"
+    )
     found = hand_front(clench.solve(hand, mug, command))
     assert found[0].chosen
     assert sum(entry.chosen for entry in found) == 1

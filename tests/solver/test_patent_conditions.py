@@ -71,7 +71,7 @@ def test_conditions_of_side_contacts(make, kind):
             turned([0.6, 0.0, 0.8], rng.uniform(0, 3)),
         )
         obj = clench.GraspObject.from_meshes([(mesh.vertices, mesh.faces)], pose=Pose.from_matrix(place))
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity()))
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
         for candidate in solution.fingers["index"].candidates:
             for contact in candidate.contacts:
                 if contact.kind == "side" and not contact.passed and candidate.status == "touch":
@@ -114,7 +114,7 @@ def test_tips_and_corners_meet_the_weaker_form():
     seen = 0
     for height in np.linspace(0.055, 0.07, 6):
         obj = clench.GraspObject.from_meshes([(mesh.vertices, mesh.faces)], pose=Pose([0.035, 0.0, height]))
-        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3))
+        solution = clench.solve(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, preshape="open"))
         turn = solution.joint_angles["index_0"]
         for contact in (c for c in solution.contacts if c.kind == "edge"):
             inward = np.array([-np.sin(contact.curve_angle), 0.0, np.cos(contact.curve_angle)])

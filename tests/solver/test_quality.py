@@ -19,7 +19,7 @@ def grip():
     """A hand around a small ball, with contacts all around."""
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03").with_friction(0.8)
     for pose in clench.approach_poses(hand, ball, 20, 1):
-        solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+        solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
         if solution.is_valid() and clench.grasp_quality(solution, hand, ball).epsilon.radius > 0.1:
             return hand, ball, solution
     raise AssertionError("no grip found")

@@ -40,6 +40,7 @@ def test_on_one_plane(order):
             full_width=False,
             order=clench.ClosingOrder(order),
             measure=False,
+            preshape="open",
         )
         one, other = (clench.solve(hand, clench.GraspObject.from_shape(s, name="rod"), command) for s in (shape, mesh))
         assert list(one.joint_angles.values()) == pytest.approx(list(other.joint_angles.values()), abs=CLOSE), seed

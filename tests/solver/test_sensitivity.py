@@ -70,7 +70,7 @@ def test_random_chains():
     seen = Counter()
     for seed in range(40):
         case = make_case(seed)
-        command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, planes=1)
+        command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, planes=1, preshape="open")
         seen += judge(case.hand, case.obj, command)
     assert seen["compared"] > 200, seen
     assert seen["unknown"] + seen["rough"] < 0.1 * seen["compared"], seen
@@ -86,7 +86,7 @@ def test_random_chains_whose_joints_move_at_once(tilted):
         free = [name for i, name in enumerate(case.hand.joint_names) if i not in followers]
         speeds = {name: 0.5 + k for k, name in enumerate(free)}
         command = clench.GraspCommand(
-            hand_pose=Pose.identity(), object_pose=case.place, planes=1, order=order, speeds=speeds
+            hand_pose=Pose.identity(), object_pose=case.place, planes=1, order=order, speeds=speeds, preshape="open"
         )
         seen += judge(case.hand, case.obj, command)
     assert seen["compared"] > 150, seen
@@ -98,7 +98,7 @@ def test_built_in_hands(name):
     hand, mug = clench.Hand.load(name), GraspObject.load("mug")
     seen = Counter()
     for pose in clench.approach_poses(hand, mug, 3, seed=5):
-        seen += judge(hand, mug, clench.GraspCommand(hand_pose=pose, planes=1))
+        seen += judge(hand, mug, clench.GraspCommand(hand_pose=pose, planes=1, preshape="open"))
     assert seen["compared"] > 60, seen
     assert seen["unknown"] + seen["rough"] < 0.3 * seen["compared"], seen
 
@@ -106,14 +106,18 @@ def test_built_in_hands(name):
 @pytest.mark.parametrize("shape", ["box:x=0.05,y=0.07,z=0.02", "sphere:r=0.02", "capsule:r=0.015,h=0.06"])
 def test_fingers_one_after_another_with_a_coupled_one(shape):
     pose = Pose([0.02, 0.003, 0.033], wxyz=np.array([0.9, 0.1, 0.4, 0.13]) / np.linalg.norm([0.9, 0.1, 0.4, 0.13]))
-    seen = judge(two_fingers(), GraspObject.load(shape, pose=pose), clench.GraspCommand(hand_pose=Pose.identity()))
+    seen = judge(
+        two_fingers(),
+        GraspObject.load(shape, pose=pose),
+        clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"),
+    )
     assert seen["compared"] > 10, seen
 
 
 @pytest.mark.parametrize("shape", ["ellipsoid:a=0.02,b=0.03,c=0.015", "cylinder:r=0.02,h=0.09"])
 def test_shapes_that_are_swept_as_polyhedra(shape):
     """Their facets are a hundredth of a radian off: so are the normals, and so may be the changes."""
-    hand, command = two_fingers(), clench.GraspCommand(hand_pose=Pose.identity())
+    hand, command = two_fingers(), clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
     obj = GraspObject.load(shape, pose=Pose([0.02, 0.003, 0.031], wxyz=[0.6, 0.64, 0.48, 0.0]))
     solution = clench.solve(hand, obj, command)
     found = clench.sensitivity(solution, hand, obj)
@@ -133,7 +137,7 @@ def test_one_link_on_a_ball_in_closed_form():
     radius, w = 0.02, 0.008
     x, z = 0.05, 0.05
     hand, ball = one_link(w), GraspObject.load(f"sphere:r={radius}", pose=Pose([x, 0.0, z]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity()))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
     found = clench.sensitivity(solution, hand, ball)
     D = np.hypot(x, z)
     along = (radius + w) / (D * np.sqrt(D**2 - (radius + w) ** 2))
@@ -148,9 +152,13 @@ def test_one_link_on_a_ball_in_closed_form():
 def test_a_moved_world_changes_only_the_axes():
     hand, motion = one_link(), Pose([0.3, -0.2, 0.5], wxyz=[0.5, -0.1, 0.7, 0.5])
     box = GraspObject.load("box:x=0.03,y=0.04,z=0.02", pose=Pose([0.06, 0.004, 0.04], wxyz=[0.96, 0.0, 0.28, 0.0]))
-    here = clench.sensitivity(clench.solve(hand, box, clench.GraspCommand(hand_pose=Pose.identity())), hand, box)
+    here = clench.sensitivity(
+        clench.solve(hand, box, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")), hand, box
+    )
     moved = box.posed(motion @ box.pose)
-    there = clench.sensitivity(clench.solve(hand, moved, clench.GraspCommand(hand_pose=motion)), hand, moved)
+    there = clench.sensitivity(
+        clench.solve(hand, moved, clench.GraspCommand(hand_pose=motion, preshape="open")), hand, moved
+    )
     known = np.isfinite(here.translation).all() and np.isfinite(there.translation).all()
     assert known
     np.testing.assert_allclose(here.translation @ motion.rotation.T, there.translation, atol=1e-6)
@@ -158,7 +166,7 @@ def test_a_moved_world_changes_only_the_axes():
 
 def test_limits_do_not_change():
     hand, ball = three_links(upper=0.3), GraspObject.load("sphere:r=0.02", pose=Pose([0.03, 0.3, 0.0]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity()))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
     found = clench.sensitivity(solution, hand, ball)
     assert set(found.stopped_by.values()) == {"limit"}
     assert not found.matrix.any()
@@ -170,7 +178,7 @@ def test_a_grazing_touch_is_said_to_be_one():
     w, length, radius = 0.008, 0.1, 0.02
     hand, far = one_link(w, length), length + w + radius - 2e-9
     ball = GraspObject.load(f"sphere:r={radius}", pose=Pose([far * np.cos(1.0), 0.0, far * np.sin(1.0)]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity()))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
     assert solution.joint_angles["index_0"] == pytest.approx(1.0, abs=1e-3)
     found = clench.sensitivity(solution, hand, ball)
     assert found.reasons == {"index_0": "index_0: it grazes what stops it."}
@@ -183,7 +191,7 @@ def test_a_grazing_touch_is_said_to_be_one():
 def test_a_joint_that_is_stopped_before_it_moves():
     """The ball lies against the open finger: pushed towards it, it would overlap; drawn back, the finger follows."""
     hand, ball = one_link(0.008), GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.0, 0.028 + 1e-12]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity()))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
     assert solution.joint_angles["index_0"] == pytest.approx(0.0, abs=1e-9)
     found = clench.sensitivity(solution, hand, ball)
     assert np.isinf(found.translation[0]).tolist() == [False, False, True]
@@ -194,7 +202,7 @@ def test_a_joint_that_the_touch_of_an_earlier_one_holds_stays():
     """The distal link touched while the proximal joint moved: whatever the ball does, the distal joint stays open."""
     hand = three_links(lengths=(0.03, 0.03, 0.03))
     ball = GraspObject.load("sphere:r=0.01", pose=Pose([0.05, 0.0, 0.06]))
-    command = clench.GraspCommand(hand_pose=Pose.identity())
+    command = clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
     found = clench.sensitivity(clench.solve(hand, ball, command), hand, ball)
     assert found.stopped_by["index_2"] == ball.name
     assert not found.reasons
@@ -206,7 +214,7 @@ def test_parallel_features_give_what_is_the_same_at_both_ends():
     link = Shape(ShapeKind.BOX, (0.05, 0.01, 0.005), Pose([0.05, 0.0, 0.0]))
     hand = HandBuilder().finger("index", [link], [0.1]).hand()
     box = GraspObject.load("box:x=0.02,y=0.06,z=0.02", pose=Pose([0.06, 0.003, 0.05]))
-    command = clench.GraspCommand(hand_pose=Pose.identity())
+    command = clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
     solution = clench.solve(hand, box, command)
     found = clench.sensitivity(solution, hand, box)
     measured, smooth = differences(hand, box, command, solution)
@@ -221,7 +229,7 @@ def test_a_joint_that_is_stopped_by_the_hand_itself():
     builder = HandBuilder().finger("index", [along_x(0.006, 0.08)], [0.08])
     builder.finger("thumb", [along_x(0.006, 0.07)], [0.07], base=mount_below(), thumb=True)
     hand, ball = builder.hand(), GraspObject.load("sphere:r=0.015", pose=Pose([0.06, 0.002, 0.05]))
-    command = clench.GraspCommand(hand_pose=Pose.identity())
+    command = clench.GraspCommand(hand_pose=Pose.identity(), preshape="open")
     solution = clench.solve(hand, ball, command)
     found = clench.sensitivity(solution, hand, ball)
     assert found.stopped_by == {"index_0": ball.name, "thumb_0": "index_link_0"}
@@ -239,7 +247,7 @@ def mount_below():
 
 def test_another_hand_or_object_is_refused():
     hand, ball = three_links(), GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.0, 0.05]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity()))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"))
     with pytest.raises(clench.ClenchError, match=r"hand 'chain' is not the one that the solution"):
         clench.sensitivity(solution, three_links(0.005), ball)
     with pytest.raises(clench.ClenchError, match=r"the object is not the 'sphere.*' that the solution"):
@@ -248,7 +256,9 @@ def test_another_hand_or_object_is_refused():
 
 def test_a_set_of_one_plane_says_so():
     case = make_case(3)
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, planes=2, full_width=False)
+    command = clench.GraspCommand(
+        hand_pose=Pose.identity(), object_pose=case.place, planes=2, full_width=False, preshape="open"
+    )
     solution = clench.solve(case.hand, case.obj, command)
     found = clench.sensitivity(solution, case.hand, case.obj)
     unknown = [name for name, row in zip(found.joints, found.matrix, strict=True) if not np.isfinite(row).all()]
@@ -257,7 +267,7 @@ def test_a_set_of_one_plane_says_so():
 
 def test_a_small_error_does_what_was_predicted():
     case = make_case(12)
-    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place)
+    command = clench.GraspCommand(hand_pose=Pose.identity(), object_pose=case.place, preshape="open")
     error = clench.pose_error(case.hand, case.obj, command, 1e-5, 1e-5)
     assert len(error.corners) == 64
     assert error.predicted.max() > 1e-5
@@ -268,7 +278,7 @@ def test_a_small_error_does_what_was_predicted():
 
 def test_a_large_error_loses_touches():
     hand, ball = three_links(), GraspObject.load("sphere:r=0.02", pose=Pose([0.06, 0.0, 0.05]))
-    error = clench.pose_error(hand, ball, clench.GraspCommand(hand_pose=Pose.identity()), 0.01, 0.0)
+    error = clench.pose_error(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), preshape="open"), 0.01, 0.0)
     assert sum(error.statuses.values()) == 64
     assert min(error.kept.values()) < 1.0
     for corner in error.corners:
@@ -284,12 +294,14 @@ def test_a_large_error_loses_touches():
 def test_an_error_that_is_none_is_refused(translation, rotation, what):
     case = make_case(12)
     with pytest.raises(clench.CommandError, match=f"pose error: expected a {what} of 0 or more"):
-        clench.pose_error(case.hand, case.obj, clench.GraspCommand(Pose.identity()), translation, rotation)
+        clench.pose_error(
+            case.hand, case.obj, clench.GraspCommand(Pose.identity(), preshape="open"), translation, rotation
+        )
 
 
 def test_a_solution_that_was_tampered_with_is_refused_in_a_sentence():
     hand, ball = three_links(), GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.0, 0.05]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open"))
     with pytest.raises(clench.ClenchError, match="Collision source 'x' is not in clench"):
         clench.sensitivity(replace(solution, collision_source="x"), hand, ball)
     with pytest.raises(clench.ClenchError, match="joint_angles: the solution has no angle of joint 'index_0'"):
@@ -298,7 +310,7 @@ def test_a_solution_that_was_tampered_with_is_refused_in_a_sentence():
 
 def test_a_finger_without_sets_has_changes_that_are_not_known():
     hand, ball = three_links(), GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.0, 0.05]))
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), planes=1))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open"))
     bare = replace(solution, fingers={n: replace(f, candidates=()) for n, f in solution.fingers.items()})
     found = clench.sensitivity(bare, hand, ball)
     assert np.isinf(found.translation).all()

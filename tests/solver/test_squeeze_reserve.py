@@ -25,7 +25,7 @@ Grip = tuple[Hand, GraspObject, GraspSolution]
 def grip() -> Grip:
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
     for pose in clench.approach_poses(hand, ball, 20, 1):
-        solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+        solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
         if solution.is_valid() and plan_squeeze(solution, hand, ball, gravity=None).feasible:
             return hand, ball, solution
     raise AssertionError("no grip found")

@@ -14,7 +14,7 @@ HALF = np.sqrt(0.5)
 
 
 def command(**changes):
-    return clench.GraspCommand(**{"hand_pose": Pose.identity(), "planes": 5, **changes})
+    return clench.GraspCommand(**{"hand_pose": Pose.identity(), "planes": 5, "preshape": "open", **changes})
 
 
 def palm_and_finger():

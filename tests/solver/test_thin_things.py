@@ -33,7 +33,9 @@ def needle(apex, away, thick=1e-4):
 
 
 def closed(obj, order):
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, order=clench.ClosingOrder(order))
+    command = clench.GraspCommand(
+        hand_pose=Pose.identity(), planes=3, order=clench.ClosingOrder(order), preshape="open"
+    )
     solution = clench.solve(box_finger(), obj, command)
     assert solution.certified
     return solution
@@ -95,7 +97,7 @@ def test_a_link_that_touches_something_else_by_now_does_not_say_that_it_holds_wh
     tips = [(first, [-1.0, 0.0, 0.0]), (second, [-1.0, 0.0, -0.2])]
     shapes = [needle(apex, away).bodies[0].shapes[0] for apex, away in tips]
     needles = GraspObject("needles", (Body("needles", tuple(shapes), closed=True),))
-    solution = clench.solve(hand, needles, clench.GraspCommand(hand_pose=Pose.identity(), planes=3))
+    solution = clench.solve(hand, needles, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, preshape="open"))
 
     def seen(point, turn, pivot):
         c, s = np.cos(turn), np.sin(turn)

@@ -22,7 +22,7 @@ def moved(k: int) -> Pose:
 
 
 def test_the_bits_of_fresh_solves() -> None:
-    command = clench.GraspCommand(hand_pose=START, planes=3)
+    command = clench.GraspCommand(hand_pose=START, planes=3, preshape="open")
     tracker = clench.Tracker(HAND, BALL, command)
     for k in range(5):
         answer = tracker.update(object_pose=moved(k))
@@ -40,7 +40,7 @@ def test_the_bits_of_fresh_solves() -> None:
 
 @pytest.mark.parametrize("full_width", [True, False])
 def test_contacts_are_those_of_a_batch_whenever_they_are_read(full_width: bool) -> None:
-    command = clench.GraspCommand(hand_pose=START, planes=3, full_width=full_width)
+    command = clench.GraspCommand(hand_pose=START, planes=3, full_width=full_width, preshape="open")
     tracker = clench.Tracker(HAND, BALL, command, margin=0.0)
     answers = [tracker.update(object_pose=moved(k)) for k in range(3)]
     copied = pickle.loads(pickle.dumps(answers[0]))
@@ -63,7 +63,7 @@ def trembling(k: int) -> Pose:
 
 
 def test_a_finger_stays_on_its_plane_unless_another_is_clearly_better() -> None:
-    command = clench.GraspCommand(hand_pose=START, planes=5, full_width=False)
+    command = clench.GraspCommand(hand_pose=START, planes=5, full_width=False, preshape="open")
     changes = {}
     for margin in (0.0, 0.02, 1e9):
         tracker = clench.Tracker(HAND, BALL, command, margin=margin)
@@ -103,11 +103,11 @@ def worth(candidate: clench.Candidate) -> float:
 )
 def test_what_is_not_tracked_is_said(asked: dict[str, object], sentence: str) -> None:
     with pytest.raises(CommandError, match=sentence):
-        clench.Tracker(HAND, BALL, clench.GraspCommand(hand_pose=START, planes=1, **asked))  # type: ignore[arg-type]
+        clench.Tracker(HAND, BALL, clench.GraspCommand(hand_pose=START, planes=1, **{"preshape": "open", **asked}))  # type: ignore[arg-type]
 
 
 def test_bad_numbers() -> None:
-    command = clench.GraspCommand(hand_pose=START, planes=1)
+    command = clench.GraspCommand(hand_pose=START, planes=1, preshape="open")
     with pytest.raises(CommandError, match="margin: expected a finite number of at least 0, got -1"):
         clench.Tracker(HAND, BALL, command, margin=-1)
     with pytest.raises(CommandError, match=r"object_pose: expected a clench\.Pose, got list"):

@@ -81,6 +81,12 @@ class LateFields:
         instance.__dict__.update(known, _make_field=make)
         return instance
 
+    def with_known(self, **known: Any) -> Self:
+        """Return the same instance with other values of some fields; what is not made yet is not made for it."""
+        instance = object.__new__(type(self))
+        instance.__dict__.update(self.__dict__, **known)
+        return instance
+
     def __getattr__(self, name: str) -> Any:
         make: Callable[[str], Any] | None = self.__dict__.get("_make_field")
         if make is None or name not in self.__dataclass_fields__:

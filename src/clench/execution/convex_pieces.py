@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
-import sys
 import zipfile
 import zlib
 from dataclasses import replace
@@ -13,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from clench.base.cache_folder import cache_folder
 from clench.base.errors import ObjectError
 from clench.base.json_files import write_atomically
 from clench.base.pose import FloatArray
@@ -98,20 +97,6 @@ def hull_of(vertices: FloatArray, name: str) -> tuple[FloatArray, float]:
     except QhullError:
         raise ObjectError(f"Body '{name}' is flat: simulation needs a solid shape.") from None
     return np.asarray(vertices[hull.vertices]), float(hull.volume)
-
-
-def cache_folder() -> Path:
-    """Return the user's cache folder for this program: `CLENCH_CACHE_DIR`, else the platform's."""
-    named = os.environ.get("CLENCH_CACHE_DIR")
-    if named:
-        return Path(named)
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "clench"
 
 
 def _volume(mesh: TriangleMesh) -> float:

@@ -13,9 +13,13 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 
 
 def open_posture(hand: Hand, command: GraspCommand) -> FloatArray:
-    """Return the posture before closing, shape (J,) [rad]: open values, with the preshape's in their place."""
+    """Return the posture before closing, shape (J,) [rad]: open values, with the preshape's in their place.
+
+    Args:
+        hand: the hand. command: its preshape is given by angles.
+    """
     q = np.array([j.open_value for j in hand.joints])
-    for name, angle in command.preshape.items():
+    for name, angle in command.angles.items():
         joint = hand.joint_index(name)
         q[joint] = min(max(angle, hand.joints[joint].lower), hand.joints[joint].upper)
     return hand.coupled(q)

@@ -36,7 +36,9 @@ class GraspCommand:
         hand_pose: `T_world_palm`, or the pose of `root_link` when that is named.
         root_link: the link that `hand_pose` places; None is the palm.
         object_pose: `T_world_object`; None keeps the object's own.
-        preshape: angles [rad] by joint name: posture joints, and open values of closing joints.
+        preshape: angles [rad] by joint name: posture joints, and open values of closing joints. Or a name: "open", or
+            that of a preshape of the hand (`clench hand` lists them). If no posture joint and no name is given, clench
+            compares the preshapes of the hand and chooses one (docs/preshapes.md).
         fingers: names of the fingers that close, in order; None is all.
         order, rounds: closing order, and how often it is gone through; 0 rounds: until nothing moves any more.
         orders: alternatives, used instead of `order`: each is solved by itself, and the best solution is kept.
@@ -64,7 +66,7 @@ class GraspCommand:
     hand_pose: Pose
     root_link: str | None = None
     object_pose: Pose | None = None
-    preshape: Mapping[str, float] = field(default_factory=dict)
+    preshape: Mapping[str, float] | str = field(default_factory=dict)
     fingers: tuple[str, ...] | None = None
     order: ClosingOrder = ClosingOrder.PROXIMAL_FIRST
     orders: tuple[ClosingOrder, ...] = ()
@@ -89,6 +91,11 @@ class GraspCommand:
         check_type(self.hand_pose, Pose, "hand_pose")
         if self.object_pose is not None:
             check_type(self.object_pose, Pose, "object_pose")
+
+    @property
+    def angles(self) -> Mapping[str, float]:
+        """The angles that the preshape gives by joint name [rad]; none where it is a name."""
+        return {} if isinstance(self.preshape, str) else self.preshape
 
     def unshared(self) -> GraspCommand:
         """Return the same command, which no later change of a list or mapping that was given reaches."""

@@ -103,7 +103,8 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     """
     if command.root_link is not None:
         _check_root_link(hand, command.root_link)
-    for name, angle in _weights(command.preshape, "preshape", "a number in rad").items():
+    preshape = _preshape(command.preshape, "preshape")
+    for name, angle in preshape.items() if isinstance(preshape, Mapping) else ():
         check_angle(hand, hand.joint_index(name), angle, f"preshape.{name}")
     for finger in _names(command.fingers, "fingers") or ():
         hand.finger(finger)
@@ -193,7 +194,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "hand_pose": _pose,
         "root_link": _text,
         "object_pose": _pose,
-        "preshape": lambda v, key: _weights(v, key, "a number in rad"),
+        "preshape": _preshape,
         "fingers": _names,
         "order": lambda v, key: _choice(v, ClosingOrder, key),
         "orders": _orders,
@@ -249,6 +250,17 @@ def _weights(value: Any, key: str, what: str) -> dict[str, float]:
     if not isinstance(value, Mapping):
         raise CommandError(f"{key}: expected an object of names with {what} each, got {_shown(value)}.")
     return {str(name): _number(number, f"{key}.{name}", what) for name, number in value.items()}
+
+
+def _preshape(value: Any, key: str) -> dict[str, float] | str:
+    if isinstance(value, str):
+        return _text(value, key)
+    if not isinstance(value, Mapping):
+        raise CommandError(
+            f"{key}: expected an object of names with a number in rad each, 'open', or the name of a preshape, "
+            f"got {_shown(value)}."
+        )
+    return _weights(value, key, "a number in rad")
 
 
 def _numbers(value: Any, key: str, what: str) -> tuple[float, ...]:

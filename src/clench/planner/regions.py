@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, checked_vector
+from clench.base.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,7 @@ class Region:
     radius: float | None = None
     points: FloatArray | None = None
     marked: NDArray[np.bool_] | None = None
+    __repr__ = short_repr
 
     @classmethod
     def box(cls, low: ArrayLike, high: ArrayLike) -> Region:

@@ -13,6 +13,7 @@ import numpy as np
 
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray
+from clench.base.short_repr import described
 from clench.grasp.closing import core_count
 from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
@@ -35,7 +36,7 @@ LARGEST_ROUND = 256
 LEFT = 0.2
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class GraspSearch:
     """A search for grasps: iterate over it to get them as they are found, or ask for its `plan`.
 
@@ -86,6 +87,10 @@ class GraspSearch:
             due = -(-self.proposed // self.asked.effort) if self.proposed < self.asked.proposals else self.asked.count
             yield from self._finish(min(due, self.asked.count))
         yield from self._finish(self.asked.count)
+
+    def __repr__(self) -> str:
+        progress = f"{len(self.found)} of {self.asked.count} grasps, {self.proposed} proposals"
+        return described(self, hand=self.hand.name, object=self.obj.name, progress=progress)
 
     def plan(self) -> GraspPlan:
         """Return what was found so far, the best grasps first."""

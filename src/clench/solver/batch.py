@@ -25,9 +25,10 @@ from clench.models.objects.grasp_object import GraspObject
 
 from .batch_parts import BatchParts
 from .batch_progress import shown
-from .batch_solver import BatchSolver
 from .devices import CPU, why_not
 from .grasp_batch import GraspBatch, Question
+from .posture_choice import posture_solver
+from .postures import preshape_angles
 
 #: Poses that are solved at a time: a few ten megabytes.
 CHUNK: Final = 1024
@@ -77,6 +78,8 @@ def solve_batch(
         raise CommandError(f"object_poses: expected {len(rows)} poses, one per hand pose, got {len(there)}.")
     count, size, device = _threads(threads), _whole(chunk, "chunk"), _usable(device)
     columns = _preshapes(preshapes, len(rows))
+    if columns and isinstance(asked.preshape, str):
+        asked = replace(asked, preshape=preshape_angles(hand, asked.preshape))
     question = Question(hand, obj, asked, columns)
     parts = None if out is None else BatchParts(out, question, size, len(rows), (rows, there, device))
     size = size if parts is None else parts.chunk
@@ -85,7 +88,7 @@ def solve_batch(
     with shown(len(rows), progress) as advance:
         for where in groups:
             shape = {name: float(values[where[0]]) for name, values in columns.items()} if len(where) else {}
-            solver = BatchSolver(hand, obj, replace(asked, preshape={**asked.preshape, **shape}))
+            solver = posture_solver(hand, obj, replace(asked, preshape={**asked.angles, **shape}) if shape else asked)
             for begin in range(0, max(len(where), 1), size):
                 some = where[begin : begin + size]
                 solve = partial(solver.solve, rows[some], None if there is None else there[some], count, device)
@@ -94,7 +97,7 @@ def solve_batch(
     batch = GraspBatch.joined(solved)
     if len(groups) > 1:
         batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
-    batch = replace(batch, question=question)
+    batch = replace(batch, question=replace(question, options=batch.question.options))
     if parts is not None:
         parts.finish(batch)
     return batch
@@ -121,7 +124,7 @@ def solve_stream(
     """
     asked = _asked(hand, obj, command)
     count, size, device = _threads(threads), _whole(chunk, "chunk"), _usable(device)
-    solver = BatchSolver(hand, obj, asked)
+    solver = posture_solver(hand, obj, asked)
     solve = partial(solver.solve, threads=count, device=device)
     return _stream(solve, iter(hand_poses), None if object_poses is None else iter(object_poses), size)
 

@@ -164,6 +164,7 @@ def _is_whole(found: Mapping[str, NDArray[Any]], names: Mapping[str, Any], rows:
     counts = {
         "status_codes": len(STATUSES),
         "finger_codes": len(FINGER_STATUSES),
+        "preshape_codes": max(len(names["question"].options), 1),
         "contact_finger": fingers,
         "contact_link": len(names["link_names"]),
         "contact_joint": joints,
@@ -171,7 +172,7 @@ def _is_whole(found: Mapping[str, NDArray[Any]], names: Mapping[str, Any], rows:
     }
     first = found["contact_first"]
     return (
-        all(found[key].max(initial=0) < count for key, count in counts.items())
+        all(0 <= found[key].min(initial=0) <= found[key].max(initial=0) < count for key, count in counts.items())
         and (first[0], first[-1]) == (0, contacts)
         and bool((np.diff(first) >= 0).all())
     )

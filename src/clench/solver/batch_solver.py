@@ -18,12 +18,12 @@ from clench.grasp.motion import asked_fingers, palm_pose
 from clench.grasp.plan import closing_joints
 from clench.models.command import GraspCommand
 
-from .controller import solve
 from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
 from .packing import packed_problem
 from .planning import planned
 from .problem import check_calibration, make_problem
+from .single import solve_posture
 from .solution import FingerStatus, GraspSolution
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 class BatchSolver:
     """A solver for one command at many poses. It checks and packs the command once.
+
+    The posture is that of the command. If a command names none, the hand is open: `PostureSolver` chooses.
 
     Args:
         hand, obj, command: as for `clench.solve`; the command's `hand_pose` plays no part.
@@ -49,14 +51,14 @@ class BatchSolver:
         self._question = Question(hand, obj, command, {})
         self._start = make_problem(hand, obj, command)
         asked = asked_fingers(hand, command)
-        self._moving = [finger for finger in asked if closing_joints(hand, finger)]
-        self._idle = [finger for finger in asked if finger not in self._moving]
+        self.moving = [finger for finger in asked if closing_joints(hand, finger)]
+        self._idle = [finger for finger in asked if finger not in self.moving]
         self.packed = self._pack()
 
     @property
     def fingers(self) -> list[Finger]:
         """The fingers asked for: first those that close, in the command's order."""
-        return [*self._moving, *self._idle]
+        return [*self.moving, *self._idle]
 
     def _pack(self) -> PackedProblem | None:
         problem, command = self._start, self._question.command
@@ -119,6 +121,7 @@ class BatchSolver:
             "finger_codes": np.concatenate([solved.fingers, idle], axis=1).astype(np.int8),
             "planes": np.concatenate([chosen, np.full_like(idle, -1)], axis=1).astype(np.int16),
             "one_by_one": np.zeros(len(hand_rows), dtype=np.bool_),
+            "preshape_codes": np.zeros(len(hand_rows), dtype=np.int16),
         }
 
     @cached_property
@@ -139,7 +142,9 @@ class BatchSolver:
 
         def run(rows: tuple[FloatArray, FloatArray]) -> GraspSolution:
             hand_pose, object_pose = (Pose(row[4:], row[:4]) for row in rows)
-            return solve(asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose))
+            return solve_posture(
+                asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose)
+            )
 
         with ThreadPoolExecutor(threads, thread_name_prefix="clench-batch") as pool:
             solutions = list(pool.map(run, zip(hand_rows, object_rows, strict=True)))
@@ -160,6 +165,7 @@ class BatchSolver:
             planes=np.array(planes, dtype=np.int16).reshape(shape),
             contacts=self._contacts(solutions),
             one_by_one=np.ones(len(solutions), dtype=np.bool_),
+            preshape_codes=np.zeros(len(solutions), dtype=np.int16),
         )
 
     def _contacts(self, solutions: list[GraspSolution]) -> BatchContacts:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,7 +31,7 @@ class CheckedCommand:
 
     Args:
         command: a copy, which later changes of the caller's lists and mappings do not reach. Its poses are those of
-            the first command that was checked with these values.
+            the first command that was checked with these values. Its preshape is given by angles.
         start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
     """
 
@@ -70,6 +70,10 @@ def checked(hand: Hand, command: GraspCommand) -> CheckedCommand:
 def _check(hand: Hand, command: GraspCommand) -> CheckedCommand:
     check_command(hand, command)
     own = command.unshared()
+    if isinstance(own.preshape, str):
+        from .postures import preshape_angles
+
+        own = replace(own, preshape=preshape_angles(hand, own.preshape))
     source = CollisionSource(own.collision_source or hand.default_source)
     return CheckedCommand(hand, own, open_posture(hand, own), source)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
+    from .postures import PostureOption
+
 Whole = NDArray[np.int64]
 
 #: What the codes of a batch mean, in order.
@@ -34,7 +36,7 @@ SCHEMA: Final = "clench.batch/1"
 #: Columns with one row per pose.
 PER_POSE: Final = (
     *("hand_poses", "object_poses", "status_codes", "certified", "joint_angles", "finger_codes", "planes"),
-    "one_by_one",
+    *("one_by_one", "preshape_codes"),
 )
 
 
@@ -90,12 +92,17 @@ class BatchContacts:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The inputs of a batch, so that one of its poses can be solved by itself."""
+    """The inputs of a batch, so that one of its poses can be solved by itself.
+
+    Args:
+        preshapes: angles by joint name [rad], shape (N,) each. options: postures that were compared at every pose.
+    """
 
     hand: Hand
     obj: GraspObject
     command: GraspCommand
     preshapes: dict[str, FloatArray]
+    options: tuple[PostureOption, ...] = ()
 
     __repr__ = short_repr
 
@@ -113,6 +120,7 @@ class GraspBatch(LateFields):
         finger_codes: indices into `FINGER_STATUSES`, shape (N, F); `finger_status` has their names.
         planes: index of the chosen plane of each finger, -1 for the full width, shape (N, F).
         contacts: see `BatchContacts`. one_by_one: solved by `clench.solve`, as no kernel of a batch covers it, (N,).
+        preshape_codes: index of the preshape that clench chose, shape (N,); `preshape` has their names.
     """
 
     question: Question
@@ -129,6 +137,7 @@ class GraspBatch(LateFields):
     planes: NDArray[np.int16]
     contacts: BatchContacts
     one_by_one: NDArray[np.bool_]
+    preshape_codes: NDArray[np.int16]
 
     def __repr__(self) -> str:
         asked = self.question
@@ -147,6 +156,12 @@ class GraspBatch(LateFields):
         """Status of every finger by name, shape (N, F)."""
         return np.array([s.value for s in FINGER_STATUSES])[self.finger_codes]
 
+    @property
+    def preshape(self) -> NDArray[np.str_]:
+        """Name of the preshape that clench chose at every pose, shape (N,); empty where the command left no choice."""
+        names = [option.name for option in self.question.options]
+        return np.array(names or [""])[self.preshape_codes]
+
     def counts(self) -> dict[str, int]:
         """Return how many poses have each status, by name."""
         return {s.value: int((self.status_codes == k).sum()) for k, s in enumerate(STATUSES)}
@@ -164,8 +179,16 @@ class GraspBatch(LateFields):
             asked.command,
             hand_pose=_pose(self.hand_poses[i]),
             object_pose=_pose(self.object_poses[i]),
-            preshape={**asked.command.preshape, **{name: float(a[i]) for name, a in asked.preshapes.items()}},
+            preshape=self._preshape(i),
         )
+
+    def _preshape(self, i: int) -> Mapping[str, float] | str:
+        """Return the preshape of one pose, as a command says it."""
+        asked = self.question
+        given = {name: float(angles[i]) for name, angles in asked.preshapes.items()}
+        if asked.options:
+            return {**asked.options[int(self.preshape_codes[i])].angles, **given}
+        return {**asked.command.angles, **given} if given else asked.command.preshape
 
     def solution(self, i: int) -> GraspSolution:
         """Return the whole answer for one pose, by one ordinary solve; see `command`."""
@@ -182,8 +205,9 @@ class GraspBatch(LateFields):
         skipped = {"question", "contacts"}
         arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in skipped}
         arrays |= {f"contact_{f.name}": getattr(self.contacts, f.name) for f in fields(self.contacts)}
-        arrays |= question_arrays(self.question)
-        arrays |= {"schema": np.array(SCHEMA), "status": self.status, "finger_status": self.finger_status}
+        arrays |= question_arrays(self.question, self.preshape_codes)
+        arrays |= {"schema": np.array(SCHEMA), "status": self.status}
+        arrays |= {"finger_status": self.finger_status, "preshape": self.preshape}
         content = io.BytesIO()
         np.savez(content, **arrays)  # type: ignore[arg-type]
         write_atomically(path, content.getvalue())

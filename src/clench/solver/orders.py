@@ -98,11 +98,13 @@ def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolut
 
 
 def settled(command: GraspCommand, solution: GraspSolution) -> GraspCommand:
-    """Return a command with the order that a solution of it was closed in."""
-    orders = (solution.choice or {}).get("orders") if command.orders else None
-    if orders is None:
-        return command
-    return replace(command, order=ClosingOrder(orders["chosen"]), orders=())
+    """Return a command with the order and the posture that were chosen for a solution of it."""
+    choice = solution.choice or {}
+    if command.orders and "orders" in choice:
+        command = replace(command, order=ClosingOrder(choice["orders"]["chosen"]), orders=())
+    if "preshapes" in choice:
+        command = replace(command, preshape=dict(choice["preshapes"]["angles"]))
+    return command
 
 
 def _judged(order: ClosingOrder, solution: GraspSolution, criteria: Mapping[str, Any]) -> _Solved:

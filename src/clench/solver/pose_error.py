@@ -125,6 +125,7 @@ def pose_error(
             raise CommandError(f"pose error: expected a {key} of 0 or more{_most(most)}, got {value}.")
     command = as_command(command)
     solution = solve(hand, obj, command) if solution is None else solution
+    # The order and the posture that were chosen are kept: the hand does not jump at a corner.
     command = settled(command, solution)
     at = np.array([solution.joint_angles[name] for name in hand.joint_names])
     touching = _touching(solution)

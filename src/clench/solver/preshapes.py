@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,13 @@ from clench.base.keeping import kept_while_alive
 from clench.base.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
-from clench.models.hand.hand import Hand, JointRole
+from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.hand.pads import Pad, closing_joints_of, closing_limit, finger_pads
 from clench.models.objects.grasp_object import GraspObject
 
 from .batch_solver import BatchSolver
+from .preshape_cache import ZONE, Entry, cache_key, keep_preshapes, read_preshapes
+from .preshape_names import name_preshapes
 
 #: Preshapes of a hand at most; the first one is the open hand.
 PRESHAPES = 24
@@ -49,8 +52,8 @@ class Preshape:
     """A preshape of a hand, and the zones on the way from there.
 
     Args:
-        name: "open", or "preshape-1" and so on.
-        angles: what it sets, by joint name [rad]: posture joints and open values of closing joints.
+        name: "open", or what it looks like, see `name_preshapes`.
+        angles: what it sets, by joint name [rad]: every posture joint, and open values of closing joints.
         center, axis: of its zones in the palm frame, shapes (Z, 3): the middle [m], and the unit vector from the one
             side (thumb) to the other.
         row: from the first to the last pad of the other side, across the axis [m], shape (Z, 3).
@@ -65,6 +68,17 @@ class Preshape:
     aperture: FloatArray
     quality: FloatArray
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values: name, angles, range of the aperture [m], and aperture and quality of the best zone."""
+        best = int(self.quality.argmax()) if len(self.quality) else None
+        return {
+            "name": self.name,
+            "angles": dict(self.angles),
+            "aperture_range": None if best is None else [float(self.aperture.min()), float(self.aperture.max())],
+            "aperture": None if best is None else float(self.aperture[best]),
+            "quality": None if best is None else float(self.quality[best]),
+        }
+
 
 @dataclass(frozen=True, eq=False)
 class _Pads:
@@ -78,7 +92,8 @@ class _Pads:
 def opposition_zones(hand: Hand, fingers: tuple[str, ...] | None = None) -> tuple[Preshape, ...]:
     """Return the preshapes of a hand whose pads come to face each other, with their zones; the open hand first.
 
-    They are the same for every call, and found once per hand: nothing random depends on a seed of the caller.
+    They are the same for every call, and found once per hand: nothing random depends on a seed of the caller. Later
+    processes read them from the cache folder (see `clench.solver.preshape_cache`).
 
     Args:
         hand: the hand. fingers: names of those that close; None is all of them.
@@ -86,7 +101,12 @@ def opposition_zones(hand: Hand, fingers: tuple[str, ...] | None = None) -> tupl
     names = tuple(finger.name for finger in hand.fingers) if fingers is None else fingers
     kept = _kept(hand)
     if names not in kept:
-        kept[names] = _find_zones(hand, names)
+        key = cache_key(hand, names)
+        entries = read_preshapes(key, hand.joint_names)
+        if entries is None:
+            entries = list(_find_zones(hand, names))
+            keep_preshapes(key, entries)
+        kept[names] = _named(hand, entries)
     return kept[names]
 
 
@@ -95,13 +115,42 @@ def _kept(hand: Hand) -> dict[tuple[str, ...], tuple[Preshape, ...]]:
     return {}
 
 
-def _find_zones(hand: Hand, names: tuple[str, ...]) -> tuple[Preshape, ...]:
-    pads, sides = finger_pads(hand), list(_sides(hand, names))
-    if not sides:
-        return ()
+def _named(hand: Hand, entries: list[Entry]) -> tuple[Preshape, ...]:
+    """Return preshapes with names and arrays."""
+    zones = [np.array(entry.zones, dtype=np.float64).reshape(-1, ZONE) for entry in entries]
+    outer = {hand.joints[j].name for f in hand.fingers if not f.is_thumb for j in closing_joints_of(hand, f)}
+    bent = [not outer.isdisjoint(entry.angles) for entry in entries]
+    names = name_preshapes([(rows[:, 9], rows[:, 10], is_bent) for rows, is_bent in zip(zones, bent, strict=True)])
+    opened = {name: hand.joints[hand.joint_index(name)].open_value for name in posture_joints(hand)}
+    return tuple(
+        Preshape(
+            name,
+            {**opened, **entry.angles},
+            center=rows[:, :3],
+            axis=rows[:, 3:6],
+            row=rows[:, 6:9],
+            aperture=rows[:, 9],
+            quality=rows[:, 10],
+        )
+        for name, entry, rows in zip(names, entries, zones, strict=True)
+    )
+
+
+def posture_joints(hand: Hand, fingers: tuple[Finger, ...] | None = None) -> list[str]:
+    """Return the posture joints of some fingers that follow no other joint; of all fingers by default."""
+    followers = {c.follower for c in hand.couplings}
+    own = [j for finger in (hand.fingers if fingers is None else fingers) for j in finger.joints if j not in followers]
+    return [hand.joints[j].name for j in own if hand.joints[j].role is JointRole.POSTURE]
+
+
+def _find_zones(hand: Hand, names: tuple[str, ...]) -> Iterator[Entry]:
+    """Yield the open hand and the best preshapes of every aperture; nothing where no two sides face each other."""
+    pads, sides = finger_pads(hand), list(opposing_sides(hand, names))
     places = {pad.finger: k for k, pad in enumerate(pads)}
     sides = [(one, [f for f in other if f in places]) for one, other in sides if one in places]
     sides = [(one, other) for one, other in sides if other]
+    if not sides:
+        return
     postures, shapes = _draw(hand)
     found = _move(hand, pads, postures)
     candidates = []
@@ -109,10 +158,12 @@ def _find_zones(hand: Hand, names: tuple[str, ...]) -> tuple[Preshape, ...]:
         here = _Pads(*(column[number] for column in (found.point, found.normal, found.moving)))
         zones = [_zones(here, places[one], [places[f] for f in other]) for one, other in sides]
         candidates.append((shape, *(np.concatenate(columns) for columns in zip(*zones, strict=True))))
-    return tuple(_named(hand, names, candidates))
+    for number in _chosen(hand, names, candidates):
+        start, *columns = candidates[number]
+        yield Entry(_angles(hand, start) if number else {}, np.column_stack(columns).tolist())
 
 
-def _sides(hand: Hand, names: tuple[str, ...]) -> Iterator[tuple[int, list[int]]]:
+def opposing_sides(hand: Hand, names: tuple[str, ...]) -> Iterator[tuple[int, list[int]]]:
     """Yield one finger and the fingers that it may oppose: a thumb and some others; without a thumb, any two sides."""
     closing = [k for k, finger in enumerate(hand.fingers) if finger.name in names]
     thumbs = [k for k in closing if hand.fingers[k].is_thumb]
@@ -201,8 +252,11 @@ def _zones(pads: _Pads, one: int, others: list[int]) -> tuple[FloatArray, ...]:
     return tuple(column[well] for column in columns)
 
 
-def _named(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray, ...]]) -> Iterator[Preshape]:
-    """Yield the open hand and the best candidates of every aperture, without those that close without a certificate."""
+def _chosen(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray, ...]]) -> list[int]:
+    """Return the open hand and the best candidates of every aperture, without those that close without a certificate.
+
+    The best of every aperture come first, then the second best, and so on.
+    """
     best = np.full((len(candidates), len(APERTURES) - 1), -np.inf)
     for number, (*_, aperture, quality) in enumerate(candidates):
         if len(aperture):
@@ -224,9 +278,7 @@ def _named(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray
                     kept += 1
                 else:
                     refused.add(number)
-    for name, number in enumerate(chosen):
-        start, *zones = candidates[number]
-        yield Preshape(f"preshape-{name}" if name else "open", _angles(hand, start) if name else {}, *zones)
+    return chosen
 
 
 def _apart(candidates: list[tuple[FloatArray, ...]], chosen: list[int], number: int) -> bool:

@@ -32,19 +32,28 @@ _NUMBERS: Final = ("object_scale", "preshape_angles", "hand_poses", "object_pose
 _TEXTS: Final = frozenset(_KEYS) - frozenset(_NUMBERS)
 
 
-def question_arrays(question: Question) -> dict[str, np.ndarray[Any, Any]]:
-    """Return what a batch was asked as arrays: the command as JSON, the models' names, the postures by pose."""
+def question_arrays(question: Question, chosen: np.ndarray[Any, Any]) -> dict[str, np.ndarray[Any, Any]]:
+    """Return what a batch was asked as arrays: the command as JSON, the models' names, the postures by pose.
+
+    Args:
+        question: what was asked. chosen: numbers of its postures that clench chose, shape (N,).
+    """
     from clench.models.command_file import command_to_dict
 
-    hand, obj = question.hand, question.obj
+    hand, obj, preshapes = question.hand, question.obj, question.preshapes
+    if question.options:
+        opened = dict(zip(hand.joint_names, hand.open_angles().tolist(), strict=True))
+        named = dict.fromkeys(name for option in question.options for name in option.angles)
+        rows = {name: [option.angles.get(name, opened[name]) for option in question.options] for name in named}
+        preshapes = {name: np.array(angles)[chosen] for name, angles in rows.items()} | preshapes
     return {
         "command": np.array(json.dumps(command_to_dict(question.command))),
         "hand_model": np.array(str(hand.path or hand.name)),
         "object_model": np.array(str(obj.path or obj.name)),
         "object_scale": np.array(obj.scale),
         "object_collision_source": np.array(str(obj.collision_source)),
-        "preshape_joints": np.array(list(question.preshapes), dtype=np.str_),
-        "preshape_angles": np.array(list(question.preshapes.values()), dtype=np.float64),
+        "preshape_joints": np.array(list(preshapes), dtype=np.str_),
+        "preshape_angles": np.array(list(preshapes.values()), dtype=np.float64),
     }
 
 

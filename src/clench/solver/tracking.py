@@ -17,6 +17,7 @@ from clench.models.objects.grasp_object import GraspObject
 
 from .batch_solver import BatchSolver
 from .grasp_batch import GraspBatch
+from .posture_choice import first_choice
 
 #: By how much another plane's weighted sum has to be better before a finger leaves the one it has [-].
 MARGIN: Final = 0.05
@@ -32,8 +33,8 @@ class Tracker:
 
     Args:
         hand, obj: as for `clench.solve`.
-        command: what is asked for, at the first pose, with one open posture per finger and order `proximal-first`; or
-            the first pose.
+        command: what is asked for, at the first pose, or the first pose; one open posture per finger and order
+            `proximal-first`. If it leaves the posture to clench, the best posture at the first pose is kept.
         margin: see above [-]; 0 chooses as `clench.solve` does.
 
     Raises:
@@ -46,7 +47,7 @@ class Tracker:
         check_type(hand, Hand, "hand")
         check_type(obj, GraspObject, "obj")
         command = as_command(command)
-        self._solver = BatchSolver(hand, obj, command)
+        self._solver = BatchSolver(hand, obj, first_choice(hand, obj, command))
         if self._solver.packed is None:
             raise CommandError(
                 "Tracker: expected a command with one open posture per finger, order 'proximal-first', 1 round, joints "

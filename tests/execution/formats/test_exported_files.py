@@ -80,7 +80,7 @@ def grip() -> Grip:
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
     placed = clench.Pose([0.4, 0.1, -0.2], wxyz=[0.5, 0.5, -0.5, 0.5])
     for pose in clench.approach_poses(hand, ball, 20, 1):
-        command = clench.GraspCommand(hand_pose=placed @ pose, object_pose=placed)
+        command = clench.GraspCommand(hand_pose=placed @ pose, object_pose=placed, preshape="open")
         solution = clench.solve(hand, ball, command)
         if solution.is_valid() and clench.plan_squeeze(solution, hand, ball, gravity=None).feasible:
             return hand, ball, solution
@@ -213,7 +213,9 @@ def test_one_call_writes_many_files(grip: Grip, tmp_path: Path) -> None:
 
 def test_batches_and_lists_are_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
-    batch = clench.solve_batch(hand, ball, clench.approach_poses(hand, ball, 6, 1), clench.GraspCommand(clench.Pose()))
+    batch = clench.solve_batch(
+        hand, ball, clench.approach_poses(hand, ball, 6, 1), clench.GraspCommand(clench.Pose(), preshape="open")
+    )
     batch.save(tmp_path / "b.npz")
     count = batch.counts()["grasp"]
     report = clench.export_grasps(tmp_path / "all.yaml", batch)
@@ -236,7 +238,7 @@ def test_grasps_of_several_objects(
     monkeypatch.chdir(tmp_path)
     hand, ball, solution = grip
     larger = clench.GraspObject.load("sphere:r=0.031")
-    command = clench.GraspCommand(hand_pose=solution.hand_pose, object_pose=solution.object_pose)
+    command = clench.GraspCommand(hand_pose=solution.hand_pose, object_pose=solution.object_pose, preshape="open")
     other = clench.solve(hand, larger, command)
     solution.save("a.json")
     other.save("b.json")
@@ -296,7 +298,9 @@ def test_the_object_is_named_by_its_folder_and_scale(tmp_path: Path) -> None:
     trimesh.creation.icosphere(radius=1.0).export(folder / "mesh" / "simplified.obj")
     hand = clench.Hand.load("robonaut2")
     ball = clench.GraspObject.load(folder / "mesh" / "simplified.obj", scale=0.03)
-    solution = clench.solve(hand, ball, clench.GraspCommand(clench.approach_poses(hand, ball, 1, 1)[0]))
+    solution = clench.solve(
+        hand, ball, clench.GraspCommand(clench.approach_poses(hand, ball, 1, 1)[0], preshape="open")
+    )
     solution.save(tmp_path / "s.json")
     for source in (solution, clench.GraspSolution.load(tmp_path / "s.json")):
         clench.export_grasps(tmp_path / "g.npy", source, hand=hand, obj=ball)

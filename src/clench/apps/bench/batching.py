@@ -55,7 +55,7 @@ def bench_batch(
         "seed": seed,
     }
     kinds = {
-        name: GraspCommand(hand_pose=Pose.identity(), planes=planes, full_width=full, measure=False)
+        name: GraspCommand(hand_pose=Pose.identity(), preshape="open", planes=planes, full_width=full, measure=False)
         for name, full in (("certified", True), ("planes", False))
     }
     for name, command in kinds.items():

@@ -44,7 +44,7 @@ def bench_choice(
     hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)
     variants = tuple(STEP * k for k in range(alternatives))
     problems = [
-        make_problem(hand, obj, GraspCommand(hand_pose=pose, planes=1, open_variants=variants))
+        make_problem(hand, obj, GraspCommand(hand_pose=pose, preshape="open", planes=1, open_variants=variants))
         for pose in clench.approach_poses(hand, obj, count, seed)
     ]
     cases = [([[c for c in g if c.plane is None] for g in finger_sets(p)], p) for p in problems]

@@ -86,7 +86,9 @@ class PeerCase:
 
     def command(self, k: int, full_width: bool) -> GraspCommand:
         """Return what our own solve is asked."""
-        return GraspCommand(hand_pose=self.poses[k], planes=self.planes, full_width=full_width, measure=False)
+        return GraspCommand(
+            hand_pose=self.poses[k], preshape="open", planes=self.planes, full_width=full_width, measure=False
+        )
 
     def closers(self) -> Mapping[str, Closer]:
         """Return every way of closing by name; called with the number of a pose it does nothing else than to close."""

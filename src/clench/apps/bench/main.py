@@ -76,6 +76,7 @@ def solve(
     source = None if collision_source is None else clench.CollisionSource(collision_source)
     asked = clench.GraspCommand(
         hand_pose=clench.Pose.identity(),
+        preshape="open",
         order=clench.ClosingOrder(order),
         planes=planes,
         collision_source=source,

@@ -49,7 +49,7 @@ def main(hand_model: str, path: str) -> None:
 
 def _solve_once(hand: clench.Hand, obj: clench.GraspObject) -> None:
     pose = clench.approach_poses(hand, obj, 1, 0)[0]
-    clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose))
+    clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))
 
 
 def _status(key: str) -> float | None:

@@ -62,13 +62,14 @@ def sample_grasps(
     for number, preshape in enumerate(preshapes):
         count = len(range(number, poses, len(preshapes)))
         for pose in clench.approach_poses(hand, obj, count, seed + number, preshape=preshape):
-            command = GraspCommand(hand_pose=pose, preshape=preshape, planes=1, full_width=False, measure=False)
+            shaped = preshape or "open"
+            command = GraspCommand(hand_pose=pose, preshape=shaped, planes=1, full_width=False, measure=False)
             solution = clench.solve(hand, obj, command)
             tick()
             kinds[f"sampled_{solution.status.value}"] += 1
             if solution.status is SolutionStatus.GRASP:
                 promise = _mean(epsilon_bound, solution, hand, obj, friction)
-                quick.append((promise, GraspCommand(hand_pose=pose, preshape=preshape)))
+                quick.append((promise, GraspCommand(hand_pose=pose, preshape=shaped)))
     quick.sort(key=lambda found: -found[0])
     grasps: list[GradedGrasp] = []
     for _, command in _spread(quick, wanted):

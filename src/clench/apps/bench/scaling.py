@@ -90,7 +90,10 @@ def bench_scaling(
     poses = clench.approach_poses(hand, obj, asked.poses, asked.seed)
     report.values |= {"hand": hand.name, "object": given.name, "poses": asked.poses, "passes": asked.passes}
     # Before the fine meshes, whose memory would be told as that of the stream.
-    streamed, command = BenchReport(), GraspCommand(hand_pose=Pose.identity(), full_width=False, measure=False)
+    streamed, command = (
+        BenchReport(),
+        GraspCommand(hand_pose=Pose.identity(), preshape="open", full_width=False, measure=False),
+    )
     stream_memory(streamed, hand, obj, poses, command, asked.stream)
     batches = [count for count in BATCHES if count <= asked.batch]
     work = len(meshes) + len(PLANES) + len(hand.fingers) + _cores() + len(batches)
@@ -147,7 +150,7 @@ class _Bench:
     def triangles(self, meshes: Sequence[TriangleMesh]) -> Axis:
         """Solve the same surface with more and more triangles; the answers are those of the coarsest."""
         axis = Axis("triangles")
-        commands = [GraspCommand(hand_pose=pose, measure=False) for pose in self.poses]
+        commands = [GraspCommand(hand_pose=pose, preshape="open", measure=False) for pose in self.poses]
         first: list[FloatArray] = []
         for mesh in meshes:
             obj = _object(mesh)
@@ -164,7 +167,9 @@ class _Bench:
         axis = Axis("planes")
         first: list[FloatArray] = []
         for count in PLANES:
-            commands = [GraspCommand(hand_pose=pose, planes=count, measure=False) for pose in self.poses]
+            commands = [
+                GraspCommand(hand_pose=pose, preshape="open", planes=count, measure=False) for pose in self.poses
+            ]
             angles = [_angles(clench.solve(self.hand, self.obj, command)) for command in commands]
             first = first or angles
             self._compare(f"{count} planes", angles, first, SAME)
@@ -197,7 +202,7 @@ class _Bench:
     def _batches(self, name: str, rows: Sequence[tuple[int, Sequence[Pose], int]]) -> Axis:
         axis = Axis(name)
         kinds = {
-            part: GraspCommand(hand_pose=Pose.identity(), full_width=full, measure=False)
+            part: GraspCommand(hand_pose=Pose.identity(), preshape="open", full_width=full, measure=False)
             for part, full in (("certified", True), ("planes", False))
         }
         alone = {
@@ -244,7 +249,7 @@ class _Bench:
 
 
 def _command(pose: Pose, fingers: tuple[str, ...]) -> GraspCommand:
-    return GraspCommand(hand_pose=pose, fingers=fingers, measure=False)
+    return GraspCommand(hand_pose=pose, preshape="open", fingers=fingers, measure=False)
 
 
 def _angles(solution: GraspSolution) -> FloatArray:

@@ -138,7 +138,7 @@ def _time_forces(report: BenchReport, passes: int) -> None:
     """Time the least torque for one load, and the squeeze, of the built-in hand on a sphere; check what they keep."""
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
     pose = clench.approach_poses(hand, ball, 1, 1)[0]
-    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose))
+    solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
     grasp = hold(solution, hand, ball, friction=0.8)
     load = weight(0.2, grasp.palm_direction([0.0, 0.0, -1.0]))[0]
     pulls = six_pulls_and_twists(float(np.linalg.norm(load)))

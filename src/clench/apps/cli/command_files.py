@@ -20,10 +20,13 @@ def read_command(path: Path, hand: Hand) -> GraspCommand:
     """
     from clench.grasp.calibration import calibration_of
     from clench.models.command_file import check_command, load_command
+    from clench.solver.postures import preshape_angles
 
     command = load_command(path)
     try:
         check_command(hand, command)
+        if isinstance(command.preshape, str):
+            preshape_angles(hand, command.preshape)
         calibration_of(command.criteria)
     except FileError:
         raise  # names the calibration file

@@ -115,6 +115,7 @@ def solve(
     from clench.solver.pareto import hand_front
 
     from .choice_tables import print_choice
+    from .preshape_tables import print_posture_choice
     from .printing import print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
 
@@ -157,6 +158,7 @@ def solve(
     else:
         untold = [warning for warning in the_object.warnings if warning not in told]
         print_solution(solution, [*the_hand.warnings, *untold], files)
+        print_posture_choice(solution)
         if error is not None:
             print_pose_error(error)
         if explain:
@@ -206,7 +208,7 @@ def hand(
     figure: Path | None = None,
     json: bool = False,
 ) -> int:
-    """Show what was understood of a hand, check it, and say what to do: fingers, roles, coupling, findings.
+    """Show what was understood of a hand, check it, and say what to do: fingers, roles, coupling, preshapes, findings.
 
     Args:
         model: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
@@ -214,12 +216,14 @@ def hand(
         palm: name of the palm link, to pick a hand inside a whole robot.
         collision_source: geometry to use.
         figure: file (.png, .pdf, .svg, …) for a picture of the hand: joint axes, roles, closing directions, curl
-            planes.
+            planes, and its preshapes.
         json: print one JSON document on standard output.
     """
     import clench
     from clench.models.hand.report import describe_hand
+    from clench.solver.preshapes import opposition_zones
 
+    from .preshape_tables import print_preshapes
     from .printing import print_files, print_hand
     from .results import print_json
 
@@ -229,14 +233,16 @@ def hand(
         check_figure(figure)
     loaded = clench.Hand.load(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
     report = describe_hand(loaded, clench.check_hand(loaded))
+    preshapes = opposition_zones(loaded)
     if figure is not None:
         from clench.apps.figures.hand_map import draw_hand_map
 
-        draw_hand_map(loaded, figure)
+        draw_hand_map(loaded, figure, preshapes=preshapes)
     if json:
-        print_json(report.to_dict())
+        print_json(report.to_dict() | {"preshapes": [shape.to_dict() for shape in preshapes]})
     else:
         print_hand(report)
+        print_preshapes(preshapes)
         print_files([] if figure is None else [figure])
     return 0
 

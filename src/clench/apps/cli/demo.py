@@ -36,6 +36,7 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
     from clench.base.json_files import check_folder
     from clench.kernels.warming import warm_up
 
+    from .preshape_tables import print_posture_choice
     from .printing import print_files, print_report, print_solution
 
     check_folder(out)
@@ -64,6 +65,7 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         print_json(solution.to_dict())
     else:
         print_solution(solution, [*hand.warnings, *obj.warnings], [])
+        print_posture_choice(solution)
         print_report(report)
         print_files(files)
     return 0 if report.success and exit_code(solution, strict=False) == 0 else 1

@@ -160,7 +160,8 @@ def _held(grasp: PlannedGrasp, hand: Hand, obj: GraspObject, friction: Any) -> H
 
 def _write(found: GraspPlan, document: dict[str, Any], folder: Path) -> list[Path]:
     """Write the plan, and the solution and trajectory of every grasp; return the paths of the files."""
-    from clench.base.files import make_folder, write_json
+    from clench.base.files import make_folder
+    from clench.base.json_files import write_json
 
     make_folder(folder)
     write_json(folder / "plan.json", document, "plan")

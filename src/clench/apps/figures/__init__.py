@@ -33,12 +33,14 @@ def draw_solution(
     Raises:
         FileError: the folder cannot be made, or a file cannot be written.
     """
+    from clench.solver.orders import settled
+
     from .curl_plane import draw_finger
     from .finger_scenes import FingerScenes
     from .hand_view import draw_hand
     from .set_grid import draw_sets
 
-    folder = make_folder(directory)
+    folder, command = make_folder(directory), settled(command, solution)
     files = []
     for name, result in solution.fingers.items():
         if not 0 <= result.chosen < len(result.candidates):

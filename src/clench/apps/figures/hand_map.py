@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -15,6 +16,7 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.shapes import CollisionSource
 
 from . import style
+from .preshape_sheet import draw_preshapes, sheet_height
 from .raster import Camera, halved, rasterise
 from .surfaces import PALM_COLOR, Surface, posed_surface
 from .views import GAP, VIEW, fitted_camera, frame_axes, lit, scale_bar, two_views
@@ -22,6 +24,8 @@ from .views import GAP, VIEW, fitted_camera, frame_axes, lit, scale_bar, two_vie
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from clench.solver.preshapes import Preshape
 
 _TEXT: Final = 450
 #: Half the length at which an axis is drawn, as a share of the hand's size [-].
@@ -49,11 +53,14 @@ class FingerMap:
     paths: FloatArray
 
 
-def draw_hand_map(hand: Hand, path: Path, source: CollisionSource | None = None) -> Path:
+def draw_hand_map(
+    hand: Hand, path: Path, source: CollisionSource | None = None, preshapes: Sequence[Preshape] = ()
+) -> Path:
     """Write a picture of the open hand with its joint axes, roles, closing directions and curl planes.
 
     Args:
         hand: see `Hand.load`. path: PNG file. source: geometry to draw; None is the hand's default.
+        preshapes: are drawn below, each with the axis along which its pads oppose best.
 
     Raises:
         FileError: the file cannot be written.
@@ -65,7 +72,8 @@ def draw_hand_map(hand: Hand, path: Path, source: CollisionSource | None = None)
     size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.1
     maps = [_map_finger(hand, finger, chosen, _AXIS * size) for finger in hand.fingers]
     focus = np.concatenate([corners, *(m.paths.reshape(-1, 3) for m in maps), *(m.axes.reshape(-1, 3) for m in maps)])
-    figure, views = two_views(_TEXT)
+    below = sheet_height(len(preshapes))
+    figure, views = two_views(_TEXT, below)
     directions, above = _directions(hand, maps)
     scale = min(fitted_camera(d, focus, VIEW, above=above).scale for d in directions)
     for axes, direction in zip(views, directions, strict=True):
@@ -74,7 +82,8 @@ def draw_hand_map(hand: Hand, path: Path, source: CollisionSource | None = None)
     for m in maps:
         _name_finger(views[0], m, fitted_camera(directions[0], focus, VIEW, scale, above))
     scale_bar(views[0], scale)
-    _explain(figure, hand, maps)
+    _explain(figure, hand, maps, below)
+    draw_preshapes(figure, hand, preshapes, chosen, directions, above)
     return style.save_figure(figure, path)
 
 
@@ -167,14 +176,14 @@ def _name_finger(axes: Axes, m: FingerMap, camera: Camera) -> None:
     label.set_path_effects(style.halo())
 
 
-def _explain(figure: Figure, hand: Hand, maps: list[FingerMap]) -> None:
+def _explain(figure: Figure, hand: Hand, maps: list[FingerMap], below: int) -> None:
     width, height = figure.get_size_inches() * style.DPI
     left = (2 * VIEW[0] + 3 * GAP) / width
     palm = hand.links[hand.palm].name
     title = f"{hand.name}: what was understood of the open hand, in the frame of its palm '{palm}'"
     style.write(figure, GAP / width, 1.0 - 16 / height, title, fontsize=14, fontweight="bold", va="top")
     rows = [(m.finger, j) for m in maps for j in m.finger.joints]
-    step = min(16.0, (height - 330.0) / max(len(rows) + len(maps), 1))
+    step = min(16.0, (height - below - 330.0) / max(len(rows) + len(maps), 1))
     row = 60.0
     for m in maps:
         closing = [j for j in m.finger.joints if hand.joints[j].role is JointRole.CLOSING]
@@ -187,7 +196,7 @@ def _explain(figure: Figure, hand: Hand, maps: list[FingerMap]) -> None:
             text = _joint_text(hand, j)
             style.write(figure, left, 1.0 - row / height, text, fontsize=0.56 * step, color=color, va="top")
             row += step
-    _legend(figure, left - 0.004)
+    _legend(figure, left - 0.004, below / height)
 
 
 def _middle(m: FingerMap) -> FloatArray:
@@ -209,7 +218,7 @@ def _joint_text(hand: Hand, j: int) -> str:
     return f"    {joint.name}: {way}, open {open_value:.0f} in {low:.0f}..{high:.0f} deg{follows}"
 
 
-def _legend(figure: Figure, left: float) -> None:
+def _legend(figure: Figure, left: float, bottom: float) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -225,4 +234,4 @@ def _legend(figure: Figure, left: float) -> None:
         Patch(facecolor=PALM_COLOR, label="palm and what does not close"),
         Line2D([], [], color=style.FAINT, marker=r"$\rightarrow$", ms=12, ls="", label="axes of the palm's frame"),
     ]
-    figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(left, 0.0), fontsize=9, frameon=False)
+    figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(left, bottom), fontsize=9, frameon=False)

@@ -24,15 +24,15 @@ _TOP: Final = 70
 _BOTTOM: Final = 60
 
 
-def two_views(text: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure with two square views and room for text to the right of them, so many pixels wide."""
-    width, height = 2 * VIEW[0] + text + 4 * GAP, VIEW[1] + _TOP + _BOTTOM
+def two_views(text: int, below: int = 0) -> tuple[Figure, list[Axes]]:
+    """Return a figure with two square views, room for text to the right of them, and room below, in pixels."""
+    width, height = 2 * VIEW[0] + text + 4 * GAP, VIEW[1] + _TOP + _BOTTOM + below
     figure = style.new_figure(width, height)
     views = [
         figure.add_axes(
             (
                 (GAP + k * (VIEW[0] + GAP)) / width,
-                _BOTTOM / height,
+                (_BOTTOM + below) / height,
                 VIEW[0] / width,
                 VIEW[1] / height,
             )

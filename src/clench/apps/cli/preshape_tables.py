@@ -1,0 +1,49 @@
+"""Tables of preshapes: those of a hand, and those that were compared for a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from .tables import console_out, plain, table_with
+
+if TYPE_CHECKING:
+    from clench.solver.preshapes import Preshape
+    from clench.solver.solution import GraspSolution
+
+
+def print_preshapes(preshapes: Sequence[Preshape]) -> None:
+    """Print the preshapes of a hand: how far apart its pads are, and how well they oppose."""
+    console = console_out()
+    if not preshapes:
+        console.print("preshapes: none, as no two fingers close towards each other")
+        return
+    title = "preshapes (a command may name one)"
+    table = table_with(title, "name", "aperture [mm]", "best at [mm]", "opposition")
+    for said in (shape.to_dict() for shape in preshapes):
+        if said["quality"] is None:
+            table.add_row(plain(said["name"]), "", "", "none")
+            continue
+        low, high = (f"{1e3 * length:.0f}" for length in said["aperture_range"])
+        best = f"{1e3 * said['aperture']:.0f}"
+        table.add_row(plain(said["name"]), f"{low} to {high}", best, f"{said['quality']:.2f}")
+    console.print(table)
+
+
+def print_posture_choice(solution: GraspSolution) -> None:
+    """Print which preshape clench chose, and how the others compare; nothing where the command left no choice."""
+    said = (solution.choice or {}).get("preshapes")
+    if said is None:
+        return
+    console, compared = console_out(), said["compared"]
+    names = list(dict.fromkeys(name for each in compared.values() for name in each["scores"]))
+    words = [name.replace("_", " ") for name in names]
+    table = table_with("preshapes that were compared (* chosen, 2 next best)", "", "preshape", "status", *words, "sum")
+    table.columns[1].no_wrap = True
+    marks = {said["chosen"]: "*", said["runner_up"]: "2"}
+    for name, each in compared.items():
+        scores = [f"{each['scores'][key]:.4g}" if key in each["scores"] else "" for key in names]
+        row = (marks.get(name, ""), name, each["status"], *scores, f"{each['total']:.4f}")
+        table.add_row(*map(plain, row))
+    console.print(table)
+    console.print(plain(said["text"]), soft_wrap=True)
