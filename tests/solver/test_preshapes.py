@@ -146,7 +146,7 @@ def test_a_damaged_file_is_never_used(searched, tmp_path, damage) -> None:
 def test_joints_that_the_hand_does_not_have_are_not_believed(searched, tmp_path) -> None:
     hand = clench.Hand.load("robonaut2")
     key = cache_key(hand, ("thumb",))
-    entry = preshape_cache.Entry({"absent": 0.1}, [(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.05, 0.9)])
+    entry = preshape_cache.Entry({"absent": 0.1}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.9]])
     keep_preshapes(key, [entry])
     assert read_preshapes(key, ["absent"]) == [entry]
     assert read_preshapes(key, hand.joint_names) is None
