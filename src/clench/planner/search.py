@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -20,7 +20,7 @@ from clench.solve.preshapes import Preshape, opposition_zones
 
 from .approach_check import Approach
 from .finishing import Finisher
-from .grasp_plan import GraspPlan, PlannedGrasp
+from .grasp_plan import GraspPlan, PlannedGrasp, UnfinishedGrasp
 from .options import PlanOptions, is_reached
 from .pairs import opposing_pairs
 from .proposals import Arm, Proposals, Proposer
@@ -82,6 +82,10 @@ class GraspSearch:
             due = -(-self.proposed // self.asked.effort) if self.proposed < self.asked.proposals else self.asked.count
             yield from self._finish(min(due, self.asked.count))
         yield from self._finish(self.asked.count)
+
+    def tell_unfinished(self, tell: Callable[[UnfinishedGrasp], None]) -> None:
+        """Call a function from now on with every grasp that lacks a squeeze or a path, which the plan leaves out."""
+        self._finisher.tell = tell
 
     def plan(self) -> GraspPlan:
         """Return what was found so far, the best grasps first."""
