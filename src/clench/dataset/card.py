@@ -24,7 +24,17 @@ CARD_FILE: Final = "DATASET.md"
 PICTURES: Final = "pictures"
 #: Hands or objects that a picture shows at most.
 _SHOWN: Final = 30
-_READ: Final = ("hand_model", "object_model", "ok", "stage", "kind", "epsilon", "hand_license", "object_license", "held")
+_READ: Final = (
+    "hand_model",
+    "object_model",
+    "ok",
+    "stage",
+    "kind",
+    "epsilon",
+    "hand_license",
+    "object_license",
+    "held",
+)
 
 
 def write_card(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged) -> None:
@@ -55,9 +65,7 @@ def _values(file: Path) -> dict[str, list[Any]]:
     return found
 
 
-def _text(
-    folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged, values: dict[str, list[Any]]
-) -> str:
+def _text(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged, values: dict[str, list[Any]]) -> str:
     job = folder.job
     failed = [record for record in records if record.status == "failed"]
     rejected: Counter[str] = sum((Counter(r.rejected) for r in records), Counter())

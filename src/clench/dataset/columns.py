@@ -21,8 +21,8 @@ class Column(NamedTuple):
     text: str
 
 
-#: All columns, in order. Types: text, whole, number, truth; pose is [w, x, y, z, X, Y, Z]; texts, numbers and points are
-#: lists, a point is [x, y, z].
+#: All columns, in order. Types: text, whole, number, truth; pose is [w, x, y, z, X, Y, Z]; texts, numbers and points
+#: are lists, a point is [x, y, z].
 COLUMNS: Final = {
     "hand": Column("text", False, "name of the hand"),
     "hand_model": Column("text", False, "its model, as the job names it"),
@@ -51,7 +51,7 @@ COLUMNS: Final = {
     "T_world_object": Column("pose", False, "pose of the object"),
     "pregrasp": Column("numbers", True, "angles of all joints at the pregrasp [rad]; null without a path"),
     "touch": Column("numbers", False, "angles of all joints at the touch [rad]"),
-    "squeeze": Column("numbers", True, "what position servos are told to squeeze [rad]; null without a squeeze or gains"),
+    "squeeze": Column("numbers", True, "what servos are told to squeeze [rad]; null without a squeeze or their gains"),
     "torque_joints": Column("texts", True, "degrees of freedom that the torques are of; null without a squeeze"),
     "torques": Column("numbers", True, "torques of the squeeze [Nm]; null without one"),
     "margin": Column("number", True, "disturbances are resisted up to this multiple [-]; null without a squeeze"),
@@ -60,7 +60,7 @@ COLUMNS: Final = {
     "contact_position": Column("points", False, "place in the object's frame [m]"),
     "contact_normal": Column("points", False, "unit normal out of the object, in its frame"),
     "contact_force": Column("points", True, "force on the object, in its frame [N]; null without a squeeze"),
-    "epsilon": Column("number", True, "Ferrari–Canny ball at the lowest friction [N/N]; null for one without a squeeze"),
+    "epsilon": Column("number", True, "Ferrari–Canny ball at the lowest friction [N/N]; null without a squeeze"),
     "score": Column("number", True, "mean of epsilon at the lowest friction and at half of it; null as epsilon"),
     "certified": Column("truth", False, "the certificate of the closing holds"),
     "penetration": Column("number", True, "largest depth over all links [m]; null when it was not measured"),

@@ -1,4 +1,4 @@
-"""The folder of a dataset: the job, a part per unit, a manifest per shard; whole files alone, so that a run can go on."""
+"""The folder of a dataset: the job, a part per unit, a manifest per shard. All files are whole, so a run can go on."""
 
 from __future__ import annotations
 

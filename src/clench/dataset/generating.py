@@ -104,8 +104,8 @@ def generate(
         tell: called with the record of every unit. runner: does the units instead of processes of this machine.
 
     Raises:
-        ClenchError: pyarrow is missing. CommandError, UnknownNameError, FileError, HandError: a hand that does not load,
-            an object that is not there, a folder that holds something else. Nothing is written then.
+        ClenchError: pyarrow is missing, a hand does not load, an object is not there, or the folder holds something
+            else. Nothing is written then.
     """
     need_pyarrow()
     count = (os.cpu_count() or 1) if workers is None else workers

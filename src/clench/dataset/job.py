@@ -19,7 +19,7 @@ from clench.base.json_files import read_json
 from clench.base.toml_files import read_toml
 from clench.models.objects.loading import BUILTIN
 from clench.models.objects.shape_text import is_shape_text, parse_shape
-from clench.planner.options import APART, EFFORT, PlanArguments, PlanOptions
+from clench.planner.options import APART, EFFORT, PlanOptions
 
 from .units import Unit
 
@@ -91,7 +91,7 @@ class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         self.options(self.count, self.seed)
         pairs = len(self.hands) * len(self.objects) * len(self.scales)
         if pairs * -(-self.count // self.unit) > MOST_UNITS:
-            raise CommandError(f"unit: the job has more than {MOST_UNITS} units; give larger ones, up to {LARGEST_UNIT}.")
+            raise CommandError(f"unit: the job has more than {MOST_UNITS} units; give larger ones.")
 
     def options(self, count: int, seed: int) -> PlanOptions:
         """Return the planner's options for so many grasps, on one thread.
@@ -99,11 +99,8 @@ class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         Raises:
             CommandError: an option of a wrong type or out of range.
         """
-        return PlanOptions(count=count, seed=seed, threads=1, **self.arguments())
-
-    def arguments(self) -> PlanArguments:
-        """Return the keys that are the planner's, as `clench.plan_grasps` takes them."""
-        return PlanArguments(**{key: getattr(self, key) for key in _PLANNED})  # type: ignore[typeddict-item]
+        planned: dict[str, Any] = {key: getattr(self, key) for key in _PLANNED}
+        return PlanOptions(count=count, seed=seed, threads=1, **planned)
 
     def units(self) -> Iterator[Unit]:
         """Yield the units, in the order of the rows of the dataset."""

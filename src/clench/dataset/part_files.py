@@ -33,17 +33,13 @@ def writing_options() -> dict[str, Any]:
     return WRITING | {"use_dictionary": [*TEXTS, *nested]}
 
 
-def with_metadata(
-    content: Mapping[str, Any], hands: Mapping[str, Mapping[str, Any]]
-) -> pyarrow.Schema:
+def with_metadata(content: Mapping[str, Any], hands: Mapping[str, Mapping[str, Any]]) -> pyarrow.Schema:
     """Return the schema with metadata.
 
     Args:
         content: what the file holds. hands: names of the joints and links, by model.
     """
-    return arrow_schema().with_metadata(
-        {SCHEMA_KEY: SCHEMA, CONTENT_KEY: _plain(content), HANDS_KEY: _plain(hands)}
-    )
+    return arrow_schema().with_metadata({SCHEMA_KEY: SCHEMA, CONTENT_KEY: _plain(content), HANDS_KEY: _plain(hands)})
 
 
 def encode_part(rows: Sequence[Row], content: Mapping[str, Any], hands: Mapping[str, Mapping[str, Any]]) -> bytes:
@@ -108,4 +104,4 @@ def sha256(content: bytes) -> str:
 
 
 def _plain(document: Mapping[str, Any]) -> str:
-    return json.dumps(document, allow_nan=False, sort_keys=True)
+    return json.dumps(document, allow_nan=False)

@@ -25,7 +25,20 @@ from .sources import hand_source, load_hand, load_object
 from .units import Unit
 
 #: What of a record comes out the same in every run.
-_SAME = ("unit", "hand", "object", "scale", "part", "count", "status", "reason", "rows", "ok", "hand_hash", "object_hash")
+_SAME = (
+    "unit",
+    "hand",
+    "object",
+    "scale",
+    "part",
+    "count",
+    "status",
+    "reason",
+    "rows",
+    "ok",
+    "hand_hash",
+    "object_hash",
+)
 _COUNTED = ("proposed", "closed", "force_closed", "rejected")
 
 

@@ -71,7 +71,8 @@ class UnfinishedGrasp:
     """A closed grasp that could not be completed, and why; a plan leaves it out.
 
     Args:
-        solution: the certified answer, without squeeze and pregrasp. command, preshape, kind, number: see `PlannedGrasp`.
+        solution: the certified answer, without squeeze and pregrasp.
+        command, preshape, kind, number: see `PlannedGrasp`.
         reason: why it was left out: no squeeze, or no path.
     """
 

@@ -14,6 +14,7 @@ from .calibrating import calibrate
 from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
+from .generate import generate
 from .parsing import as_range
 
 if TYPE_CHECKING:
@@ -293,6 +294,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "solve": solve,
     "batch": batch,
+    "generate": generate,
     "hand": hand,
     "execute": execute,
     "export": export,
