@@ -26,6 +26,8 @@ from .workers import run_units
 MANIFEST_INTERVAL: Final = 5.0
 #: A process that has had more memory than this is replaced [GB].
 MEMORY: Final = 4.0
+#: Units of a shard at most: its manifest is one file.
+MOST_UNITS: Final = 10_000
 
 #: What does units: yields what comes of each.
 Runner = Callable[[DatasetJob, list[Unit]], Iterator[UnitResult]]
@@ -119,6 +121,11 @@ def generate(
     for model in job.hands:
         job.options(1, 0).sets_of_fingers(load_hand(model))
     units = [unit for unit in job.units() if shard.has(unit)]
+    if len(units) > MOST_UNITS:
+        raise CommandError(
+            f"shard: {len(units)} units are too many for one run; give larger ones with unit, or more shards: "
+            f"up to {MOST_UNITS} units each."
+        )
     records = folder.done(units)
     waiting = [unit for unit in units if unit.key not in records]
     report = GenerateReport(folder.path, shard, len(units), len(records))

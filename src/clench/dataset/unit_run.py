@@ -24,23 +24,6 @@ from .rows import row_of
 from .sources import hand_source, load_hand, load_object
 from .units import Unit
 
-#: What of a record comes out the same in every run.
-_SAME = (
-    "unit",
-    "hand",
-    "object",
-    "scale",
-    "part",
-    "count",
-    "status",
-    "reason",
-    "rows",
-    "ok",
-    "hand_hash",
-    "object_hash",
-)
-_COUNTED = ("proposed", "closed", "force_closed", "rejected")
-
 
 @dataclass(frozen=True)
 class UnitRecord:
@@ -80,8 +63,8 @@ class UnitRecord:
         return cls(unit.key, unit.hand, unit.object, unit.scale, unit.part, unit.count, **values)
 
     def content(self, job: str) -> dict[str, Any]:
-        """Return what the part's file says of itself: the job's hash, and all but hash and time of the file."""
-        return {"job": job, **{key: value for key, value in asdict(self).items() if key in (*_SAME, *_COUNTED)}}
+        """Return what the part's file says of itself: the hash of the job, and the record without hash and time."""
+        return {"job": job, **{key: value for key, value in self.same().items() if key != "sha256"}}
 
     def same(self) -> dict[str, Any]:
         """Return the record without the time that it took."""
