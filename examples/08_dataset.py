@@ -13,9 +13,8 @@ if __name__ == "__main__":  # worker processes import this file
     )
     report = clench.dataset.generate(job, folder, workers=0)  # in this process; all cores without it
     assert report.merged is not None
-    print(
-        f"{report.merged.ok} grasps in {report.merged.file.name}, {report.merged.bytes / report.merged.rows:.0f} bytes each"
-    )
+    size = report.merged.bytes / report.merged.rows
+    print(f"{report.merged.ok} grasps in {report.merged.file.name}, {size:.0f} bytes each")
 
     dataset = clench.dataset.open(folder)
     box = dataset.filter(ok=True, object_model="box:x=0.05,y=0.05,z=0.1", epsilon=(0.01, None))

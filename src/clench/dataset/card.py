@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +13,7 @@ import numpy as np
 from clench import __version__
 from clench.base.errors import FileError
 from clench.base.json_files import write_atomically
+from clench.base.pose import FloatArray
 
 from .columns import COLUMNS, SCHEMA
 from .folder import MANIFEST_FILE, ROWS_FILE, DatasetFolder, whole_file
@@ -37,6 +39,23 @@ _READ: Final = (
 )
 
 
+@dataclass
+class Counted:
+    """Count the rows of a dataset.
+
+    Args:
+        pairs: by hand, object and `ok`. kind, stage, held: by the values of these columns.
+        licenses: of every model. epsilon: of the rows that are `ok`.
+    """
+
+    pairs: Counter[tuple[str, str, bool]] = field(default_factory=Counter)
+    kind: Counter[str] = field(default_factory=Counter)
+    stage: Counter[str | None] = field(default_factory=Counter)
+    held: Counter[bool | None] = field(default_factory=Counter)
+    licenses: dict[str, str | None] = field(default_factory=dict)
+    epsilon: FloatArray = field(default_factory=lambda: np.empty(0))
+
+
 def write_card(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged) -> None:
     """Write DATASET.md and its pictures.
 
@@ -46,32 +65,42 @@ def write_card(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Mer
     Raises:
         FileError: a file cannot be written.
     """
-    values = _values(merged.file)
+    rows = _count(merged.file)
     pictures = folder.path / PICTURES
     try:
         pictures.mkdir(exist_ok=True)
     except OSError as error:
         raise FileError(pictures, f"cannot be made a folder ({error.strerror or error}).") from None
-    _draw_counts(pictures / "counts.png", values)
-    _draw_epsilon(pictures / "epsilon.png", values)
+    _draw_counts(pictures / "counts.png", rows.pairs)
+    _draw_epsilon(pictures / "epsilon.png", rows.epsilon)
     _draw_rejections(pictures / "rejections.png", records)
-    write_atomically(folder.path / CARD_FILE, _text(folder, records, merged, values).encode())
+    write_atomically(folder.path / CARD_FILE, _text(folder, records, merged, rows).encode())
 
 
-def _values(file: Path) -> dict[str, list[Any]]:
+def _count(file: Path) -> Counted:
+    """Count the rows, some thousand at a time."""
     import pyarrow.parquet as pq
 
-    found: dict[str, list[Any]] = pq.read_table(file, columns=list(_READ)).to_pydict()
+    found, epsilon = Counted(), list[Any]()
+    for batch in pq.ParquetFile(file).iter_batches(columns=list(_READ)):
+        values = batch.to_pydict()
+        found.pairs.update(zip(values["hand_model"], values["object_model"], values["ok"], strict=True))
+        for name in ("kind", "stage", "held"):
+            getattr(found, name).update(values[name])
+        for kind in ("hand", "object"):
+            found.licenses.update(zip(values[f"{kind}_model"], values[f"{kind}_license"], strict=True))
+        good = zip(values["epsilon"], values["ok"], strict=True)
+        epsilon.append(np.array([value for value, ok in good if ok and value is not None], dtype=np.float64))
+    found.epsilon = np.concatenate(epsilon) if epsilon else found.epsilon
     return found
 
 
-def _text(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged, values: dict[str, list[Any]]) -> str:
+def _text(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged, rows: Counted) -> str:
     job = folder.job
     failed = [record for record in records if record.status == "failed"]
     rejected: Counter[str] = sum((Counter(r.rejected) for r in records), Counter())
     closed = sum(record.closed for record in records)
-    held = Counter(values["held"])
-    tested = held[True] + held[False]
+    tested = rows.held[True] + rows.held[False]
     lines = [
         "# Dataset of grasps",
         "",
@@ -80,7 +109,7 @@ def _text(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged, 
         f"schema `{SCHEMA}`. `clench.dataset.open` reads it.",
         "",
         *_table(("what", "number"), _numbers(records, merged, closed)),
-        *([f"Held in simulation: {held[True]} of {tested} grasps.", ""] if tested else []),
+        *([f"Held in simulation: {rows.held[True]} of {tested} grasps.", ""] if tested else []),
         "![Grasps by hand and by object](pictures/counts.png)",
         "",
         "![Epsilon](pictures/epsilon.png)",
@@ -89,15 +118,15 @@ def _text(folder: DatasetFolder, records: Sequence[UnitRecord], merged: Merged, 
         "",
         "## Grasps by hand and object",
         "",
-        *_table(("hand", "object", "complete", "failed"), _pairs(values)),
+        *_table(("hand", "object", "complete", "failed"), _pairs(rows.pairs)),
         "## Kinds, failures and rejections",
         "",
-        *_table(("kind", "grasps"), Counter(values["kind"]).most_common()),
-        *_table(("failed at", "grasps"), Counter(stage for stage in values["stage"] if stage).most_common()),
+        *_table(("kind", "grasps"), rows.kind.most_common()),
+        *_table(("failed at", "grasps"), [each for each in rows.stage.most_common() if each[0]]),
         *_table(("rejected for", "proposals"), rejected.most_common()),
         "## Sources",
         "",
-        *_table(("model", "licence beside it"), _licenses(values)),
+        *_table(("model", "licence beside it"), [(m, text or "none found") for m, text in rows.licenses.items()]),
         "## Units that failed",
         "",
         *(_table(("hand", "object", "reason"), [(r.hand, r.object, r.reason) for r in failed]) or ["None.", ""]),
@@ -127,19 +156,9 @@ def _numbers(records: Sequence[UnitRecord], merged: Merged, closed: int) -> list
     ]
 
 
-def _pairs(values: dict[str, list[Any]]) -> list[tuple[Any, ...]]:
-    counts = Counter(zip(values["hand_model"], values["object_model"], values["ok"], strict=True))
-    pairs = dict.fromkeys(zip(values["hand_model"], values["object_model"], strict=True))
+def _pairs(counts: Counter[tuple[str, str, bool]]) -> list[tuple[Any, ...]]:
+    pairs = dict.fromkeys((hand, obj) for hand, obj, _ in counts)
     return [(*pair, counts[(*pair, True)], counts[(*pair, False)]) for pair in pairs]
-
-
-def _licenses(values: dict[str, list[Any]]) -> list[tuple[Any, ...]]:
-    named = dict.fromkeys(
-        pair
-        for kind in ("hand", "object")
-        for pair in zip(values[f"{kind}_model"], values[f"{kind}_license"], strict=True)
-    )
-    return [(model, license or "none found") for model, license in named]
 
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
@@ -150,25 +169,25 @@ def _table(heading: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
     return [f"| {' | '.join(heading)} |", "|" + "---|" * len(heading), *(f"| {row} |" for row in cells), ""]
 
 
-def _draw_counts(file: Path, values: dict[str, list[Any]]) -> None:
+def _draw_counts(file: Path, pairs: Counter[tuple[str, str, bool]]) -> None:
     figure, axes = _figure(2)
-    for ax, kind in zip(axes, ("hand", "object"), strict=True):
-        counts = Counter(zip(values[f"{kind}_model"], values["ok"], strict=True))
-        total = Counter(values[f"{kind}_model"]).most_common(_SHOWN)
-        names = [model for model, _ in total][::-1]
-        good = [counts[(name, True)] for name in names]
+    for which, (ax, kind) in enumerate(zip(axes, ("hand", "object"), strict=True)):
+        counts: dict[bool, Counter[str]] = {True: Counter(), False: Counter()}
+        for (hand, obj, ok), number in pairs.items():
+            counts[ok][(hand, obj)[which]] += number
+        names = [model for model, _ in (counts[True] + counts[False]).most_common(_SHOWN)][::-1]
+        good, failed = ([counts[ok][name] for name in names] for ok in (True, False))
         ax.barh(range(len(names)), good, color="tab:blue", label="complete")
-        ax.barh(range(len(names)), [counts[(n, False)] for n in names], left=good, color="tab:orange", label="failed")
+        ax.barh(range(len(names)), failed, left=good, color="tab:orange", label="failed")
         ax.set_yticks(range(len(names)), [_short(name) for name in names])
         ax.set_xlabel(f"grasps by {kind}")
     axes[0].legend()
     _save(figure, file)
 
 
-def _draw_epsilon(file: Path, values: dict[str, list[Any]]) -> None:
+def _draw_epsilon(file: Path, epsilon: FloatArray) -> None:
     figure, (ax,) = _figure(1)
-    found = np.array([e for e, ok in zip(values["epsilon"], values["ok"], strict=True) if ok and e is not None])
-    ax.hist(found, bins=40, color="tab:blue")
+    ax.hist(epsilon, bins=40, color="tab:blue")
     ax.set_xlabel("epsilon [N/N] of complete grasps")
     ax.set_ylabel("grasps")
     _save(figure, file)

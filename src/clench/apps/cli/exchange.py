@@ -40,7 +40,7 @@ def export(
         solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, or batches
             (.npz) written by `clench batch --out`, of which all poses that are grasps are taken; or one dataset: the
             folder of `clench generate`, or its grasps.parquet.
-        out: the file; for several grasps in the format dexgraspbench, a folder. Of a dataset: a folder, or an HDF5 file.
+        out: the file; for several grasps in the format dexgraspbench, a folder; of a dataset, a folder or an HDF5 file.
         format: of the file; by its ending (.yaml, .npy, .json, .h5) by default, a folder is dexgraspbench. hdf5 is for
             datasets.
         hand: model of the hand; the one that the solutions name by default.
