@@ -76,6 +76,31 @@ def test_bad_values_get_a_sentence(values: dict, said: str) -> None:
     assert said in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"hands": "robonaut2"}, "hands: expected a list, got 'robonaut2'"),
+        ({"scales": 1.0}, "scales: expected a list, got 1.0"),
+        ({"objects": [1]}, "objects: expected a list of text"),
+        ({"scales": ["1"]}, "scales: expected a list of numbers"),
+        ({"unit": 2.5}, "unit: expected a whole number"),
+    ],
+)
+def test_bad_values_from_python_get_a_sentence_too(values: dict, said: str) -> None:
+    with pytest.raises(CommandError) as raised:
+        DatasetJob(**({"hands": ["robonaut2"], "objects": ["mug"]} | values))
+    assert said in str(raised.value)
+    assert (
+        DatasetJob(hands=["robonaut2"], objects=["mug"]).hash == DatasetJob(hands=("robonaut2",), objects=("mug",)).hash
+    )
+
+
+def test_whole_numbers_are_numbers() -> None:
+    whole, same = (DatasetJob(hands=["patent15"], objects=["mug"], scales=[x], mass=x) for x in (1, 1.0))
+    assert whole.hash == same.hash == job_from(json.loads(json.dumps(whole.document())), "again").hash
+    assert [unit.key for unit in whole.units()] == [unit.key for unit in same.units()]
+
+
 def test_every_unit_is_in_exactly_one_shard() -> None:
     for of in (1, 2, 5):
         found = [sum(Shard(i + 1, of).has(unit) for i in range(of)) for unit in JOB.units()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -29,6 +30,8 @@ JOB_FILE: Final = "job.json"
 #: The merged rows, and the merged manifest.
 ROWS_FILE: Final = "grasps.parquet"
 MANIFEST_FILE: Final = "manifest.json"
+#: A merged file that nothing was written to for so long will not be finished [s].
+_LEFT: Final = 3600.0
 _ADVICE: Final = "give --out another folder, or remove this one."
 
 
@@ -116,6 +119,10 @@ class DatasetFolder:
         mine = {unit.key for unit in units}
         for file in (self.path / "parts").glob(".*.part"):
             if file.name[1:].partition(".")[0] in mine:
+                file.unlink(missing_ok=True)
+        for file in self.path.glob(f".{ROWS_FILE}.*.part"):
+            # Another run may be merging at this moment.
+            if time.time() - file.stat().st_mtime > _LEFT:
                 file.unlink(missing_ok=True)
 
     def manifests(self) -> dict[str, UnitRecord]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -79,6 +79,13 @@ class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         """Refuse what cannot be generated."""
         for key, what in (("hands", "hand"), ("objects", "object"), ("scales", "scale")):
             values = getattr(self, key)
+            kinds = (int, float) if key == "scales" else str
+            if isinstance(values, str) or not isinstance(values, Sequence):
+                raise CommandError(f"{key}: expected a list, got {values!r}.")
+            if not all(isinstance(value, kinds) and not isinstance(value, bool) for value in values):
+                raise CommandError(
+                    f"{key}: expected a list of {'numbers' if key == 'scales' else 'text'}, got {values!r}."
+                )
             if not values:
                 raise CommandError(f"{key}: expected at least one {what}, got none.")
             twice = next((value for value in values if values.count(value) > 1), None)
@@ -86,7 +93,8 @@ class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
                 raise CommandError(f"{key}: '{twice}' is named twice.")
         if not all(math.isfinite(scale) and scale > 0.0 for scale in self.scales):
             raise CommandError(f"scales: expected finite numbers above 0, got {list(self.scales)}.")
-        if not 1 <= self.unit <= LARGEST_UNIT:
+        whole = isinstance(self.unit, int) and isinstance(self.count, int)
+        if not whole or not 1 <= self.unit <= LARGEST_UNIT:
             raise CommandError(f"unit: expected a whole number from 1 to {LARGEST_UNIT}, got {self.unit}.")
         self.options(self.count, self.seed)
         pairs = len(self.hands) * len(self.objects) * len(self.scales)
@@ -106,14 +114,16 @@ class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         """Yield the units, in the order of the rows of the dataset."""
         for hand in self.hands:
             for obj in self.objects:
-                for scale in self.scales:
+                for scale in map(float, self.scales):
                     for part in range(-(-self.count // self.unit)):
                         count = min(self.unit, self.count - part * self.unit)
                         yield Unit(self.seed, hand, obj, scale, part, count)
 
     def document(self) -> dict[str, Any]:
         """Return the keys and values in plain form; a job file may have the same."""
-        values: dict[str, Any] = msgspec.to_builtins(self)
+        # Through the types, so that 1 and 1.0 are the same.
+        same = msgspec.convert(msgspec.to_builtins(self), DatasetJob)
+        values: dict[str, Any] = msgspec.to_builtins(same)
         return values
 
     @property

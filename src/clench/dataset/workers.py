@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -39,7 +40,7 @@ class Worker:
         context = get_context("spawn")
         self.connection, other = context.Pipe()
         self.unit: Unit | None = None
-        with _one_thread():
+        with _one_thread(), _ignoring_interrupts():
             self.process: SpawnProcess = context.Process(target=_serve, args=(other, job), daemon=True)
             self.process.start()
         other.close()
@@ -121,8 +122,6 @@ def _ended(worker: Worker) -> str:
 
 def _serve(connection: Connection, job: DatasetJob) -> None:
     """Do units until there are no more, or the process that sends them has ended."""
-    # Ctrl-C goes to all processes of a terminal; the one that shares out ends the others.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     while True:
         try:
             unit = connection.recv()
@@ -139,6 +138,22 @@ def _peak() -> int:
         return 0
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most if sys.platform == "darwin" else 1024 * most
+
+
+@contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """Have processes that start meanwhile ignore Ctrl-C, which goes to all processes of a terminal.
+
+    The process that shares out the units heeds it, and ends the others.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
