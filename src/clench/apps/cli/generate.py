@@ -58,28 +58,30 @@ def generate(
             besides counts instead.
         hands: built-in names, paths to .urdf or .xml files, or names that clench[hands] finds (docs/own-hand.md).
         objects: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
-        scales: of the objects' lengths, e.g. 0.001 for meshes in millimetres; each object is used at each scale.
-        count: grasps per hand, object and scale.
-        seed: the same seed gives the same grasps, for any number of workers and shards.
-        unit: grasps that are planned together at most; what is ended loses at most a unit per worker.
+        scales: of the objects' lengths, e.g. 0.001 for meshes in millimetres; each object is used at each scale; 1 by
+            default.
+        count: grasps per hand, object and scale; 100 by default.
+        seed: the same seed gives the same grasps, for any number of workers and shards; 0 by default.
+        unit: grasps that are planned together at most; what is ended loses at most a unit per worker; 50 by
+            default.
         hold: test every grasp in simulation, in six directions; grasps are planned on convex pieces.
         friction: that is planned for; two numbers are a range; by default what hand file and object say, else 0.6.
         mass: of the objects, kg; two numbers are a range; 0.1 by default.
         gravity: its direction; by default objects are held in any direction.
         kinds: of grasps; all by default.
         fingers: names of the fingers that may close; all by default.
-        min_fingers: how many touch at least.
+        min_fingers: how many touch at least; 2 by default.
         approach: direction in which the palm comes.
-        approach_angle: how far off it may be, rad.
+        approach_angle: how far off it may be, rad; 0.785 by default.
         pose_sigma: standard deviation of the object's position, m, and of its rotation, rad: grasps are preferred
             that hold when the object is displaced.
-        apart: distance of any two grasps of a unit, m: root mean square over all links.
-        effort: proposals per grasp; the best one of so many is kept.
+        apart: distance of any two grasps of a unit, m: root mean square over all links; 0.01 by default.
+        effort: proposals per grasp; the best one of so many is kept; 40 by default.
         most: proposals of a unit at most.
         no_path: leave out the path from the open hand to the touch, and the pregrasp.
         shard: i/n: do the units of one of n runs; by default what SLURM's variables of an array say, else all.
         workers: processes; all cores by default, 0 works in this process.
-        memory: a process that has had more is replaced after its unit, GB.
+        memory: a process that has had more is replaced after its unit, GB; 4 by default.
         merge: merge the parts in this folder, and do nothing else.
         json: print one JSON document on standard output.
     """
