@@ -113,7 +113,9 @@ def test_an_interrupted_run_keeps_whole_units(tmp_path: Path, unbroken: Path) ->
     (manifest,) = (tmp_path / "manifests").glob("*.json")
     document = json.loads(manifest.read_text())
     assert (len(document["units"]), document["waiting"], document["complete"]) == (5, 59, False)
-    assert run(tmp_path).found == 5
+    asked: list = []
+    report = generate(JOB, tmp_path, runner=lambda job, units: slowly(job, asked.extend(units) or units, 0.0))
+    assert (report.found, len(asked)) == (5, 59)
     assert same(tmp_path, unbroken)
 
 
@@ -187,13 +189,15 @@ def test_a_manifest_of_another_dataset_is_refused(tmp_path: Path, copied: Path) 
 
 
 @pytest.mark.parametrize("with_manifest", [True, False])
-@pytest.mark.parametrize("damage", ["cut", "changed", "other"])
+@pytest.mark.parametrize("damage", ["cut", "changed", "flipped", "other"])
 def test_a_part_that_is_not_whole_is_refused(copied: Path, damage: str, with_manifest: bool) -> None:
     part = DatasetFolder.open(copied).part(next(iter(JOB.units())).key)
     content = part.read_bytes()
     if damage == "other":
         content = parts(copied)[0].read_bytes() if parts(copied)[0] != part else parts(copied)[1].read_bytes()
-    part.write_bytes({"cut": content[:-100], "changed": content[:-4] + b"PARE", "other": content}[damage])
+    flipped = content[:400] + bytes([content[400] ^ 1]) + content[401:]
+    changed = {"cut": content[:-100], "changed": content[:-4] + b"PARE", "flipped": flipped, "other": content}
+    part.write_bytes(changed[damage])
     if not with_manifest:
         (copied / "manifests" / "1-of-1.json").unlink()
     with pytest.raises(ClenchError, match=r"remove it, and 'clench generate' makes it again"):

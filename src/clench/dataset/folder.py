@@ -20,7 +20,7 @@ from clench.base.json_files import check_folder, read_json, write_atomically, wr
 
 from .job import SCHEMA as JOB_SCHEMA
 from .job import DatasetJob, job_from
-from .part_files import CONTENT_KEY, metadata_of, open_parquet, sha256
+from .part_files import CONTENT_KEY, metadata_of, open_parquet, read_rows, sha256
 from .shards import Shard
 from .unit_run import UnitRecord, UnitResult
 from .units import Unit
@@ -186,6 +186,8 @@ class DatasetFolder:
 
             read = open_parquet(pa.BufferReader(content), str(file))
             document = metadata_of(read, CONTENT_KEY, str(file))
+            if known is None:
+                read_rows(read, str(file))
             job = document.pop("job", None)
             record = msgspec.convert(document | {"sha256": said}, UnitRecord)
         except FileError as error:

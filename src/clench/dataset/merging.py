@@ -15,7 +15,7 @@ from clench.base.json_files import write_json
 
 from .columns import need_pyarrow
 from .folder import MANIFEST_FILE, MANIFEST_SCHEMA, ROWS_FILE, DatasetFolder, whole_file
-from .part_files import HANDS_KEY, metadata_of, open_parquet, with_metadata, writing_options
+from .part_files import HANDS_KEY, metadata_of, open_parquet, read_rows, with_metadata, writing_options
 from .unit_run import UnitRecord
 from .units import Unit
 
@@ -141,14 +141,9 @@ def _tables(folder: DatasetFolder, units: list[Unit]) -> Iterator[pyarrow.Table]
     Raises:
         FileError: a part cannot be read.
     """
-    import pyarrow as pa
-
     for unit in units:
         file = folder.part(unit.key)
-        try:
-            yield open_parquet(file, str(file)).read().replace_schema_metadata(None)
-        except (pa.ArrowException, OSError) as error:
-            raise FileError(file, f"cannot be read ({' '.join(str(error).split())}); remove it.") from None
+        yield read_rows(open_parquet(file, str(file)), str(file)).replace_schema_metadata(None)
 
 
 def _write(path: Path, tables: Iterator[pyarrow.Table], schema: pyarrow.Schema) -> None:

@@ -24,7 +24,7 @@ SCHEMA_KEY: Final = b"clench.schema"
 CONTENT_KEY: Final = b"clench.content"
 HANDS_KEY: Final = b"clench.hands"
 #: How rows are packed; the same bytes come of the same rows.
-WRITING: Final[dict[str, Any]] = {"compression": "zstd", "compression_level": 3, "store_schema": True}
+WRITING: Final[dict[str, Any]] = {"compression": "zstd", "compression_level": 3, "write_page_checksum": True}
 
 
 def writing_options() -> dict[str, Any]:
@@ -66,7 +66,10 @@ def open_parquet(source: Any, name: str) -> pyarrow.parquet.ParquetFile:
 
     try:
         file = pq.ParquetFile(
-            source, thrift_string_size_limit=JSON_BYTES, thrift_container_size_limit=4 * ARRAY_BYTES // 1024
+            source,
+            thrift_string_size_limit=JSON_BYTES,
+            thrift_container_size_limit=4 * ARRAY_BYTES // 1024,
+            page_checksum_verification=True,
         )
         found = file.schema_arrow
         groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
@@ -84,6 +87,20 @@ def open_parquet(source: Any, name: str) -> pyarrow.parquet.ParquetFile:
         if group.num_rows > DATASET_GROUP_ROWS or max(group.total_byte_size, 8 * largest) > ARRAY_BYTES:
             raise FileError(name, f"has a group of {group.num_rows} rows, which is more than clench writes.")
     return file
+
+
+def read_rows(file: pyarrow.parquet.ParquetFile, name: str) -> pyarrow.Table:
+    """Return all rows of a part; the checksums of its pages must be right.
+
+    Raises:
+        FileError: they cannot be read.
+    """
+    import pyarrow as pa
+
+    try:
+        return file.read()
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise FileError(name, f"its rows cannot be read ({' '.join(str(error).split())}).") from None
 
 
 def metadata_of(file: pyarrow.parquet.ParquetFile, key: bytes, name: str) -> dict[str, Any]:
