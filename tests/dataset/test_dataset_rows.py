@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import signal
+import sys
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clench
+from clench.apps.cli.main import main
 from clench.base.errors import ClenchError
 from clench.dataset.columns import COLUMNS, SCHEMA
 from clench.dataset.exporting import export
@@ -20,7 +26,9 @@ from clench.dataset.reading import GraspDataset
 from clench.dataset.reading import open as open_dataset
 from clench.dataset.rows import row_of
 from clench.dataset.sources import license_beside, load_hand, load_object
+from clench.dataset.unit_run import UnitResult
 from clench.dataset.units import Unit
+from clench.dataset.workers import run_units
 from clench.execution.hold import Hold
 from clench.planner.rejections import Rejection
 
@@ -30,15 +38,22 @@ v .02 .02 .04\nv -.02 .02 .04\nf 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 
 f 4 1 5\nf 4 5 8\n"""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Work in a folder of models: their paths are part of the seeds."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("made")
+        patch.chdir(folder)
+        yield folder
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, GenerateReport]:
+def made(folder: Path) -> tuple[Path, GenerateReport]:
     """Generate a small dataset in this process: two objects, one of which is no mesh."""
-    folder = tmp_path_factory.mktemp("made")
     (folder / "box.obj").write_text(BOX)
     (folder / "LICENSE").write_text("\n  A licence for all.\nMore.\n")
     (folder / "bad.obj").write_text("v 0 0 zero\n")
-    objects = tuple(str(folder / name) for name in ("bad.obj", "box.obj"))
-    job = DatasetJob(hands=("robonaut2",), objects=objects, count=3, unit=2, effort=8, hold=True, seed=3)
+    job = DatasetJob(hands=("robonaut2",), objects=("bad.obj", "box.obj"), count=3, unit=2, effort=8, hold=True, seed=3)
     return folder / "out", generate(job, folder / "out", workers=0)
 
 
@@ -189,3 +204,74 @@ def test_other_programs_get_the_grasps_as_they_were_computed(dataset: GraspDatas
         (posture,) = clench.import_grasps(files[number])
         assert dict(posture.joint_angles) == dict(zip(names, row["touch"], strict=True))
         assert posture.command(load_hand("robonaut2")).hand_pose.position == pytest.approx(row["T_world_palm"][4:])
+
+
+CALL = [
+    "generate",
+    "--hands",
+    "robonaut2",
+    "--objects",
+    "ball",
+    "--count",
+    "2",
+    "--unit",
+    "1",
+    "--effort",
+    "8",
+    "--no-path",
+]
+
+
+def test_the_command_says_what_it_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    call = [*CALL, "--workers", "0", "--out", str(tmp_path / "out")]
+    assert main(call) == 0
+    said = capsys.readouterr().out
+    assert "Shard 1/1: 2 units, 2 grasps and 0 that failed" in said
+    assert "Merged 2 rows, 2 of them grasps" in said
+    assert main([*call, "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert (report["schema"], report["done_before"], report["ok"]) == ("clench.generate/1", 2, 2)
+    assert report["merged"]["sha256"] in said
+    assert main(["generate", "--merge", str(tmp_path / "out"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sha256"] == report["merged"]["sha256"]
+    assert open_dataset(tmp_path / "out").row(0)["pregrasp"] is None
+
+
+def test_ctrl_c_leaves_whole_parts_and_says_how_to_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(job: DatasetJob, units: list[Unit], workers: int, memory: float) -> Iterator[UnitResult]:
+        yield from islice(run_units(job, units, workers, memory), 1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("clench.dataset.generating.run_units", interrupted)
+    out = tmp_path / "out"
+    call = [*CALL, "--workers", "0", "--out", str(out)]
+    monkeypatch.setattr(sys, "argv", ["clench", *call])
+    assert main(call) == 130
+    assert f"whole units are in '{out}'; the same call goes on: clench {' '.join(call)}" in capsys.readouterr().err
+    assert len(list((out / "parts").glob("*.parquet"))) == 1
+    assert not (out / "grasps.parquet").exists()
+    monkeypatch.undo()
+    assert main(call) == 0
+    assert "2 units (1 of them before), 2 grasps" in capsys.readouterr().out
+
+
+def test_a_job_of_which_everything_fails_gives_no_dataset(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.obj").write_text("v 0 0 zero\n")
+    call = [
+        "generate",
+        "--hands",
+        "robonaut2",
+        "--objects",
+        str(tmp_path / "bad.obj"),
+        "--count",
+        "1",
+        "--workers",
+        "0",
+    ]
+    assert main([*call, "--out", str(tmp_path / "out")]) == 1
+    assert "bad.obj" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "grasps.parquet").exists()
+    assert main(["generate", "--merge", str(tmp_path / "out")]) == 2
+    assert "holds no part: all 1 units failed" in capsys.readouterr().err
