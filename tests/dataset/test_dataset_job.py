@@ -7,11 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from clench.apps.cli import exchange, generate
 from clench.apps.cli.main import main
 from clench.base.errors import CommandError, UnknownNameError
+from clench.dataset.exporting import DatasetFormat
 from clench.dataset.job import DatasetJob, job_from, read_job
 from clench.dataset.shards import Shard
 from clench.dataset.units import Unit
+from clench.execution.formats.exchange import GraspFormat
+from clench.planner.options import GraspKind
 
 JOB = DatasetJob(hands=("robonaut2",), objects=("mug", "ball"), scales=(1.0, 0.5), count=120, unit=50)
 
@@ -182,3 +186,8 @@ def test_slurm_names_the_shard_of_the_command(
 def test_only_datasets_are_merged(folder: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["generate", "--merge", str(tmp_path / folder)]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_choices_of_the_commands_are_the_values_of_the_enumerations() -> None:
+    assert set(generate.Kind.__args__) == set(GraspKind)
+    assert set(exchange.AnyFormat.__args__) == set(GraspFormat) | set(DatasetFormat)

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -214,3 +215,15 @@ def test_parts_of_other_models_are_not_merged(tmp_path: Path) -> None:
 
     with pytest.raises(ClenchError, match="was made from another 'mug' than"):
         generate(JOB, tmp_path, runner=changed)
+
+
+def test_shards_that_begin_at_once_do_not_refuse_each_other(tmp_path: Path) -> None:
+    def begin(path: Path) -> None:
+        folder = DatasetFolder(path, JOB)
+        folder.check()
+        folder.prepare()
+
+    with ThreadPoolExecutor(8) as pool:
+        for number in range(20):
+            list(pool.map(begin, [tmp_path / str(number)] * 8))
+            assert DatasetFolder.open(tmp_path / str(number)).job.hash == JOB.hash

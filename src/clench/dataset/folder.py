@@ -74,8 +74,9 @@ class DatasetFolder:
         check_folder(self.path)
         if not self.path.exists():
             return
-        if not (self.path / JOB_FILE).is_file():
-            first = next((name for name in sorted(os.listdir(self.path)) if not name.startswith(".")), None)
+        names = sorted(os.listdir(self.path))
+        if JOB_FILE not in names:
+            first = next((name for name in names if not name.startswith(".")), None)
             if first is not None:
                 raise FileError(self.path, f"holds other files ('{first}') and no dataset; {_ADVICE}")
             return
@@ -92,14 +93,13 @@ class DatasetFolder:
         Raises:
             FileError: it cannot be written.
         """
-        for folder in (self.path, self.path / "parts", self.path / "manifests"):
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise FileError(folder, f"cannot be made a folder ({error.strerror or error}).") from None
+        _make(self.path)
+        # Before the others: a run that begins at the same time knows the folder by it.
         if not (self.path / JOB_FILE).is_file():
             document = {"schema": JOB_SCHEMA, "clench_version": __version__, "hash": self.job.hash}
             write_json(self.path / JOB_FILE, document | {"job": self.job.document()}, "job")
+        for name in ("parts", "manifests"):
+            _make(self.path / name)
 
     def part(self, key: str) -> Path:
         """Return the file of a unit's part."""
@@ -216,6 +216,13 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise FileError(path, f"cannot be written ({error.strerror or error}).") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(folder, f"cannot be made a folder ({error.strerror or error}).") from None
 
 
 def _document(file: Path, schema: str, advice: str) -> dict[str, Any]:
