@@ -18,8 +18,9 @@ import clench
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
-LAYERS = ["base", "kernels", "models", "grasp", "solver", "execution", "planner", "apps"]
+LAYERS = ["base", "kernels", "models", "grasp", "solver", "execution", "planner", "dataset", "apps"]
 HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
+HEAVY |= {"pyarrow", "h5py", "ray", "torch"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_FILE_LINES = 400

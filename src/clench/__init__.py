@@ -262,6 +262,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "dataset":
+        # A namespace of its own, whose names need packages of extras.
+        return importlib.import_module("clench.dataset")
     if name not in _HOMES:
         raise AttributeError(f"module 'clench' has no attribute {name!r}; it has: {', '.join(__all__)}")
     value = getattr(importlib.import_module(_HOMES[name]), name)

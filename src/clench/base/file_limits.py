@@ -55,3 +55,6 @@ MESH_TRIANGLES: Final = 10_000_000
 COMMAND_ITEMS: Final = 1_000
 #: Sets that the grids of a command make together.
 COMMAND_SETS: Final = 10_000
+
+#: Rows of one group of a Parquet file of grasps.
+DATASET_GROUP_ROWS: Final = 65_536

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from clench.solver.solution import GraspSolution
 from clench.solver.squeezing import SqueezePlan, plan_squeeze
 
 from .confidence import shipped_table
-from .grasp_plan import PlannedGrasp
+from .grasp_plan import PlannedGrasp, UnfinishedGrasp
 from .options import PlanOptions
 from .rejections import Rejection
 from .trials import FRICTION_SHARES, Closer, Trial
@@ -33,12 +34,14 @@ class Finisher:
 
     Args:
         hand, obj, asked: what grasps what, and how. closer: knows the commands.
+        tell: called with every grasp that could not be completed.
     """
 
     hand: Hand
     obj: GraspObject
     asked: PlanOptions
     closer: Closer
+    tell: Callable[[UnfinishedGrasp], None] = field(default=lambda grasp: None)
 
     def __post_init__(self) -> None:
         """Note how contacts are modelled."""
@@ -50,15 +53,21 @@ class Finisher:
         command = replace(self.closer.command(trial.arm), hand_pose=T_world_palm)
         solution = solve(self.hand, self.obj, command)
         squeeze = self._squeeze(solution)
+        preshape = self.closer.shapes[trial.arm.shape].name
+
+        def leave_out(reason: Rejection) -> None:
+            rejected[reason] += 1
+            self.tell(UnfinishedGrasp(solution, command, preshape, trial.kind, trial.number, reason))
+
         if not squeeze.feasible:
-            rejected[Rejection.NO_SQUEEZE] += 1
+            leave_out(Rejection.NO_SQUEEZE)
             return None
         trajectory, pregrasp = None, None
         if self.asked.path:
             try:
                 trajectory = plan_trajectory(solution, self.hand, obj=self.obj)
             except MotionError:
-                rejected[Rejection.NO_WAY] += 1
+                leave_out(Rejection.NO_WAY)
                 return None
             row = trajectory.positions[trajectory.pregrasp if trajectory.pregrasp is not None else 0]
             pregrasp = dict(zip(self.hand.joint_names, row.tolist(), strict=True))
@@ -66,11 +75,10 @@ class Finisher:
         friction: FloatArray = held.contacts.friction
         found = [epsilon(held.with_friction(share * friction)).radius for share in FRICTION_SHARES]
         score = float(np.mean(found))
-        solution = replace(solution, squeeze=squeeze.to_dict(), pregrasp=pregrasp)
         return PlannedGrasp(
-            solution=solution,
+            solution=replace(solution, squeeze=squeeze.to_dict(), pregrasp=pregrasp),
             command=replace(command, planes=GraspCommand.planes),
-            preshape=self.closer.shapes[trial.arm.shape].name,
+            preshape=preshape,
             kind=trial.kind,
             epsilon=found[-1],
             score=score,

@@ -79,6 +79,24 @@ class PlannedGrasp:
 
 
 @dataclass(frozen=True, eq=False)
+class UnfinishedGrasp:
+    """A closed grasp that could not be completed, and why; a plan leaves it out.
+
+    Args:
+        solution: the certified answer, without squeeze and pregrasp.
+        command, preshape, kind, number: see `PlannedGrasp`.
+        reason: why it was left out: no squeeze, or no path.
+    """
+
+    solution: GraspSolution
+    command: GraspCommand
+    preshape: str
+    kind: GraspKind
+    number: int
+    reason: Rejection
+
+
+@dataclass(frozen=True, eq=False)
 class GraspPlan:
     """Grasps of an object, the best ones first, and what became of all proposals.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from bisect import insort
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -22,7 +22,7 @@ from clench.solver.preshapes import Preshape, opposition_zones
 
 from .approach_check import Approach
 from .finishing import Finisher
-from .grasp_plan import GraspPlan, PlannedGrasp
+from .grasp_plan import GraspPlan, PlannedGrasp, UnfinishedGrasp
 from .options import PlanOptions, is_reached
 from .pairs import opposing_pairs
 from .proposals import Arm, Proposals, Proposer
@@ -91,6 +91,10 @@ class GraspSearch:
     def __repr__(self) -> str:
         progress = f"{len(self.found)} of {self.asked.count} grasps, {self.proposed} proposals"
         return described(self, hand=self.hand.name, object=self.obj.name, progress=progress)
+
+    def tell_unfinished(self, tell: Callable[[UnfinishedGrasp], None]) -> None:
+        """Call a function from now on with every grasp that lacks a squeeze or a path, which the plan leaves out."""
+        self._finisher.tell = tell
 
     def plan(self) -> GraspPlan:
         """Return what was found so far, the best grasps first."""

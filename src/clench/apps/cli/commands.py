@@ -14,6 +14,7 @@ from .calibrating import calibrate
 from .command_files import read_command
 from .exchange import export, import_
 from .execute import execute
+from .generate import generate
 from .objects import object_
 from .parsing import as_range
 from .plan_command import plan
@@ -22,6 +23,7 @@ from .scene_options import with_scene
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
     from clench.planner.grasp_plan import GraspPlan
+    from clench.solver.solution import GraspSolution
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
 Source = Literal["engine", "raw", "visual"]
@@ -142,10 +144,7 @@ def solve(
     if json or forces or out is not None or record is not None:
         solution = clench.complete(solution, the_hand, the_object, mass=carried, friction=gripped)
     files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)
-    if record is not None:
-        with clench.Record(record) as recorded:
-            recorded.append(solution)
-        files.append(record)
+    files += [] if record is None else [_recorded(solution, record)]
     error = None
     if pose_error is not None:
         off = pose_error[0], radians(pose_error[1])
@@ -166,6 +165,15 @@ def solve(
         if forces:
             print_forces(solution)
     return exit_code(solution, strict)
+
+
+def _recorded(solution: GraspSolution, path: Path) -> Path:
+    """Append a solution to a record, and return the record's path."""
+    import clench
+
+    with clench.Record(path) as record:
+        record.append(solution)
+    return path
 
 
 def _check_files(out: Path | None, record: Path | None) -> None:
@@ -316,6 +324,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "solve": solve,
     "plan": plan,
     "batch": batch,
+    "generate": generate,
     "hand": hand,
     "object": object_,
     "execute": execute,

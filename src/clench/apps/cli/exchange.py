@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from clench.base.errors import FileError, UnknownNameError
+from clench.base.errors import CommandError, FileError, UnknownNameError
 
 from .parsing import as_range
 
 # The values of `GraspFormat`, written out so that the command line loads without NumPy.
 Format = Literal["isaac_grasp", "dexgraspbench", "moveit_grasp"]
+# The same, and those of `DatasetFormat` besides.
+AnyFormat = Literal["isaac_grasp", "dexgraspbench", "moveit_grasp", "hdf5"]
 
 
 def export(
@@ -18,7 +20,7 @@ def export(
     /,
     *,
     out: Path,
-    format: Format | None = None,
+    format: AnyFormat | None = None,
     hand: str | None = None,
     object: str | None = None,
     hand_file: Path | None = None,
@@ -36,9 +38,11 @@ def export(
 
     Args:
         solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, or batches
-            (.npz) written by `clench batch --out`, of which all poses that are grasps are taken.
-        out: the file; for several grasps in the format dexgraspbench, a folder.
-        format: of the file; by its ending (.yaml, .npy, .json) by default, a folder is dexgraspbench.
+            (.npz) written by `clench batch --out`, of which all poses that are grasps are taken; or one dataset: the
+            folder of `clench generate`, or its grasps.parquet.
+        out: the file; for several grasps in the format dexgraspbench, a folder; of a dataset, a folder or an HDF5 file.
+        format: of the file; by its ending (.yaml, .npy, .json, .h5) by default, a folder is dexgraspbench. hdf5 is for
+            datasets.
         hand: model of the hand; the one that the solutions name by default.
         object: model of the object; the one that the solutions name by default.
         hand_file: TOML file that was used to load the hand.
@@ -60,6 +64,11 @@ def export(
     from .printing import print_exported
     from .results import print_json
 
+    if len(solutions) == 1 and (solutions[0].is_dir() or solutions[0].suffix == ".parquet"):
+        unused = (hand, object, hand_file, palm, scale, root, name, stiffness)
+        return _export_dataset(solutions[0], out, format, any(unused) or hold or bool(mass or friction), json)
+    if format == "hdf5" or out.suffix == ".h5":
+        raise CommandError("hdf5: is for datasets; expected the folder of one, or its grasps.parquet.")
     chosen = format_of(out, format)
     one_each = chosen == "dexgraspbench" and (out.is_dir() or not out.suffix)
     (check_folder if one_each else check_writable)(out)
@@ -94,6 +103,32 @@ def export(
         )
     else:
         print_exported(report, notes)
+    return 0
+
+
+def _export_dataset(source: Path, out: Path, format: AnyFormat | None, more: bool, json: bool) -> int:
+    """Write a dataset in another format, all of it as it was computed."""
+    import clench.dataset
+    from clench.dataset.exporting import DatasetFormat
+
+    from .printing import print_files
+    from .results import print_json
+
+    if more:
+        raise CommandError(
+            "export: a dataset is written as it was computed; leave out all options but --out, --format."
+        )
+    endings = {".h5": "hdf5", ".hdf5": "hdf5"}
+    chosen = DatasetFormat(format) if format in list(DatasetFormat) else endings.get(out.suffix, format)
+    dataset = clench.dataset.open(source)
+    files = clench.dataset.export(dataset, out, chosen or DatasetFormat.DEXGRASPBENCH)
+    if json:
+        listed = [str(file) for file in files]
+        print_json(
+            {"schema": "clench.export/1", "file": str(out), "files": listed, "grasps": len(dataset), "notes": []}
+        )
+    else:
+        print_files([*files[:10]])
     return 0
 
 
