@@ -33,8 +33,12 @@ _PANEL: Final = 400
 _GAP: Final = 22
 _TOP: Final = 78
 _BOTTOM: Final = 96
+#: Part of a panel that the object fills, next to what would fit: axes and scale stay clear of it [-].
+_FILLED: Final = 0.86
+#: How much the light and shade of the object is weakened, so that the heat shows [-].
+_EVEN: Final = 0.5
 #: A contact warms the surface around it: standard deviation [m], and where that ends [m].
-_SPREAD: Final = 5e-3
+_SPREAD: Final = 8e-3
 _END: Final = 3.0 * _SPREAD
 #: Colours of the share of grasps, from none upwards.
 _HEAT: Final = ("#ece5d6", "#f3c98b", style.CONTACT, "#6e1a00")
@@ -46,7 +50,7 @@ _THUMB: Final[dict[str, Any]] = {"marker": "s", "ms": 5.5, "mfc": style.JOINT_CO
 def draw_contacts(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path) -> Path:
     """Write the object from six sides, coloured by the share of the grasps that touch near each place.
 
-    Every contact counts fully where it is, and less around: exp(-d²/2s²) with s = 5 mm. Of several contacts of a grasp
+    Every contact counts fully where it is, and less around: exp(-d²/2s²) with s = 8 mm. Of several contacts of a grasp
     the nearest counts. The other side of a thin wall stays cold.
 
     Args:
@@ -64,7 +68,7 @@ def draw_contacts(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path) -> 
     width, height = 3 * _PANEL + 4 * _GAP, _TOP + 2 * _PANEL + _GAP + _BOTTOM
     figure = style.new_figure(width, height)
     focus = surface.corners.reshape(-1, 3)
-    scale = min(fitted_camera(d, focus, (_PANEL, _PANEL)).scale for d in _sides())
+    scale = _FILLED * min(fitted_camera(d, focus, (_PANEL, _PANEL)).scale for d in _sides())
     cameras = [fitted_camera(d, focus, (2 * _PANEL, 2 * _PANEL), 2.0 * scale) for d in _sides()]
     pictures = [rasterise(surface.corners, camera) for camera in cameras]
     heats = [_heat(p, surface, camera, touches) for p, camera in zip(pictures, cameras, strict=True)]
@@ -81,7 +85,8 @@ def draw_contacts(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path) -> 
         frame_panel(axes)
     scale_bar(figure.axes[0], scale, (_PANEL, _PANEL))
     _explain(figure, hand, obj, len(plan))
-    _color_bar(figure, colors, most)
+    if touches:
+        _color_bar(figure, colors, most)
     return style.save_figure(figure, path)
 
 
@@ -106,8 +111,11 @@ class _Touches:
 
 
 def _sides() -> FloatArray:
-    """Return directions to six viewers, three from above and three from below, shape (6, 3)."""
-    azimuth = 0.5 + np.arange(6) * (2.0 * np.pi / 3.0) + np.repeat([0.0, np.pi / 3.0], 3)
+    """Return directions to six viewers, three from above and three from below, shape (6, 3).
+
+    No two axes of the world fall together: every direction is 15 degrees or more off their planes.
+    """
+    azimuth = 0.262 + np.arange(6) * (2.0 * np.pi / 3.0) + np.repeat([0.0, np.pi / 3.0], 3)
     height = np.repeat([0.55, -0.55], 3)
     level = np.sqrt(1.0 - height**2)
     return np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), height])
@@ -140,7 +148,7 @@ def _heat(picture: Picture, surface: Surface, camera: Camera, touches: Sequence[
 def _painted(picture: Picture, surface: Surface, camera: Camera, colors: FloatArray) -> Image:
     """Return the lit object in colours of its pixels, shape (H, W, 3), with dark lines around it."""
     white = np.ones_like(surface.colors)
-    image = shade(picture, surface.normals, white, camera)
+    image = np.float32(1.0 - _EVEN) * shade(picture, surface.normals, white, camera) + np.float32(_EVEN)
     seen = picture.triangle >= 0
     image[seen] *= colors[seen].astype(np.float32)
     image[borders(picture, surface.groups, 4e-3) & seen] *= np.float32(0.45)
@@ -169,8 +177,12 @@ def _explain(figure: Figure, hand: Hand, obj: GraspObject, count: int) -> None:
     handles += [Line2D([], [], ls="", label="contact of a thumb", **_THUMB)] if has_thumb else []
     handles.append(Line2D([], [], color=style.FAINT, marker=r"$\rightarrow$", ms=12, ls="", label="axes of the world"))
     figure.legend(
-        handles=handles, loc="lower right", bbox_to_anchor=(1.0 - _GAP / width, 30 / height), fontsize=9, frameon=False,
-        ncols=len(handles)
+        handles=handles,
+        loc="lower right",
+        bbox_to_anchor=(1.0 - _GAP / width, 30 / height),
+        fontsize=9,
+        frameon=False,
+        ncols=len(handles),
     )
 
 
@@ -183,7 +195,7 @@ def _color_bar(figure: Figure, colors: Colormap, most: float) -> None:
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 100.0 * most), colors), cax=place, orientation="horizontal")
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=9, color=style.FAINT)
-    bar.set_label("share of the grasps that touch within about 5 mm [%]", fontsize=9.5)
+    bar.set_label("share of the grasps that touch within about 1 cm [%]", fontsize=9.5)
 
 
 def _colors() -> Colormap:

@@ -12,13 +12,21 @@ import numpy as np
 
 from clench.base.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.models.objects.grasp_object import GraspObject
+from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.solve.solution import GraspSolution
 
 from . import style
 from .hand_view import around, focus_of, is_hidden, render
 from .raster import Camera, halved, rasterise
-from .surfaces import OBJECT_COLOR, PALM_COLOR, hand_surface, object_surface, without_forearm
+from .surfaces import (
+    OBJECT_COLOR,
+    OBJECT_GROUP,
+    OBSTACLE_COLOR,
+    PALM_COLOR,
+    hand_surface,
+    object_surface,
+    without_forearm,
+)
 from .views import fitted_camera, frame_panel, scale_bar
 
 if TYPE_CHECKING:
@@ -40,23 +48,21 @@ _COLUMNS: Final = 5
 #: Width of a letter of the text, at most [px].
 _LETTER: Final = 8
 #: Width of the figure at least, for the text above and below the panels, in pixels.
-_NARROWEST: Final = 1240
+_NARROWEST: Final = 1400
 #: How much of the hand shows through the object [-].
 _THROUGH: Final = 0.42
 #: Width of a grid [m] to which surfaces are coarsened while a viewpoint is chosen, and pixels on a side.
 _GRID: Final = 3e-3
 _SMALL: Final = 90
 #: The object is shown as far from the hand as this share of its size [-].
-_NEAR: Final = 0.15
+_NEAR: Final = 0.25
 #: A contact is hidden when all of the surface within so many pixels of its mark lies before it.
 _MARK: Final = 3
-#: What a contact behind the object counts, next to one that is seen; one behind the hand counts nothing [-].
+#: What a contact behind the object counts, next to one that is seen; one behind hand or obstacles counts nothing.
 _BEHIND_OBJECT: Final = 0.6
 
 
-def draw_grasps(
-    plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held: Sequence[bool] | None = None
-) -> Path:
+def draw_grasps(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held: Sequence[bool] | None = None) -> Path:
     """Write a sheet of the best grasps of a plan, at most `MOST_GRASPS`, all at one scale.
 
     Args:
@@ -98,22 +104,29 @@ class _Scene:
         self.body = without_forearm(hand, hand_surface(hand, solution))
         self.things = object_surface(obj, solution)
         self.points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
-        coarse = self.body.coarse(_GRID), self.things.coarse(_GRID)
-        self.focus = focus_of(*coarse, _NEAR)
+        in_the_way = np.isin(self.things.groups, _obstacles(obj))
+        body, grasped = self.body.coarse(_GRID), self.things.taken(~in_the_way).coarse(_GRID)
+        self.focus = focus_of(body, grasped, _NEAR)
+        opaque = np.concatenate([body, self.things.taken(in_the_way).corners])
         cameras = [fitted_camera(d, self.focus, (_SMALL, _SMALL)) for d in around()]
-        best = int(np.argmax([self._score(*coarse, camera) for camera in cameras]))
+        best = int(np.argmax([self._score(opaque, grasped, camera) for camera in cameras]))
         self.towards = around()[best]
         self.scale = fitted_camera(self.towards, self.focus, (_PANEL, _PANEL)).scale
 
-    def _score(self, body: FloatArray, things: FloatArray, camera: Camera) -> float:
+    def _score(self, opaque: FloatArray, grasped: FloatArray, camera: Camera) -> float:
         """Return how well a view shows the contacts: seen, and spread over the picture."""
         if not len(self.points):
             return 0.0
-        by_hand = is_hidden(rasterise(body, camera).nearness, camera, self.points)
-        by_object = is_hidden(rasterise(things, camera).nearness, camera, self.points)
-        seen = np.where(by_hand, 0.0, np.where(by_object, _BEHIND_OBJECT, 1.0))
+        away = is_hidden(rasterise(opaque, camera).nearness, camera, self.points)
+        behind = is_hidden(rasterise(grasped, camera).nearness, camera, self.points)
+        seen = np.where(away, 0.0, np.where(behind, _BEHIND_OBJECT, 1.0))
         spread = float(np.ptp(camera.project(self.points)[:, :2], axis=0).sum()) / camera.width
         return float(seen.mean()) + 0.5 * spread
+
+
+def _obstacles(obj: GraspObject) -> list[int]:
+    """Return the groups of the triangles of obstacles."""
+    return [OBJECT_GROUP + k for k, body in enumerate(obj.bodies) if body.role is BodyRole.OBSTACLE]
 
 
 def _draw_panel(axes: Axes, scene: _Scene, scale: float) -> None:
@@ -158,21 +171,24 @@ def _explain(figure: Figure, hand: Hand, obj: GraspObject, counts: tuple[int, in
     title = f"{hand.name} and {obj.name}: {said}{', the best first' if shown > 1 else ''}"
     style.write(figure, _GAP / width, 1.0 - 14 / height, title, fontsize=14, fontweight="bold", va="top")
     style.write(figure, _GAP / width, 1.0 - 38 / height, "\n".join(text), fontsize=10, va="top", color=style.CHOSEN)
-    _legend(figure, width, height)
+    if shown:
+        _legend(figure, width, height, bool(_obstacles(obj)))
 
 
-def _legend(figure: Figure, width: float, height: float) -> None:
+def _legend(figure: Figure, width: float, height: float, has_obstacles: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     handles: list[Any] = [Patch(facecolor=PALM_COLOR, label="palm and what does not close")]
     for k, name in enumerate(("first", "second", "third")):
         color = style.mixed(style.joint_color(k), style.PAPER, 0.3)
-        handles.append(Patch(facecolor=color, label=f"links after the {name} closing joint"))
+        handles.append(Patch(facecolor=color, label=f"after the {name} closing joint"))
     handles.append(Patch(facecolor=OBJECT_COLOR, label="object"))
+    if has_obstacles:
+        handles.append(Patch(facecolor=OBSTACLE_COLOR, label="obstacle"))
     handles.append(Line2D([], [], color=style.CONTACT, marker="o", ls="", label="contact"))
-    hidden = {"mfc": style.PAPER, "label": "contact, hidden from this side"}
-    handles.append(Line2D([], [], color=style.CONTACT, marker="o", ls="", **hidden))
+    hidden = Line2D([], [], color=style.CONTACT, marker="o", mfc=style.PAPER, ls="", label="hidden contact")
+    handles.append(hidden)
     figure.legend(
         handles=handles,
         loc="lower left",
@@ -181,5 +197,5 @@ def _legend(figure: Figure, width: float, height: float) -> None:
         fontsize=9,
         frameon=False,
         handlelength=1.4,
-        columnspacing=1.6,
+        columnspacing=1.3,
     )

@@ -113,9 +113,7 @@ def is_hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArr
     return result
 
 
-def render(
-    body: Surface, things: Surface, camera: Camera, through: float = _THROUGH
-) -> tuple[Image, FloatArray]:
+def render(body: Surface, things: Surface, camera: Camera, through: float = _THROUGH) -> tuple[Image, FloatArray]:
     """Return the picture, shape (H, W, 3), and the nearness of what is seen [m].
 
     Args:

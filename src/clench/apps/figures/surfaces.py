@@ -24,7 +24,7 @@ MOST_TRIANGLES: Final = 120_000
 MOST_COARSE: Final = 6_000
 #: Round shapes are drawn with facets off by at most this [m].
 _DEVIATION: Final = 5e-5
-_OBSTACLE: Final = "#c4c4c4"
+OBSTACLE_COLOR: Final = "#c4c4c4"
 #: The same while looking for viewpoints [m].
 COARSE: Final = 5e-4
 #: Groups of triangles from this on are bodies of the object, those below are links.
@@ -118,7 +118,7 @@ def placed_object(obj: GraspObject, T: FloatArray, engine: bool = False, deviati
     most = MOST_TRIANGLES if deviation < COARSE else MOST_COARSE
     parts = []
     for number, body in enumerate(obj.bodies):
-        color = _OBSTACLE if body.role is BodyRole.OBSTACLE else OBJECT_COLOR
+        color = OBSTACLE_COLOR if body.role is BodyRole.OBSTACLE else OBJECT_COLOR
         for shape in body.shapes:
             if shape.kind is ShapeKind.MESH and engine and shape.mesh is not None:
                 mesh = convex_hull(shape.mesh).transformed(shape.pose)

@@ -104,7 +104,7 @@ def _draw(axes: Axes, zones: FloatArray, ends: FloatArray, camera: Camera) -> No
         axes.plot(*flat[k].T, "-", color=style.PAPER, lw=2.6, alpha=0.6, solid_capstyle="round")
         axes.plot(*flat[k].T, "-", color=colors[k], lw=1.2, alpha=0.9, solid_capstyle="round")
     for k in np.argsort(middle[:, 2]).tolist():
-        axes.plot(*middle[k, :2], "o", ms=6.5, mfc=colors[k], mec=style.PAPER, mew=0.9)
+        axes.plot(*middle[k, :2], "o", ms=5.5, mfc=colors[k], mec=style.PAPER, mew=0.9)
 
 
 def _explain(figure: Figure, hand: Hand, shapes: tuple[Preshape, ...], count: int) -> None:
@@ -116,7 +116,8 @@ def _explain(figure: Figure, hand: Hand, shapes: tuple[Preshape, ...], count: in
     left = (2 * VIEW[0] + 3 * GAP) / width
     title = f"{hand.name}: where its pads come to face each other"
     style.write(figure, GAP / width, 1.0 - 16 / height, title, fontsize=14, fontweight="bold", va="top")
-    said = f"{count} zones of {len(shapes)} preshapes, on the open hand" if count else "no two pads face each other"
+    said = f"{count} zones of {len(shapes)} preshapes as the fingers close; the hand is drawn open"
+    said = said if count else "no two pads face each other"
     style.write(figure, GAP / width, 1.0 - 44 / height, said, fontsize=10, va="top", color=style.CHOSEN)
     place = figure.add_axes((left, 260 / height, 16 / width, (height - 380) / height))
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1e3 * APERTURES[-1]), _COLORS), cax=place)
