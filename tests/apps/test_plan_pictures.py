@@ -12,7 +12,7 @@ import pytest
 import clench
 from chain_hands import one_link
 from clench.apps.cli.main import main
-from clench.apps.figures import draw_plan, grasp_sheet, style
+from clench.apps.figures import draw_plan, grasp_sheet
 from clench.apps.figures.contact_map import _heat, _sides, _Touches, draw_contacts
 from clench.apps.figures.grasp_sheet import MOST_GRASPS, draw_grasps
 from clench.apps.figures.raster import rasterise
