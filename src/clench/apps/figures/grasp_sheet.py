@@ -47,8 +47,9 @@ _BOTTOM: Final = 44
 _COLUMNS: Final = 5
 #: Width of a letter of the text, at most [px].
 _LETTER: Final = 8
-#: Width of the figure at least, for the text above and below the panels, in pixels.
-_NARROWEST: Final = 1400
+#: Width of the figure at least, for the text above and below the panels, and of a legend in one row, in pixels.
+_NARROWEST: Final = 960
+_LEGEND: Final = 1400
 #: How much of the hand shows through the object [-].
 _THROUGH: Final = 0.42
 #: Width of a grid [m] to which surfaces are coarsened while a viewpoint is chosen, and pixels on a side.
@@ -81,7 +82,7 @@ def draw_grasps(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held:
     width = max(_GAP + columns * (_PANEL + _GAP), _NARROWEST)
     text = textwrap.wrap(plan.text, width // _LETTER)
     top_of_all = _TOP + _LINE * len(text)
-    height = top_of_all + rows * (_PANEL + _CAPTION + _GAP) + _BOTTOM
+    height = top_of_all + rows * (_PANEL + _CAPTION + _GAP) + (_BOTTOM if width >= _LEGEND else _BOTTOM + _LINE)
     figure = style.new_figure(width, height)
     scenes = [_Scene(hand, obj, grasp.solution) for grasp in shown]
     scale = min((scene.scale for scene in scenes), default=1.0)
@@ -193,7 +194,7 @@ def _legend(figure: Figure, width: float, height: float, has_obstacles: bool) ->
         handles=handles,
         loc="lower left",
         bbox_to_anchor=((_GAP - 8) / width, 4 / height),
-        ncols=len(handles),
+        ncols=len(handles) if width >= _LEGEND else math.ceil(len(handles) / 2),
         fontsize=9,
         frameon=False,
         handlelength=1.4,
