@@ -41,12 +41,14 @@ def run(capsys: pytest.CaptureFixture[str], *options: str) -> dict[str, object]:
 
 def test_the_best_of_a_few_hold_and_the_table_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     files = ("--table", str(tmp_path / "table.md"), "--trials", str(tmp_path / "trials.json"))
-    options = ("--poses", "12", "--best", "1", "--others", "1", *files)
+    options = ("--proposals", "64", "--best", "1", "--others", "1", *files)
     found = run(capsys, *options)
     case = {key.removeprefix("robonaut2.ball."): value for key, value in found.items() if key.startswith("robonaut2.")}
     assert (case["tried"], case["held"], case["held_5mm_5deg"]) == (1, 1, 1)
     assert case["held_interval"] == "21-100 %"
-    assert sum(int(str(n)) for key, n in case.items() if key.startswith("sampled_")) == 12
+    assert case["proposed"] == 64
+    assert 0 < int(str(case["force_closed"])) <= int(str(case["closed"])) <= 64
+    assert (case["grasps"], case["score_trials"]) == (3, 2)
     assert float(str(case["closing_motion_max_mm"])) < 0.5
     assert float(str(case["touch_spread_max_ms"])) <= 5.0
     assert float(str(case["penetration_max_um"])) <= 10.0
@@ -64,7 +66,7 @@ def test_the_best_of_a_few_hold_and_the_table_says_so(capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--poses", "0"], "--poses: expected at least 1, got 0"),
+        (["--proposals", "0"], "--proposals: expected at least 1, got 0"),
         (["--best", "0"], "--best: expected at least 1"),
         (["--others", "-1"], "--others: expected at least 0"),
         (["--mass", "-1"], "hold: mass: expected a finite number of at least 0.001 kg, got -1.0"),

@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 from six_directions import Settings, holds, read_grasp
 
 import clench
-from clench.apps.bench.sampling import sample_grasps
 from clench.apps.cli.main import main
 from clench.base.errors import CommandError, UnknownNameError
 from clench.models.hand.hand import Hand
@@ -319,21 +318,21 @@ def test_exported_grasps_hold_in_six_directions(shared_data: Path, tmp_path: Pat
     file = shared_data / "hands" / "shadow_hand_mjcf" / "right_hand.xml"
     hand, box = clench.Hand.load(file), clench.GraspObject.load("box:x=0.05,y=0.06,z=0.1")
     geoms = [{"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [0.025, 0.03, 0.05]}]
-    best = sample_grasps(hand, box, 60, (3, 0), 0, 0.6, lambda: None).grasps[:3]
-    clench.export_grasps(tmp_path, [g.solution for g in best], hand=hand, obj=box, stiffness=stiffness)
+    best = clench.plan_grasps(hand, box, 3, most=120, path=False)
+    clench.export_grasps(tmp_path, [planned.solution for planned in best], hand=hand, obj=box, stiffness=stiffness)
     test = Settings(kp=stiffness)
     grasps = [read_grasp(tmp_path / f"grasp_{i}.npy") for i in range(3)]
     assert all(holds(grasp, file, geoms, test) for grasp in grasps)
-    for grasp, graded in zip(grasps, best, strict=True):
+    for grasp, planned in zip(grasps, best, strict=True):
         moved = dict(zip(grasp["joint_names"], (grasp["squeeze_qpos"] - grasp["grasp_qpos"])[7:], strict=True))
-        torques = clench.plan_squeeze(graded.solution, hand, box, gravity=None).torques
+        torques = clench.plan_squeeze(planned.solution, hand, box, gravity=None).torques
         assert all(moved[name] != 0.0 for name, torque in torques.items() if abs(torque) > 1e-9)
         assert {"rh_FFJ1", "rh_FFJ2"} <= set(moved)
-    palm = graded.solution.hand_pose
+    palm = planned.solution.hand_pose
     wrong = {key: np.array([*palm.position, *palm.wxyz, *grasp[key][7:]]) for key in grasp if key.endswith("_qpos")}
     assert not holds(grasp | wrong, file, geoms, test)
     assert not holds(grasp | {"squeeze_qpos": grasp["grasp_qpos"]}, file, geoms, test)
-    wrist = clench.export_grasps(tmp_path / "w.npy", graded.solution, hand=hand, obj=box, root="rh_wrist")
+    wrist = clench.export_grasps(tmp_path / "w.npy", planned.solution, hand=hand, obj=box, root="rh_wrist")
     assert not wrist.notes or "obj_path" in wrist.notes[0]
     assert len(read_grasp(tmp_path / "w.npy")["grasp_qpos"]) == 7 + 23
 

@@ -1,4 +1,4 @@
-"""The benchmark of holding: the best of many grasps by our own criteria, tried in simulation."""
+"""The benchmark of holding: the best grasps of a plan, tried in simulation."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ from clench.grasp.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table
+from clench.planner.grasp_plan import GraspPlan
 
 from .proportions import roc_auc, wilson
 from .report import BenchReport, Value, describe_place
-from .sampling import SOLVED, sample_grasps
 from .trying import Trial, try_grasp
+
+#: Of the planned grasps that are not the best, one of so many is tried.
+SPREAD = 2
 
 #: Stricter limits on the object's motion: name, distance [m], angle [rad].
 STRICT = (("10mm_5deg", 0.01, float(np.deg2rad(5.0))), ("5mm_5deg", 0.005, float(np.deg2rad(5.0))))
@@ -51,15 +54,20 @@ class HoldBench:
     """Say what is tried.
 
     Args:
-        poses: approaches per hand and object. best: of them by score are tried. others: tried besides, over all
-            scores, to judge the score. seed: of the approaches. hold: the test.
+        proposals: of the planner per hand and object. best: grasps by score that are tried. others: tried besides,
+            over all scores, to judge the score. seed: of the planner. hold: the test.
     """
 
-    poses: int
+    proposals: int
     best: int
     others: int
     seed: int
     hold: Hold
+
+    @property
+    def planned(self) -> int:
+        """How many grasps are planned."""
+        return self.best + SPREAD * self.others
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,7 @@ class HoldFiles:
 def bench_hold(
     hands: Sequence[str], objects: Sequence[str], scale: float, asked: HoldBench, files: HoldFiles, show_progress: bool
 ) -> BenchReport:
-    """Sample, select and try grasps for every hand and object.
+    """Plan and try grasps for every hand and object.
 
     Args:
         hands, objects: models. scale: of the objects. asked: what is tried. files: where it is written.
@@ -109,7 +117,7 @@ def _label(model: str) -> str:
 
 
 def _work(asked: HoldBench) -> int:
-    return asked.poses + (SOLVED + 1) * asked.best + 3 * asked.others
+    return asked.planned + asked.best + asked.others
 
 
 def _case(
@@ -118,17 +126,36 @@ def _case(
     """Return the trials of one hand and one object, and what came of them, flat."""
     if asked.hold.test == HoldTest.LIFT:
         obj = obj.with_body(table(lowest(obj)))
-    sampled = sample_grasps(hand, obj, asked.poses, (asked.best, asked.others), asked.seed, asked.hold.friction, tick)
-    best, rest = sampled.grasps[: asked.best], sampled.grasps[asked.best :]
-    step = max(1, len(rest) // asked.others) if asked.others else 1
-    others = rest[::-1][::step][: asked.others]
+    plan = _plan(hand, obj, asked, tick)
+    best, rest = plan.grasps[: asked.best], plan.grasps[asked.best :]
+    others = rest[::-SPREAD][: asked.others]
     trials = []
-    for number, graded in enumerate([*best, *others]):
-        trials.append(try_grasp(graded.solution, graded.score, hand, obj, asked.hold, harder=number < len(best)))
+    for number, grasp in enumerate([*best, *others]):
+        trials.append(try_grasp(grasp.solution, grasp.score, hand, obj, asked.hold, harder=number < len(best)))
         tick()
-    values: dict[str, Value] = dict(sorted(sampled.kinds.items()))
-    values["grasps"] = len(sampled.grasps)
+    values: dict[str, Value] = {"proposed": plan.proposed, "closed": plan.closed, "force_closed": plan.force_closed}
+    values |= {f"rejected_{reason.replace(' ', '_')}": n for reason, n in sorted(plan.rejected.items()) if n}
+    values["grasps"] = len(plan)
     return trials, values | _of_best(trials[: len(best)]) | _of_score(trials)
+
+
+def _plan(hand: Hand, obj: GraspObject, asked: HoldBench, tick: Callable[[], None]) -> GraspPlan:
+    """Plan for the mass and the friction of the test; the weight alone has to be held where it lifts."""
+    search = clench.iter_grasps(
+        hand,
+        obj,
+        asked.planned,
+        friction=asked.hold.friction,
+        mass=asked.hold.mass,
+        gravity=(0.0, 0.0, -1.0) if asked.hold.test == HoldTest.LIFT else None,
+        effort=max(1, asked.proposals // asked.planned),
+        most=asked.proposals,
+        seed=asked.seed,
+        path=False,
+    )
+    for _ in search:
+        tick()
+    return search.plan()
 
 
 def _of_best(trials: Sequence[Trial]) -> dict[str, Value]:

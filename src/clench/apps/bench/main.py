@@ -290,7 +290,7 @@ def hold(
     hand: tuple[str, ...] = ("robonaut2",),
     object: tuple[str, ...] = ("ball", "bottle"),
     scale: float = 1.0,
-    poses: int = 100,
+    proposals: int = 200,
     best: int = 5,
     others: int = 5,
     test: Literal["pulls", "lift"] = "pulls",
@@ -301,19 +301,19 @@ def hold(
     trials: Path | None = None,
     json: bool = False,
 ) -> int:
-    """Select the best of many grasps by our own criteria, and see in simulation whether they hold.
+    """Plan grasps, and see in simulation whether the best ones hold.
 
     Args:
         hand: built-in names, or paths to .urdf or .xml files.
         object: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
         scale: multiplies the objects' lengths, e.g. 0.001 for meshes in millimetres.
-        poses: approach poses per hand and object.
+        proposals: of the planner per hand and object.
         best: how many of the grasps are tried, the best by score.
         others: grasps over all scores that are tried besides, to see what the score is worth.
         test: pull in six directions without gravity, or lift from a table.
         mass: of the object, kg.
         friction: of its contacts.
-        seed: of the approach poses.
+        seed: of the planner.
         table: file for a table (Markdown).
         trials: file for every grasp that was tried, with its reports (JSON).
         json: print one JSON document on standard output.
@@ -322,11 +322,11 @@ def hold(
 
     from .holding import HoldBench, HoldFiles, bench_hold
 
-    for key, count, least in (("poses", poses, 1), ("best", best, 1), ("others", others, 0), ("seed", seed, 0)):
+    for key, count, least in (("proposals", proposals, 1), ("best", best, 1), ("others", others, 0), ("seed", seed, 0)):
         if count < least:
             raise CommandError(f"--{key}: expected at least {least}, got {count}.")
     _writable(table, trials)
-    asked = HoldBench(poses, best, others, seed, Hold(mass=mass, friction=friction, test=test))
+    asked = HoldBench(proposals, best, others, seed, Hold(mass=mass, friction=friction, test=test))
     return _print(bench_hold(hand, object, scale, asked, HoldFiles(table, trials), show_progress=not json), json)
 
 

@@ -51,7 +51,7 @@ class Trial:
     """Hold what came of a grasp.
 
     Args:
-        solution: the grasp. grasp_kind: by the links that touch. score: our own, see `GradedGrasp`.
+        solution: the grasp. grasp_kind: by the links that touch. score: our own, see `PlannedGrasp`.
         simultaneous: a way is known on which all contacts are reached at once.
         measures: at the grasp's posture. report: at the settings asked for. harder: held under other ones, by name.
     """

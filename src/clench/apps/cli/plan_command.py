@@ -76,7 +76,8 @@ def plan(
         threads: how many are used; all cores by default.
         without_path: leave out the free paths, which take longest.
         hold: try every grasp in simulation: close on the free object, squeeze, pull in six directions (docs/hold.md).
-        out: folder for plan.json, the solution and trajectory of every grasp, and a picture of all of them.
+        out: folder for plan.json, the solution and trajectory of every grasp, and pictures: the best grasps, where
+            all of them touch the object, and the zones in which the hand grasps.
         json: print one JSON document on standard output.
     """
     from math import radians
@@ -125,6 +126,10 @@ def plan(
     for entry, report in zip(document["grasps"], held, strict=False):
         entry["hold"] = report.to_dict()
     files = [] if out is None else _write(found, document, out)
+    if out is not None:
+        from clench.apps.figures import draw_plan
+
+        files += draw_plan(found, the_hand, the_object, out, [report.held for report in held] if hold else None)
     if json:
         print_json(document)
     else:

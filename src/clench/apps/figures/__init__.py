@@ -1,8 +1,9 @@
-"""Pictures of a solution, for people who have not read the source: PNG files, made without a screen."""
+"""Pictures of solutions, plans and hands, for people who have not read the source: PNG files, made without a screen."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,10 @@ if TYPE_CHECKING:
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
+    from clench.planner.grasp_plan import GraspPlan
     from clench.solver.solution import GraspSolution
 
-__all__ = ["draw_solution"]
+__all__ = ["draw_plan", "draw_solution"]
 
 
 def draw_solution(
@@ -51,3 +53,31 @@ def draw_solution(
         files.append(draw_sets(scenes, result, hand.name, obj.name, folder / f"{stem}_sets.png"))
     files.append(draw_hand(hand, obj, solution, folder / "grasp.png"))
     return files
+
+
+def draw_plan(
+    plan: GraspPlan, hand: Hand, obj: GraspObject, directory: str | Path, held: Sequence[bool] | None = None
+) -> list[Path]:
+    """Draw the best grasps of a plan, where all of them touch the object, and the opposition zones of the hand.
+
+    Args:
+        plan: the grasps. hand, obj: what was planned for.
+        directory: an existing folder; `grasps.png`, `contacts.png` and `zones.png` are written there.
+        held: whether each grasp held the object when it was tried; None: not tried.
+
+    Returns:
+        the files written.
+
+    Raises:
+        FileError: a file cannot be written.
+    """
+    from .contact_map import draw_contacts
+    from .grasp_sheet import draw_grasps
+    from .zone_map import draw_zones
+
+    folder = Path(directory)
+    return [
+        draw_grasps(plan, hand, obj, folder / "grasps.png", held),
+        draw_contacts(plan, hand, obj, folder / "contacts.png"),
+        draw_zones(hand, folder / "zones.png"),
+    ]

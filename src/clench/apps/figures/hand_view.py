@@ -36,11 +36,12 @@ def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path)
     body, things = hand_surface(hand, solution), object_surface(obj, solution)
     figure, views = two_views(_TEXT)
     coarse = (hand_surface(hand, solution, COARSE).corners, object_surface(obj, solution, COARSE).corners)
-    focus = _focus(*coarse)
+    focus = focus_of(*coarse)
     directions = viewpoints(*coarse, focus, solution)
     scale = min(fitted_camera(d, focus, VIEW).scale for d in directions)
     for axes, direction in zip(views, directions, strict=True):
-        image, nearness = render(body, things, fitted_camera(direction, focus, (2 * VIEW[0], 2 * VIEW[1]), 2.0 * scale))
+        double = fitted_camera(direction, focus, (2 * VIEW[0], 2 * VIEW[1]), 2.0 * scale)
+        image, nearness = render(body, things, double)
         axes.imshow(halved(image), extent=(0, VIEW[0], VIEW[1], 0), interpolation="nearest")
         camera = fitted_camera(direction, focus, VIEW, scale)
         _mark(axes, camera, nearness[::2, ::2], solution.contacts)
@@ -53,15 +54,19 @@ def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path)
     return style.save_figure(figure, path)
 
 
-def _focus(body: FloatArray, things: FloatArray) -> FloatArray:
-    """Return the points that must be seen: the hand, and the object as far as it is near the hand, shape (N, 3)."""
+def focus_of(body: FloatArray, things: FloatArray, near: float = 0.5) -> FloatArray:
+    """Return the points that must be seen: the hand, and the object as far as it is near the hand, shape (N, 3).
+
+    Args:
+        body, things: corners of hand and object [m]. near: how far from the hand, as a share of its size [-].
+    """
     hand, others = body.reshape(-1, 3), things.reshape(-1, 3)
     if not len(hand) or not len(others):
         return hand if len(hand) else others
     low, high = hand.min(axis=0), hand.max(axis=0)
-    reach = 0.5 * float((high - low).max())
-    near = ((others >= low - reach) & (others <= high + reach)).all(axis=1)
-    return np.concatenate([hand, others[near]])
+    reach = near * float((high - low).max())
+    seen = ((others >= low - reach) & (others <= high + reach)).all(axis=1)
+    return np.concatenate([hand, others[seen]])
 
 
 def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution: GraspSolution) -> list[FloatArray]:
@@ -70,10 +75,7 @@ def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution
     Args:
         body, things: corners of hand and object [m], shape (T, 3, 3). focus: points that must be seen, shape (N, 3).
     """
-    azimuth = 0.2 + np.arange(16) * (np.pi / 8.0)  # off the diagonals, where two world axes would coincide
-    heights = np.array([0.3, 0.7, 0.0, -0.4])[np.arange(16) % 4]
-    level = np.sqrt(1.0 - heights**2)
-    directions = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
+    directions = around()
     points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
     corners = np.concatenate([body, things])
     scores = np.array([_score(corners, len(body), fitted_camera(d, focus, (140, 140)), points) for d in directions])
@@ -83,18 +85,26 @@ def viewpoints(body: FloatArray, things: FloatArray, focus: FloatArray, solution
     return [directions[first], directions[second]]
 
 
+def around() -> FloatArray:
+    """Return directions to viewers all around, from above and from below, unit vectors of shape (16, 3)."""
+    azimuth = 0.2 + np.arange(16) * (np.pi / 8.0)  # off the diagonals, where two world axes would coincide
+    heights = np.array([0.3, 0.7, 0.0, -0.4])[np.arange(16) % 4]
+    level = np.sqrt(1.0 - heights**2)
+    return np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), heights])
+
+
 def _score(corners: FloatArray, hand: int, camera: Camera, points: FloatArray) -> float:
     """Return how well a view shows a grasp: share of contacts not hidden, their spread, share of the object in it."""
     picture = rasterise(corners, camera)
     seen = int(np.count_nonzero(picture.triangle >= 0))
     score = int(np.count_nonzero(picture.triangle >= hand)) / max(seen, 1)
     if len(points):
-        score += float((~_hidden(picture.nearness, camera, points)).mean())
+        score += float((~is_hidden(picture.nearness, camera, points)).mean())
         score += float(np.ptp(camera.project(points)[:, :2], axis=0).sum()) / camera.width
     return score
 
 
-def _hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray[np.bool_]:
+def is_hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray[np.bool_]:
     """Say which points lie behind what is seen at their pixel, shape (N,)."""
     p = camera.project(points)
     column = np.clip(p[:, 0].astype(np.int64), 0, camera.width - 1)
@@ -103,15 +113,19 @@ def _hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray
     return result
 
 
-def render(body: Surface, things: Surface, camera: Camera) -> tuple[Image, FloatArray]:
-    """Return the picture, shape (H, W, 3), and the nearness of what is seen [m]; the hand shows through the object."""
+def render(body: Surface, things: Surface, camera: Camera, through: float = _THROUGH) -> tuple[Image, FloatArray]:
+    """Return the picture, shape (H, W, 3), and the nearness of what is seen [m].
+
+    Args:
+        body, things: hand and object. camera: see `Camera`. through: how much the hand shows through the object [-].
+    """
     front, back = rasterise(things.corners, camera), rasterise(body.corners, camera)
     image = lit(back, body, camera)
     over = lit(front, things, camera)
     alone = (front.triangle >= 0) & (back.triangle < 0)
     covered = (front.nearness > back.nearness) & (back.triangle >= 0)
     image[alone] = over[alone]
-    image[covered] = (1.0 - _THROUGH) * over[covered] + _THROUGH * image[covered]
+    image[covered] = (1.0 - through) * over[covered] + through * image[covered]
     return image, np.maximum(front.nearness, back.nearness)
 
 
@@ -121,7 +135,7 @@ def _mark(axes: Axes, camera: Camera, nearness: FloatArray, contacts: Sequence[C
         return
     points = np.array([c.position for c in contacts])
     normals = np.array([c.normal for c in contacts])
-    hidden = _hidden(nearness, camera, points)
+    hidden = is_hidden(nearness, camera, points)
     p = camera.project(points)[:, :2]
     tips = camera.project(points + _ARROW * normals)[:, :2]
     for k, (x, y) in enumerate(p):

@@ -24,9 +24,11 @@ MOST_TRIANGLES: Final = 120_000
 MOST_COARSE: Final = 6_000
 #: Round shapes are drawn with facets off by at most this [m].
 _DEVIATION: Final = 5e-5
-_OBSTACLE: Final = "#c4c4c4"
+OBSTACLE_COLOR: Final = "#c4c4c4"
 #: The same while looking for viewpoints [m].
 COARSE: Final = 5e-4
+#: Groups of triangles from this on are bodies of the object, those below are links.
+OBJECT_GROUP: Final = 10_000
 OBJECT_COLOR: Final = "#e3cf92"
 PALM_COLOR: Final = "#a9b0b7"
 
@@ -44,6 +46,18 @@ class Surface:
     normals: FloatArray
     colors: FloatArray
     groups: NDArray[np.int64]
+
+    def taken(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Surface:
+        """Return some of the triangles."""
+        return Surface(self.corners[rows], self.normals[rows], self.colors[rows], self.groups[rows])
+
+    def coarse(self, cell: float) -> FloatArray:
+        """Return corners of fewer triangles, moved to the points of a grid of this width [m], shape (T, 3, 3)."""
+        cells = np.round(self.corners / cell).astype(np.int64)
+        a, b, c = cells.transpose(1, 0, 2)
+        proper = (a != b).any(axis=1) & (b != c).any(axis=1) & (c != a).any(axis=1)
+        found: FloatArray = np.unique(cells[proper].reshape(-1, 9), axis=0).reshape(-1, 3, 3) * cell
+        return found
 
 
 def hand_surface(hand: Hand, solution: GraspSolution, deviation: float = _DEVIATION) -> Surface:
@@ -65,6 +79,14 @@ def posed_surface(
     return _surface(parts)
 
 
+def without_forearm(hand: Hand, surface: Surface) -> Surface:
+    """Return the triangles of the palm and of everything that the palm carries, of a surface of the hand."""
+    carried = [False] * len(hand.links)
+    for i, link in enumerate(hand.links):  # parents come first
+        carried[i] = i == hand.palm or (link.parent >= 0 and carried[link.parent])
+    return surface.taken(np.array(carried)[surface.groups])
+
+
 def link_colors(hand: Hand) -> list[str]:
     """Return the colour of every link: of the closing joint that moves it, as in the planar figures, or grey."""
     colors = [PALM_COLOR] * len(hand.links)
@@ -82,20 +104,27 @@ def link_colors(hand: Hand) -> list[str]:
 
 def object_surface(obj: GraspObject, solution: GraspSolution, deviation: float = _DEVIATION) -> Surface:
     """Return the geometry of the object and its obstacles where the solution has it."""
+    engine = solution.object_collision_source == CollisionSource.ENGINE.value
+    return placed_object(obj, solution.object_pose.matrix, engine, deviation)
+
+
+def placed_object(obj: GraspObject, T: FloatArray, engine: bool = False, deviation: float = _DEVIATION) -> Surface:
+    """Return the geometry of an object and its obstacles at a pose, shape (4, 4); meshes as their hulls for an engine.
+
+    The groups of its triangles are `OBJECT_GROUP` and the number of the body.
+    """
     from clench.models.tessellation import convex_hull
 
-    T = solution.object_pose.matrix
-    engine = solution.object_collision_source == CollisionSource.ENGINE.value
     most = MOST_TRIANGLES if deviation < COARSE else MOST_COARSE
     parts = []
     for number, body in enumerate(obj.bodies):
-        color = _OBSTACLE if body.role is BodyRole.OBSTACLE else OBJECT_COLOR
+        color = OBSTACLE_COLOR if body.role is BodyRole.OBSTACLE else OBJECT_COLOR
         for shape in body.shapes:
             if shape.kind is ShapeKind.MESH and engine and shape.mesh is not None:
                 mesh = convex_hull(shape.mesh).transformed(shape.pose)
             else:
                 mesh = shape.to_mesh(deviation)
-            parts.append((_placed(thinned(mesh, most), T), color, 10_000 + number))
+            parts.append((_placed(thinned(mesh, most), T), color, OBJECT_GROUP + number))
     return _surface(parts)
 
 

@@ -72,9 +72,9 @@ def lit(picture: Picture, surface: Surface, camera: Camera) -> Image:
     return image
 
 
-def frame_axes(axes: Axes, camera: Camera) -> None:
-    """Draw the directions of the axes of the frame of what is drawn in the lower left corner."""
-    origin = np.array([46.0, VIEW[1] - 46.0])
+def frame_axes(axes: Axes, camera: Camera, height: int = VIEW[1]) -> None:
+    """Draw the directions of the axes of the frame of what is drawn in the lower left corner of so high a view."""
+    origin = np.array([46.0, height - 46.0])
     for name, axis in zip("xyz", np.eye(3), strict=True):
         step = 32.0 * np.array([axis @ camera.right, -(axis @ camera.up)])
         if np.linalg.norm(step) < 14.0:
@@ -85,10 +85,24 @@ def frame_axes(axes: Axes, camera: Camera) -> None:
         style.write(axes, place[0], place[1], name, fontsize=9, color=style.FAINT, ha="center", va="center")
 
 
-def scale_bar(axes: Axes, scale: float) -> None:
-    """Draw a bar of a round number of millimetres in the lower right corner; `scale` in pixels per metre."""
-    length = next(mm for mm in (200, 100, 50, 20, 10, 5, 2, 1) if mm * 1e-3 * scale < 0.3 * VIEW[0] or mm == 1)
-    right, row = VIEW[0] - 20.0, VIEW[1] - 18.0
+def scale_bar(axes: Axes, scale: float, size: tuple[int, int] = VIEW) -> None:
+    """Draw a bar of a round number of millimetres in the lower right corner of a view.
+
+    Args:
+        axes: of the view. scale: pixels per metre. size: of the view in pixels.
+    """
+    length = next(mm for mm in (200, 100, 50, 20, 10, 5, 2, 1) if mm * 1e-3 * scale < 0.3 * size[0] or mm == 1)
+    right, row = size[0] - 20.0, size[1] - 18.0
     left = right - length * 1e-3 * scale
     axes.plot([left, right], [row, row], "-", color=style.INK, lw=2.5, solid_capstyle="butt")
     style.write(axes, 0.5 * (left + right), row - 8.0, f"{length} mm", fontsize=9, ha="center")
+
+
+def frame_panel(axes: Axes) -> None:
+    """Replace the ticks and spines of a panel by a thin border."""
+    from matplotlib.patches import Rectangle
+
+    axes.set_axis_off()
+    border = Rectangle((0, 0), 1, 1, transform=axes.transAxes, fill=False, edgecolor="#cccccc", linewidth=1.0)
+    border.set_clip_on(False)
+    axes.add_artist(border)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -21,8 +20,6 @@ _CLOSED = (0.0, 0.2, 0.4, 0.6, 0.8)
 _TOWARDS = 0.2
 #: Tips that move less have no direction [m/rad].
 _STILL = 1e-6
-#: Draws per preshape that is kept.
-_DRAWS = 8
 
 
 def check_thumbs(hand: Hand) -> list[Finding]:
@@ -36,34 +33,6 @@ def check_thumbs(hand: Hand) -> list[Finding]:
         if best < _TOWARDS:
             found.append(_opposes_nothing(hand, thumb, [f.name for f in others], best))
     return found
-
-
-def opposing_preshapes(hand: Hand, count: int, seed: int) -> list[dict[str, float]]:
-    """Draw preshapes in which the thumb opposes the fingers; the open hand, without any, comes first.
-
-    The thumb's posture joints are drawn over their ranges; of many draws those are kept in which the tips of thumb and
-    fingers close towards each other most, summed over the fingers.
-
-    Args:
-        hand: the hand. count: how many. seed: the same seed gives the same preshapes.
-
-    Returns:
-        angles of the thumb's posture joints [rad] by name; only the open hand's where no thumb can be turned.
-    """
-    thumbs = [finger for finger in hand.fingers if finger.is_thumb]
-    turned = [j for thumb in thumbs for j in thumb.joints if hand.joints[j].role is not JointRole.CLOSING]
-    turned = [j for j in turned if hand.joints[j].upper > hand.joints[j].lower]
-    if not turned or count <= 1:
-        return [dict[str, float]()][:count]
-    others = [_tips(hand, finger) for finger in hand.fingers if not finger.is_thumb]
-    rng = np.random.default_rng(seed)
-    draws = []
-    for _ in range(_DRAWS * count):
-        drawn = {hand.joints[j].name: float(rng.uniform(hand.joints[j].lower, hand.joints[j].upper)) for j in turned}
-        own = [_tips(hand, thumb, drawn) for thumb in thumbs]
-        draws.append((sum(max(0.0, _best_opposition(tip, other)) for tip in own for other in others), drawn))
-    draws.sort(key=lambda scored: -scored[0])
-    return [{}, *(drawn for _, drawn in draws[: count - 1])]
 
 
 def _opposes_nothing(hand: Hand, thumb: Finger, others: list[str], best: float) -> Finding:
@@ -81,18 +50,14 @@ def _opposes_nothing(hand: Hand, thumb: Finger, others: list[str], best: float) 
     )
 
 
-def _tips(hand: Hand, finger: Finger, given: Mapping[str, float] | None = None) -> tuple[FloatArray, FloatArray]:
-    """Return where the tip gets over postures and closings [m], and the unit directions in which it moves, (N, 3).
-
-    Args:
-        hand, finger: what moves. given: angles of posture joints [rad] instead of all that are tried.
-    """
+def _tips(hand: Hand, finger: Finger) -> tuple[FloatArray, FloatArray]:
+    """Return where the tip gets over postures and closings [m], and the unit directions in which it moves, (N, 3)."""
     own = [hand.joints[j] for j in finger.joints]
     posture = [k for k, j in enumerate(own) if j.role is not JointRole.CLOSING and j.upper > j.lower]
     rates = np.array([j.direction if j.role is JointRole.CLOSING else 0.0 for j in own], dtype=np.float64)
     places, ways = [], []
     tried = itertools.product(*(np.linspace(own[k].lower, own[k].upper, _POSTURES) for k in posture))
-    for angles in tried if given is None else [tuple(given[own[k].name] for k in posture)]:
+    for angles in tried:
         for share in _CLOSED:
             q = hand.open_angles()
             for j, joint in zip(finger.joints, own, strict=True):
