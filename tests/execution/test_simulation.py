@@ -11,6 +11,7 @@ import pytest
 
 from clench.base.errors import CommandError, HandError, ObjectError
 from clench.base.pose import Pose
+from clench.execution import convex_pieces as convex_pieces_module
 from clench.execution.convex_pieces import convex_pieces
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
@@ -234,16 +235,16 @@ def test_meshes_become_convex_pieces(pincer: Hand, pinch: GraspSolution, own_cac
 def quick_decomposition(calls: list[int]):
     """Stand in for CoACD, which takes seconds: the two boxes of the L."""
 
-    def run(*_: object, **__: object) -> list[tuple[np.ndarray, np.ndarray]]:
+    def run(*_: object) -> tuple[np.ndarray, ...]:
         calls.append(1)
-        return [(angle_table().vertices[:8], np.empty((0, 3))), (angle_table().vertices[8:], np.empty((0, 3)))]
+        return angle_table().vertices[:8], angle_table().vertices[8:]
 
     return run
 
 
 def test_pieces_come_from_the_cache_unless_it_is_damaged(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
-    monkeypatch.setattr("coacd.run_coacd", quick_decomposition(calls))
+    monkeypatch.setattr(convex_pieces_module, "decompose", quick_decomposition(calls))
     mesh = angle_table()
     pieces = convex_pieces(mesh, "part")
     again = convex_pieces(mesh, "part")
@@ -261,7 +262,7 @@ def test_pieces_come_from_the_cache_unless_it_is_damaged(own_cache: Path, monkey
 
 
 def test_a_cache_that_cannot_be_written_costs_nothing_but_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("coacd.run_coacd", quick_decomposition([]))
+    monkeypatch.setattr(convex_pieces_module, "decompose", quick_decomposition([]))
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("CLENCH_CACHE_DIR", str(tmp_path / "file"))
     assert len(convex_pieces(angle_table(), "part")) == 2

@@ -21,6 +21,8 @@ from clench.models.objects.loading import in_source
 from clench.models.shapes import CollisionSource, ShapeKind
 from clench.models.tessellation import convex_hull
 
+from .decomposing import decompose
+
 #: A mesh whose volume misses its hull's by less than this fraction is convex [-].
 CONVEX_FRACTION = 1e-4
 #: Settings of the decomposition: largest concavity of a piece as a fraction of the mesh's size, then effort.
@@ -44,7 +46,7 @@ def convex_pieces(mesh: TriangleMesh, name: str, *, show_progress: bool = False)
     in the cache folder under the hash of the geometry.
 
     Raises:
-        ObjectError: the mesh is flat, so that no solid piece exists.
+        ObjectError: the mesh is flat, so that no solid piece exists, or CoACD gives no answer.
     """
     hull, share = hull_of(mesh.vertices, name), _volume(mesh)
     if abs(share - hull[1]) <= CONVEX_FRACTION * hull[1]:
@@ -105,21 +107,15 @@ def _volume(mesh: TriangleMesh) -> float:
 
 
 def _decomposed(mesh: TriangleMesh, name: str, show_progress: bool) -> tuple[FloatArray, ...]:
-    import coacd
+    if not show_progress:
+        return decompose(mesh, name, SETTINGS)
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    coacd.set_log_level("error")
-    model = coacd.Mesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
-    if show_progress:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-            progress.add_task(f"Convex pieces of '{name}' (kept for the next time)", total=None)
-            parts = coacd.run_coacd(model, **SETTINGS)
-    else:
-        parts = coacd.run_coacd(model, **SETTINGS)
-    return tuple(np.asarray(vertices, dtype=np.float64) for vertices, _ in parts)
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        progress.add_task(f"Convex pieces of '{name}' (kept for the next time)", total=None)
+        return decompose(mesh, name, SETTINGS)
 
 
 def _cached(file: Path) -> tuple[FloatArray, ...] | None:
