@@ -36,8 +36,7 @@ def decompose(mesh: TriangleMesh, name: str, settings: Mapping[str, Any]) -> tup
             with np.load(io.BytesIO(run.stdout), allow_pickle=False) as data:
                 return tuple(data[f"piece_{i}"] for i in range(len(data.files)))
     raise ObjectError(
-        f"Body '{name}' cannot be decomposed into convex pieces: CoACD ended {len(ATTEMPTS)} times. Repair the mesh, or "
-        "give pieces (docs/hold.md)."
+        f"Body '{name}' cannot be decomposed into convex pieces: CoACD ended {len(ATTEMPTS)} times. Repair the mesh."
     )
 
 

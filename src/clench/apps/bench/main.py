@@ -8,15 +8,11 @@ from pathlib import Path
 from typing import Literal
 
 from clench.apps.cli.parsing import parse_call
-from clench.apps.cli.results import print_json
 from clench.base.defaults import FRICTION, MASS
 from clench.base.errors import CommandError, UnknownNameError
-from clench.base.json_files import check_writable
-from clench.base.visible_text import visible
 
-from .report import BenchReport
-
-SCHEMA = "clench.bench/1"
+from .bench_options import at_least, drawable, print_report, writable
+from .planning_benchmarks import confidence, displacement
 
 
 def main(argv: Sequence[str]) -> int:
@@ -72,7 +68,7 @@ def solve(
 
     from .solving import bench_solve
 
-    _at_least(1, planes=planes, poses=poses, passes=passes)
+    at_least(1, planes=planes, poses=poses, passes=passes)
     source = None if collision_source is None else clench.CollisionSource(collision_source)
     asked = clench.GraspCommand(
         hand_pose=clench.Pose.identity(),
@@ -82,7 +78,7 @@ def solve(
         collision_source=source,
         seed=seed,
     )
-    return _print(bench_solve(hand, object, scale, asked, poses, passes), json)
+    return print_report(bench_solve(hand, object, scale, asked, poses, passes), json)
 
 
 def batch(
@@ -112,8 +108,8 @@ def batch(
     """
     from .batching import bench_batch
 
-    _at_least(1, planes=planes, poses=poses, passes=passes, stream=stream)
-    return _print(bench_batch(hand, object, scale, planes, poses, passes, stream, seed), json)
+    at_least(1, planes=planes, poses=poses, passes=passes, stream=stream)
+    return print_report(bench_batch(hand, object, scale, planes, poses, passes, stream, seed), json)
 
 
 def peers(
@@ -147,11 +143,11 @@ def peers(
     """
     from .peers import PeerBench, bench_peers
 
-    _at_least(1, planes=planes, poses=poses, passes=passes)
-    _drawable(plot)
-    _writable(table)
+    at_least(1, planes=planes, poses=poses, passes=passes)
+    drawable(plot)
+    writable(table)
     asked = PeerBench(planes, poses, passes, seed, simulate, show_progress=not json)
-    return _print(bench_peers(hand, object, scale, asked, plot, table), json)
+    return print_report(bench_peers(hand, object, scale, asked, plot, table), json)
 
 
 def scaling(
@@ -187,48 +183,11 @@ def scaling(
     """
     from .scaling import ScalingBench, bench_scaling
 
-    _at_least(1, poses=poses, passes=passes, triangles=triangles, batch=batch, stream=stream)
-    _drawable(plot)
-    _writable(table)
+    at_least(1, poses=poses, passes=passes, triangles=triangles, batch=batch, stream=stream)
+    drawable(plot)
+    writable(table)
     asked = ScalingBench(poses, passes, triangles, batch, stream, seed, show_progress=not json)
-    return _print(bench_scaling(hand, object, scale, asked, plot, table), json)
-
-
-def confidence(
-    *,
-    hands: tuple[str, ...] = ("robonaut2",),
-    objects: tuple[str, ...] = ("mug", "bottle", "screwdriver", "ball"),
-    scale: float = 1.0,
-    proposals: int = 128,
-    grasps: int = 6,
-    mass: float = MASS,
-    friction: float = FRICTION,
-    seed: int = 0,
-    out: Path | None = None,
-    json: bool = False,
-) -> int:
-    """Try planned grasps of all scores in simulation, and tabulate the share that holds: the confidence of a score.
-
-    Args:
-        hands: built-in names, or paths to .urdf or .xml files.
-        objects: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
-        scale: multiplies the objects' lengths, e.g. 0.001 for meshes in millimetres.
-        proposals: per hand and object.
-        grasps: tried of them, spread evenly over the scores.
-        mass: of the objects [kg].
-        friction: of all contacts.
-        seed: of the proposals.
-        out: file for the table (JSON), as `src/clench/planner/confidence.json`.
-        json: print one JSON document on standard output.
-    """
-    from clench.execution.hold import Hold
-
-    from .confidence_bench import ConfidenceBench, bench_confidence
-
-    _at_least(1, proposals=proposals, grasps=grasps)
-    _writable(out)
-    asked = ConfidenceBench(proposals, grasps, seed, Hold(mass=mass, friction=friction))
-    return _print(bench_confidence(hands, objects, scale, asked, out, not json), json)
+    return print_report(bench_scaling(hand, object, scale, asked, plot, table), json)
 
 
 def choose(
@@ -254,8 +213,8 @@ def choose(
     """
     from .choosing import bench_choice
 
-    _at_least(1, alternatives=alternatives, poses=poses, passes=passes)
-    return _print(bench_choice(hand, object, alternatives, poses, passes, seed), json)
+    at_least(1, alternatives=alternatives, poses=poses, passes=passes)
+    return print_report(bench_choice(hand, object, alternatives, poses, passes, seed), json)
 
 
 def steadiness(
@@ -279,10 +238,10 @@ def steadiness(
     """
     from .steadiness import bench_steadiness
 
-    _at_least(2, contacts=contacts)
-    _at_least(1, grasps=grasps, passes=passes)
-    _drawable(plot)
-    return _print(bench_steadiness(contacts, grasps, passes, seed, plot), json)
+    at_least(2, contacts=contacts)
+    at_least(1, grasps=grasps, passes=passes)
+    drawable(plot)
+    return print_report(bench_steadiness(contacts, grasps, passes, seed, plot), json)
 
 
 def hold(
@@ -325,13 +284,14 @@ def hold(
     for key, count, least in (("proposals", proposals, 1), ("best", best, 1), ("others", others, 0), ("seed", seed, 0)):
         if count < least:
             raise CommandError(f"--{key}: expected at least {least}, got {count}.")
-    _writable(table, trials)
+    writable(table, trials)
     asked = HoldBench(proposals, best, others, seed, Hold(mass=mass, friction=friction, test=test))
-    return _print(bench_hold(hand, object, scale, asked, HoldFiles(table, trials), show_progress=not json), json)
+    return print_report(bench_hold(hand, object, scale, asked, HoldFiles(table, trials), show_progress=not json), json)
 
 
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "confidence": confidence,
+    "displacement": displacement,
     "solve": solve,
     "batch": batch,
     "choose": choose,
@@ -340,32 +300,3 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "peers": peers,
     "scaling": scaling,
 }
-
-
-def _at_least(least: int, **counts: int) -> None:
-    for key, count in counts.items():
-        if count < least:
-            raise CommandError(f"--{key}: expected at least {least}, got {count}.")
-
-
-def _drawable(plot: Path | None) -> None:
-    if plot is not None:
-        from clench.apps.figures.style import check_figure
-
-        check_figure(plot)
-
-
-def _writable(*files: Path | None) -> None:
-    for file in files:
-        if file is not None:
-            check_writable(file)
-
-
-def _print(report: BenchReport, json: bool) -> int:
-    if json:
-        print_json({"schema": SCHEMA, **report.values, "errors": list(report.errors)})
-    else:
-        sys.stdout.write("".join(f"{visible(line)}\n" for line in report.lines()))
-    for error in report.errors:
-        sys.stderr.write(f"clench: wrong answer: {visible(str(error))}\n")
-    return 1 if report.errors else 0
