@@ -187,6 +187,25 @@ def test_grasps_come_one_by_one_before_all_are_found(hand, mug):
     assert first.solution.is_valid()
 
 
+def test_a_search_that_was_left_goes_on_where_it_was(hand, mug):
+    asked = {"effort": 16, "most": 128, "path": False}
+    whole = list(clench.iter_grasps(hand, mug, 6, **asked))
+    search = clench.iter_grasps(hand, mug, 6, **asked)
+    parts = [next(iter(search)) for _ in range(2)] + list(search)
+    assert [g.number for g in parts] == [g.number for g in whole]
+    assert list(search) == []
+
+
+def test_a_search_ends_when_nothing_can_be_squeezed(hand, mug, monkeypatch):
+    from clench.planner import search as searching
+
+    monkeypatch.setattr(searching, "FRUITLESS", 5)
+    plan = clench.plan_grasps(hand, mug, 3, mass=500.0, path=False)
+    assert len(plan) == 0
+    assert plan.rejected["no squeeze within limits"] == 5
+    assert "lighter object" in plan.text or "stopped" in plan.text
+
+
 @pytest.mark.parametrize(
     ("shape", "reason"),
     [("sphere:r=0.001", "too few fingers touch"), ("box:x=0.6,y=0.6,z=0.6", "stopped before its place")],
@@ -217,6 +236,7 @@ def test_without_a_grasp_the_text_says_what_stood_in_the_way(hand, shape, reason
         ({"pose_sigma": 0.0}, "pose_sigma"),
         ({"pose_sigma": "little"}, "pose_sigma"),
         ({"apart": float("inf")}, "apart"),
+        ({"approach_angle": 45.0}, "in degrees"),
         ({"seconds": -1.0}, "seconds"),
         ({"contact_model": "sticky"}, "contact_model"),
         ({"fingers": ["thumb"]}, "at least 2 fingers"),

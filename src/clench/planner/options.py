@@ -99,6 +99,10 @@ class PlanOptions:
             raise CommandError(f"contact_model: expected one of {', '.join(ContactModel)}, got {self.contact_model!r}.")
         for key in ("torsion", "apart", "approach_angle", "seconds"):
             _check_number(getattr(self, key), key)
+        if self.approach_angle > np.pi:
+            raise CommandError(
+                f"approach_angle: expected at most pi rad, got {self.approach_angle:g}; is it in degrees?"
+            )
         if self.friction is not None:
             friction_range(self.friction)
         mass_range(self.mass)

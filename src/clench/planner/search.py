@@ -32,6 +32,8 @@ from .trials import Closer, Trial
 #: Proposals of the first round, and of a round at most; every round has twice as many as the one before.
 FIRST_ROUND = 64
 LARGEST_ROUND = 256
+#: The search ends when so many grasps in a row have no squeeze or no path: the object is too heavy, say.
+FRUITLESS = 100
 #: A grasp is lost when displacements of the object leave less than this part of its score [-].
 LEFT = 0.2
 
@@ -73,20 +75,27 @@ class GraspSearch:
         self.found: list[PlannedGrasp] = []
         self._places: list[FloatArray] = []
         self._displaced: set[int] = set()
+        self._rounds = 0
+        self._fruitless = 0
         self.times["preparing"] += time.perf_counter() - began
         self._began = began
 
     def __iter__(self) -> Iterator[PlannedGrasp]:
-        """Yield grasps as they are found, at most as many as are wanted."""
-        size, rng_number = FIRST_ROUND, 0
+        """Yield grasps as they are found, at most as many as are wanted; a search that was left goes on."""
+        yield from self._finish(self._due())
         while len(self.found) < self.asked.count and not self._is_over() and not self._proposer.is_hopeless:
-            rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((self.asked.seed, rng_number))))
+            rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((self.asked.seed, self._rounds))))
+            size = min(FIRST_ROUND << self._rounds, LARGEST_ROUND)
+            self._rounds += 1
             self._round(rng, min(size, self.asked.proposals - self.proposed))
-            size, rng_number = min(2 * size, LARGEST_ROUND), rng_number + 1
-            # The best one of so many proposals is returned, so that it is among the best of all.
-            due = -(-self.proposed // self.asked.effort) if self.proposed < self.asked.proposals else self.asked.count
-            yield from self._finish(min(due, self.asked.count))
+            yield from self._finish(self._due())
         yield from self._finish(self.asked.count)
+
+    def _due(self) -> int:
+        """Return how many grasps are due: the best one of every `effort` proposals, so that it is among the best."""
+        if self.proposed >= self.asked.proposals:
+            return self.asked.count
+        return min(-(-self.proposed // self.asked.effort), self.asked.count)
 
     def __repr__(self) -> str:
         progress = f"{len(self.found)} of {self.asked.count} grasps, {self.proposed} proposals"
@@ -112,7 +121,7 @@ class GraspSearch:
 
     def _is_over(self) -> bool:
         late = self.asked.seconds is not None and time.perf_counter() - self._began > self.asked.seconds
-        return late or self.proposed >= self.asked.proposals
+        return late or self.proposed >= self.asked.proposals or self._fruitless >= FRUITLESS
 
     def _round(self, rng: np.random.Generator, count: int) -> None:
         """Propose, bring up and close; good ones wait."""
@@ -154,7 +163,7 @@ class GraspSearch:
 
     def _finish(self, due: int) -> Iterator[PlannedGrasp]:
         """Yield the best of those that wait, completed, until so many were found in all."""
-        while len(self.found) < due and self._waiting:
+        while len(self.found) < due and self._waiting and self._fruitless < FRUITLESS:
             began = time.perf_counter()
             trial, grasp = self._waiting.pop(0), None
             if self.asked.sigma is not None and trial.number not in self._displaced:
@@ -163,6 +172,7 @@ class GraspSearch:
                 self.rejected[Rejection.ALIKE] += 1
             else:
                 grasp = self._finisher.finish(trial, self.rejected)
+                self._fruitless = 0 if grasp is not None else self._fruitless + 1
             self.times["finishing"] += time.perf_counter() - began
             if grasp is not None:
                 self.found.append(grasp)

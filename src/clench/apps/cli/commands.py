@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,7 +23,7 @@ from .scene_options import with_scene
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
-    from clench.planner.grasp_plan import GraspPlan
+    from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
     from clench.solver.solution import GraspSolution
 
 # The values of the enumerations of the same names, written out so that the command line loads without NumPy.
@@ -137,6 +138,7 @@ def solve(
         if not len(plan):
             return _no_grasp(plan, json)
         given = replace(plan[0].command, seed=seed)
+        _tell_planned(plan[0])
     the_command = in_orders(replace(given, **asked), order or ())
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
@@ -334,6 +336,13 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "calibrate": calibrate,
     "bench": bench,
 }
+
+
+def _tell_planned(grasp: PlannedGrasp) -> None:
+    """Say on standard error which grasp was planned, as no command was given."""
+    place = ", ".join(f"{1e3 * x:.0f}" for x in grasp.hand_pose.position)
+    said = f"preshape {grasp.preshape}, palm at [{place}] mm, epsilon {grasp.epsilon:.3f}"
+    sys.stderr.write(f"clench: no --command, so one grasp was planned: {said}. 'clench plan' finds more.\n")
 
 
 def _no_grasp(plan: GraspPlan, json: bool) -> int:

@@ -118,7 +118,10 @@ def _export_dataset(source: Path, out: Path, format: AnyFormat | None, more: boo
         raise CommandError(
             "export: a dataset is written as it was computed; leave out all options but --out, --format."
         )
-    endings = {".h5": "hdf5", ".hdf5": "hdf5"}
+    endings = {".h5": "hdf5", ".hdf5": "hdf5", ".yaml": "isaac_grasp", ".yml": "isaac_grasp", "": "dexgraspbench"}
+    if format is None and out.suffix not in endings:
+        known = ", ".join(ending for ending in endings if ending)
+        raise CommandError(f"--out {out}: expected a folder, or a file that ends with {known}; or name the --format.")
     chosen = DatasetFormat(format) if format in list(DatasetFormat) else endings.get(out.suffix, format)
     dataset = clench.dataset.open(source)
     files = clench.dataset.export(dataset, out, chosen or DatasetFormat.DEXGRASPBENCH)

@@ -6,6 +6,7 @@ import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -72,10 +73,10 @@ def generate(
         fingers: names of the fingers that may close; all by default.
         min_fingers: how many touch at least; 2 by default.
         approach: direction in which the palm comes.
-        approach_angle: how far off it may be, rad; 0.785 by default.
+        approach_angle: how far the palm may come from another direction [degrees]; 45 by default.
         pose_sigma: standard deviation of the object's position, m, and of its rotation, rad: grasps are preferred
             that hold when the object is displaced.
-        apart: distance of any two grasps of a unit, m: root mean square over all links; 0.01 by default.
+        apart: distance of any two grasps of a unit, m: root mean square over all links; 0.02 by default.
         effort: proposals per grasp; the best one of so many is kept; 40 by default.
         most: proposals of a unit at most.
         without_path: leave out the path from the open hand to the touch, and the pregrasp.
@@ -96,7 +97,8 @@ def generate(
         **({"hold": True} if hold else {}),
         **({"path": False} if without_path else {}),
     }
-    numbers = {"count": count, "seed": seed, "unit": unit, "min_fingers": min_fingers, "approach_angle": approach_angle}
+    numbers: dict[str, float | None] = {"count": count, "seed": seed, "unit": unit, "min_fingers": min_fingers}
+    numbers["approach_angle"] = None if approach_angle is None else radians(approach_angle)
     numbers |= {"apart": apart, "effort": effort, "most": most}
     given |= {key: value for key, value in numbers.items() if value is not None}
     given |= {key: value for key, value in (("gravity", gravity), ("approach", approach)) if value is not None}

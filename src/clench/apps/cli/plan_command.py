@@ -112,10 +112,6 @@ def plan(
     asked |= {key: value for key, value in given.items() if value is not None}
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm)
     the_object = clench.GraspObject.load(object, scale=scale)
-    if hold:
-        from clench.execution.convex_pieces import in_pieces
-
-        the_object = in_pieces(the_object, show_progress=not json)
     the_object = with_scene(the_object, None, table, obstacle)
     warn_of_size(the_hand, the_object)
     announce()
@@ -153,14 +149,14 @@ def _searched(hand: Hand, obj: GraspObject, count: int, asked: dict[str, Any]) -
 def _held(grasp: PlannedGrasp, hand: Hand, obj: GraspObject, friction: Any) -> HoldReport:
     from clench.base.defaults import FRICTION
     from clench.execution.hold import Hold
-    from clench.execution.pulling import hold_and_pull
+    from clench.execution.piece_hold import hold_as_collided
     from clench.execution.trajectory import plan_trajectory
     from clench.grasp.mechanics.contacts import friction_range
 
     # Tried at the largest mass and the lowest friction that were planned for.
     lowest = FRICTION if friction is None else friction_range(friction)[0]
     way = grasp.trajectory or plan_trajectory(grasp.solution, hand, obj=obj, force=True)
-    return hold_and_pull(grasp.solution, hand, obj, Hold(mass=grasp.squeeze.mass, friction=lowest), way)
+    return hold_as_collided(grasp.solution, hand, obj, Hold(mass=grasp.squeeze.mass, friction=lowest), way)
 
 
 def _write(found: GraspPlan, document: dict[str, Any], folder: Path) -> list[Path]:
