@@ -128,7 +128,7 @@ def solve(
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     told = size_warnings(the_object) if warn_of_size(the_hand, the_object) else ()
-    given = None if command is None else read_command(command, the_hand)
+    given, planned = None if command is None else read_command(command, the_hand), None
     the_object = with_scene(the_object, None if given is None else given.object_pose, table, obstacle)
     asked: dict[str, Any] = {k: v for k, v in (("planes", planes), ("criteria", criteria)) if v is not None}
     announce()
@@ -137,8 +137,7 @@ def solve(
         plan = clench.plan_grasps(the_hand, the_object, 1, mass=carried, friction=gripped, seed=seed, path=False)
         if not len(plan):
             return _no_grasp(plan, json)
-        given = replace(plan[0].command, seed=seed)
-        _tell_planned(plan[0])
+        given, planned = replace(plan[0].command, seed=seed), plan[0]
     the_command = in_orders(replace(given, **asked), order or ())
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
@@ -159,6 +158,7 @@ def solve(
     else:
         untold = [warning for warning in the_object.warnings if warning not in told]
         print_solution(solution, [*the_hand.warnings, *untold], files)
+        _tell_planned(planned)
         print_posture_choice(solution)
         if error is not None:
             print_pose_error(error)
@@ -338,11 +338,12 @@ COMMANDS: dict[str, Callable[..., int]] = {
 }
 
 
-def _tell_planned(grasp: PlannedGrasp) -> None:
-    """Say on standard error which grasp was planned, as no command was given."""
-    place = ", ".join(f"{1e3 * x:.0f}" for x in grasp.hand_pose.position)
-    said = f"preshape {grasp.preshape}, palm at [{place}] mm, epsilon {grasp.epsilon:.3f}"
-    sys.stderr.write(f"clench: no --command, so one grasp was planned: {said}. 'clench plan' finds more.\n")
+def _tell_planned(grasp: PlannedGrasp | None) -> None:
+    """Say which grasp was planned, where no command was given."""
+    if grasp is not None:
+        place = ", ".join(f"{1e3 * x:.0f}" for x in grasp.hand_pose.position)
+        said = f"preshape {grasp.preshape}, palm at [{place}] mm, epsilon {grasp.epsilon:.3f}"
+        sys.stdout.write(f"without a command, one grasp was planned: {said}; 'clench plan' finds more\n")
 
 
 def _no_grasp(plan: GraspPlan, json: bool) -> int:

@@ -109,7 +109,6 @@ def export(
 def _export_dataset(source: Path, out: Path, format: AnyFormat | None, more: bool, json: bool) -> int:
     """Write a dataset in another format, all of it as it was computed."""
     import clench.dataset
-    from clench.dataset.exporting import DatasetFormat
 
     from .printing import print_files
     from .results import print_json
@@ -122,9 +121,9 @@ def _export_dataset(source: Path, out: Path, format: AnyFormat | None, more: boo
     if format is None and out.suffix not in endings:
         known = ", ".join(ending for ending in endings if ending)
         raise CommandError(f"--out {out}: expected a folder, or a file that ends with {known}; or name the --format.")
-    chosen = DatasetFormat(format) if format in list(DatasetFormat) else endings.get(out.suffix, format)
+    chosen = format or endings[out.suffix]
     dataset = clench.dataset.open(source)
-    files = clench.dataset.export(dataset, out, chosen or DatasetFormat.DEXGRASPBENCH)
+    files = clench.dataset.export(dataset, out, chosen)
     if json:
         listed = [str(file) for file in files]
         print_json(
