@@ -46,11 +46,14 @@ def test_the_ten_lines_run_and_their_number_is_right() -> None:
     assert len(names["plan"]) == 5
 
 
-def test_the_page_about_planning_runs_and_names_all_options_and_reasons(tmp_path: Path) -> None:
+def test_the_page_about_planning_runs_and_names_all_options_and_reasons(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     text = page("planning.md")
     names: dict[str, Any] = {}
     for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-        exec(compile(code.replace("clench_out", str(tmp_path)), "planning.md", "exec"), names)
+        exec(compile(code, "planning.md", "exec"), names)
     assert names["plan"].proposed
     options = set(PlanArguments.__annotations__) - {"torsion"}
     assert options <= set(re.findall(r"`(\w+)=", text))

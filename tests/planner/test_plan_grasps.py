@@ -51,8 +51,8 @@ def test_every_proposal_is_a_grasp_or_fell_for_one_reason(hand, mug):
     found = list(search)
     assert len(found) == 3
     assert search.proposed == 96
-    waiting = len(search._waiting)
-    assert sum(search.rejected.values()) + waiting + len(found) == search.proposed
+    plan = search.plan()
+    assert sum(plan.rejected.values()) + plan.waiting + len(found) == plan.proposed
     assert search.closed >= search.force_closed >= len(found)
 
 
@@ -173,11 +173,35 @@ def test_displacements_lower_the_score_and_change_the_order(hand, mug):
     assert [g.displaced for g in plan] == sorted([g.displaced for g in plan], reverse=True)
 
 
-def test_a_time_budget_ends_the_search_and_says_how_far_it_got(hand, mug):
+def test_a_time_budget_ends_the_search_after_a_first_grasp_and_says_so(hand, mug):
     plan = clench.plan_grasps(hand, mug, 1000, effort=1, seconds=1e-6, path=False)
-    assert plan.proposed == 0
-    assert len(plan) == 0
-    assert plan.text.startswith("Found 0 of 1000 grasps from 0 proposals")
+    assert plan.proposed == 64
+    assert len(plan) == 1
+    assert plan.text == "Found 1 of 1000 grasps from 64 proposals. The time was over."
+
+
+def test_the_weight_counts_besides_the_wrenches_of_a_task(hand, mug):
+    gentle = [[0.0, 0.0, 0.01, 0.0, 0.0, 0.0]]
+    asked = {"path": False, "most": 128, "effort": 32, "task_wrenches": gentle}
+    assert len(clench.plan_grasps(hand, mug, 1, mass=50.0, **asked)) == 0
+    assert len(clench.plan_grasps(hand, mug, 1, mass=0.1, **asked)) == 1
+
+
+def test_every_wrench_of_a_task_is_resisted_or_there_is_no_grasp(hand, mug):
+    asked = {"path": False, "most": 128, "effort": 32, "gravity": [0, 0, -1]}
+    assert len(clench.plan_grasps(hand, mug, 1, task_wrenches=[[0, 0, 1000.0, 0, 0, 0]], **asked)) == 0
+    (grasp,) = clench.plan_grasps(hand, mug, 1, task_wrenches=[[0, 0, 0.5, 0, 0, 0]], **asked)
+    assert grasp.squeeze.margin >= 1.0
+
+
+def test_lists_and_arrays_are_ranges_and_names(hand, mug):
+    asked = {"path": False, "most": 64, "effort": 32}
+    one = clench.plan_grasps(hand, mug, 1, friction=(0.3, 0.6), pose_sigma=(0.003, 0.02), kinds=["power"], **asked)
+    other = clench.plan_grasps(
+        hand, mug, 1, friction=[0.3, 0.6], pose_sigma=np.array([0.003, 0.02]), kinds=(k for k in ["power"]), **asked
+    )
+    assert [g.hand_pose for g in one] == [g.hand_pose for g in other]
+    assert len(one) == 1
 
 
 def test_grasps_come_one_by_one_before_all_are_found(hand, mug):
@@ -208,7 +232,11 @@ def test_a_search_ends_when_nothing_can_be_squeezed(hand, mug, monkeypatch):
 
 @pytest.mark.parametrize(
     ("shape", "reason"),
-    [("sphere:r=0.001", "too few fingers touch"), ("box:x=0.6,y=0.6,z=0.6", "stopped before its place")],
+    [
+        ("sphere:r=0.001", "too few fingers touch"),
+        ("sphere:r=0.5", "Check the object's scale"),
+        ("box:x=0.6,y=0.6,z=0.6", "stopped before its place"),
+    ],
 )
 def test_without_a_grasp_the_text_says_what_stood_in_the_way(hand, shape, reason):
     plan = clench.plan_grasps(hand, clench.GraspObject.load(shape), 2, most=128)
@@ -235,6 +263,9 @@ def test_without_a_grasp_the_text_says_what_stood_in_the_way(hand, shape, reason
         ({"reachable": True}, "function"),
         ({"pose_sigma": 0.0}, "pose_sigma"),
         ({"pose_sigma": "little"}, "pose_sigma"),
+        ({"pose_sigma": [0.1]}, "pose_sigma: expected one number or two"),
+        ({"kinds": 3}, "kinds: expected names"),
+        ({"fingers": "thumb"}, "fingers: expected names"),
         ({"apart": float("inf")}, "apart"),
         ({"approach_angle": 45.0}, "in degrees"),
         ({"seconds": -1.0}, "seconds"),
@@ -250,6 +281,13 @@ def test_bad_options_get_one_sentence(hand, mug, asked, said):
 def test_a_finger_that_does_not_exist_is_refused_with_those_that_do(hand, mug):
     with pytest.raises(UnknownNameError, match="index"):
         clench.plan_grasps(hand, mug, fingers=["thumb", "indx"])
+
+
+def test_what_is_no_hand_or_object_is_refused(hand, mug):
+    with pytest.raises(CommandError, match=r"hand: expected a clench\.Hand"):
+        clench.plan_grasps("robonaut2", mug)
+    with pytest.raises(CommandError, match=r"obj: expected a clench\.GraspObject"):
+        clench.iter_grasps(hand, "mug")
 
 
 def test_regions_without_surface_are_refused(hand, mug):

@@ -32,6 +32,8 @@ def test_vertices_count_by_the_nearest_one():
         (lambda: clench.Region.box([0, 0], [1, 1, 1]), "region.low"),
         (lambda: clench.Region.sphere([0, 0, 0], 0.0), "region.radius"),
         (lambda: clench.Region.sphere([0, 0, np.nan], 1.0), "region.center"),
+        (lambda: clench.Region.sphere([0, 0, 0], "a"), "region.radius"),
+        (lambda: clench.Region.vertices([["a"]], [True]), "region.points"),
         (lambda: clench.Region.vertices([[0, 0, 0]], [False]), "at least one marked"),
         (lambda: clench.Region.vertices([[0, 0, 0]], [1.0]), "truth values"),
         (lambda: clench.Region.vertices([0, 0, 0], [True]), r"\(V, 3\)"),

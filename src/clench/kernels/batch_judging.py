@@ -205,7 +205,7 @@ def is_certified(
     angles: Floats,
     scratch: Scratch,
 ) -> bool:
-    """Say whether chosen sets from a free start keep the promise of `clench.solve.certificate`."""
+    """Say whether chosen sets from a free start keep the promise of `clench.solver.certificate`."""
     if wanted.nested:
         return False
     for entry in range(scratch.chosen.shape[0]):

@@ -12,6 +12,7 @@ import numpy as np
 from clench.base.errors import MotionError
 from clench.base.pose import FloatArray, Pose
 from clench.execution.trajectory import plan_trajectory
+from clench.grasp.mechanics.contacts import ContactModel
 from clench.grasp.mechanics.steadiness import epsilon
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
@@ -26,6 +27,9 @@ from .grasp_plan import PlannedGrasp, UnfinishedGrasp
 from .options import PlanOptions
 from .rejections import Rejection
 from .trials import FRICTION_SHARES, Closer, Trial
+
+#: A squeeze under gravity also resists pulls and twists of at least this multiple of the weight [-].
+LEAST_MARGIN = 0.5
 
 
 @dataclass(eq=False)
@@ -59,7 +63,7 @@ class Finisher:
             rejected[reason] += 1
             self.tell(UnfinishedGrasp(solution, command, preshape, trial.kind, trial.number, reason))
 
-        if not squeeze.feasible:
+        if not self._is_enough(squeeze):
             leave_out(Rejection.NO_SQUEEZE)
             return None
         trajectory, pregrasp = None, None
@@ -83,11 +87,17 @@ class Finisher:
             epsilon=found[-1],
             score=score,
             displaced=None if self.asked.sigma is None else trial.score,
-            confidence=shipped_table().confidence(score),
+            confidence=shipped_table().confidence(score) if self.asked.model is ContactModel.POINT else None,
             squeeze=squeeze,
             trajectory=trajectory,
             number=trial.number,
         )
+
+    def _is_enough(self, squeeze: SqueezePlan) -> bool:
+        """Say whether a squeeze holds the masses, all of the task's wrenches, and else some disturbance besides."""
+        if self.asked.task_wrenches is not None:
+            return squeeze.feasible and squeeze.margin >= 1.0 and not squeeze.found.unresisted
+        return squeeze.feasible and squeeze.margin >= LEAST_MARGIN
 
     def _squeeze(self, solution: GraspSolution) -> SqueezePlan:
         asked = self.asked

@@ -27,10 +27,11 @@ class PlannedGrasp:
         epsilon: Ferrari–Canny ball at the lowest friction [N per N of normal force].
         score: mean of epsilon at the lowest friction and at half of it; grasps are sorted by it, unless displaced.
         displaced: mean of the bound of this score over displacements of the object; None without `pose_sigma`.
-        confidence: measured share of grasps with such a score that held in simulation, 0 to 1 (docs/planning.md).
+        confidence: measured share of grasps with such a score that held in simulation, 0 to 1 (docs/planning.md); None
+            for soft contacts, for which it was not measured.
         squeeze: forces, torques and offsets that hold the object.
         trajectory: the proven path from the open hand to the touch; None when it was not asked for.
-        number: of the proposal that it came from.
+        number: tells the grasps of a search apart; earlier ones have lower numbers.
     """
 
     solution: GraspSolution
@@ -40,7 +41,7 @@ class PlannedGrasp:
     epsilon: float
     score: float
     displaced: float | None
-    confidence: float
+    confidence: float | None
     squeeze: SqueezePlan
     trajectory: Trajectory | None
     number: int
@@ -104,7 +105,8 @@ class GraspPlan:
         hand, object: their names. grasps: see `PlannedGrasp`. asked: the options.
         proposed: how many wrist poses were proposed. closed: at how many the hand was closed.
         force_closed: how many of these resist every wrench, by the bound of epsilon.
-        rejected: how many proposals fell for each reason, by its name.
+        rejected: how many proposals fell for each reason, by its name. waiting: good ones that were not needed.
+        late: the time budget ended the search. widest: how far apart pads of the hand come [m].
         times: seconds by stage.
     """
 
@@ -116,6 +118,9 @@ class GraspPlan:
     closed: int
     force_closed: int
     rejected: dict[str, int]
+    waiting: int
+    late: bool
+    widest: float
     times: dict[str, float]
 
     def __len__(self) -> int:
@@ -133,10 +138,17 @@ class GraspPlan:
         found = f"{len(self)} of {self.asked.count} grasps from {self.proposed} proposals"
         if len(self) >= self.asked.count:
             return f"Found {found}."
+        if self.late:
+            return f"Found {found}. The time was over."
         counted = {k: n for k, n in self.rejected.items() if n}
         if not counted:
-            return f"Found {found}. No zone of the hand spans two opposing places of the object."
-        reason, number = max(counted.items(), key=lambda item: item[1])
+            return (
+                f"Found {found}. No two opposing places of the object are spanned by the hand, whose pads come up to "
+                f"{1e3 * self.widest:.0f} mm apart. Check the object's scale."
+            )
+        # What the caller left out says nothing of the others.
+        others = {k: n for k, n in counted.items() if k != Rejection.DIRECTION} or counted
+        reason, number = max(others.items(), key=lambda item: item[1])
         return f"Found {found}. Most proposals fell for '{reason}' ({number}). {HELP[Rejection(reason)]}"
 
     def __repr__(self) -> str:
@@ -153,6 +165,7 @@ class GraspPlan:
             "closed": self.closed,
             "force_closed": self.force_closed,
             "rejected": dict(self.rejected),
+            "waiting": self.waiting,
             "seconds": {**self.times, "total": sum(self.times.values())},
             "grasps": [grasp.to_dict() for grasp in self.grasps],
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any, Final, TypedDict
@@ -90,6 +90,10 @@ class PlanOptions:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be planned for."""
+        for key in ("friction", "mass", "pose_sigma"):
+            object.__setattr__(self, key, _range(getattr(self, key), key))
+        for key in ("kinds", "fingers"):
+            object.__setattr__(self, key, _names(getattr(self, key), key))
         for key, least in (("count", 1), ("min_fingers", 2), ("effort", 1), ("seed", 0)):
             _check_whole(getattr(self, key), key, least)
         for key in ("most", "threads"):
@@ -213,6 +217,30 @@ def is_reached(reachable: Reachable, poses: FloatArray) -> NDArray[np.bool_]:
             f"reachable: expected {len(poses)} truth values, one per pose, got shape {found.shape} of {found.dtype}."
         )
     return found.astype(np.bool_)
+
+
+def _range(value: Any, key: str) -> Any:
+    """Return a list or an array of two numbers as a pair; anything else as it is.
+
+    Raises:
+        CommandError: another number of numbers.
+    """
+    if not isinstance(value, list | tuple | np.ndarray):
+        return value
+    if len(value) != 2:
+        raise CommandError(f"{key}: expected one number or two, got {len(value)}.")
+    return tuple(each.item() if isinstance(each, np.generic) else each for each in value)
+
+
+def _names(value: Any, key: str) -> tuple[str, ...] | None:
+    """Return names as a tuple.
+
+    Raises:
+        CommandError: no names.
+    """
+    if value is None or (isinstance(value, Iterable) and not isinstance(value, str)):
+        return None if value is None else tuple(value)
+    raise CommandError(f"{key}: expected names, such as a list, got {value!r}.")
 
 
 def _check_whole(value: Any, key: str, least: int) -> None:

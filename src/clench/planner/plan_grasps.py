@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Unpack
 
+from clench.base.argument_types import check_type
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
@@ -18,7 +19,7 @@ def plan_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
     The hand's pads face each other in some zones. The planner puts these zones on opposing places of the object,
     brings the open hand up along the palm's normal, closes it over the full width, and keeps the grasps whose contacts
     resist every wrench. Every returned grasp is certified. It has a squeeze within the limits of the joints, and a path
-    from the open hand that is proven free. No two grasps are alike.
+    from its preshape that is proven free. No two grasps are alike.
 
     Args:
         hand: the hand. obj: the object at its pose, with obstacles as other bodies (`GraspObject.with_body`).
@@ -27,7 +28,8 @@ def plan_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
             of links and object, 0.6 where neither is known.
         mass: of the object [kg], a number or a range.
         gravity: its direction in the world; None: the object is held in any direction.
-        task_wrenches: rows (force [N], torque [Nm]) in the world about the centre of mass that are resisted, (N, 6).
+        task_wrenches: rows (force [N], torque [Nm]) in the world about the centre of mass, each of which is resisted
+            together with the weight, (N, 6).
         contact_model: "point", or "soft" for fingers that also resist a twist about the normal, with the coefficient
             torsion [m]; None is soft for pinches alone, which hold nothing without it, else point.
         kinds: some of "pinch", "tripod", "precision", "power"; None is any.
@@ -40,7 +42,8 @@ def plan_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
         apart: the root mean square over all links of the distance of two grasps is at least this [m].
         effort: proposals per grasp that is wanted; the best one of so many is returned.
         most: proposals at most; 2000 or 4 times `count` times `effort` by default.
-        seconds: no new proposals after this time; `GraspPlan.proposed` says how many there were.
+        seconds: the search ends after this time, but not before a first round and a first grasp of it;
+            `GraspPlan.proposed` says how many proposals there were.
         seed: the same seed gives the same grasps, to the bit, for any number of threads.
         threads: how many are used; all cores by default. path: whether paths are planned, which takes longest.
 
@@ -62,4 +65,6 @@ def iter_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
 
     Args, errors: as for `plan_grasps`.
     """
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     return GraspSearch(hand, obj, PlanOptions(count=count, **options))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,7 +58,7 @@ class Region:
             CommandError: not three numbers, or a radius that is not above 0.
         """
         middle = checked_vector(center, 3, "region.center", "[x, y, z] in metres")
-        if not (np.isfinite(radius) and radius > 0.0):
+        if isinstance(radius, bool) or not isinstance(radius, Real) or not 0.0 < float(radius) < np.inf:
             raise CommandError(f"region.radius: expected a finite number above 0 m, got {radius!r}.")
         return cls(middle - radius, middle + radius, float(radius))
 
@@ -71,7 +72,10 @@ class Region:
         Raises:
             CommandError: shapes that do not fit, or no vertex is marked.
         """
-        p, chosen = np.asarray(points, dtype=np.float64), np.asarray(marked)
+        try:
+            p, chosen = np.asarray(points, dtype=np.float64), np.asarray(marked)
+        except (TypeError, ValueError):
+            raise CommandError("region.points: expected finite vertices [m] of shape (V, 3).") from None
         if p.ndim != 2 or p.shape[1:] != (3,) or not np.isfinite(p).all():
             raise CommandError(f"region.points: expected finite vertices [m] of shape (V, 3), got shape {p.shape}.")
         if chosen.shape != (len(p),) or chosen.dtype.kind != "b":

@@ -116,12 +116,19 @@ class GraspSearch:
             closed=self.closed,
             force_closed=self.force_closed,
             rejected={reason.value: self.rejected[reason] for reason in Rejection},
+            waiting=len(self._waiting),
+            late=self._is_late() and not self._proposer.is_hopeless,
+            widest=max(float(s.aperture.max(initial=0.0)) for s in self.shapes),
             times=dict(self.times),
         )
 
     def _is_over(self) -> bool:
-        late = self.asked.seconds is not None and time.perf_counter() - self._began > self.asked.seconds
-        return late or self.proposed >= self.asked.proposals or self._fruitless >= FRUITLESS
+        return self._is_late() or self.proposed >= self.asked.proposals or self._fruitless >= FRUITLESS
+
+    def _is_late(self) -> bool:
+        """Say whether the time is over; one round is always gone through."""
+        taken = time.perf_counter() - self._began
+        return self.asked.seconds is not None and self._rounds > 0 and taken > self.asked.seconds
 
     def _round(self, rng: np.random.Generator, count: int) -> None:
         """Propose, bring up and close; good ones wait."""
@@ -164,6 +171,8 @@ class GraspSearch:
     def _finish(self, due: int) -> Iterator[PlannedGrasp]:
         """Yield the best of those that wait, completed, until so many were found in all."""
         while len(self.found) < due and self._waiting and self._fruitless < FRUITLESS:
+            if self._is_late() and self.found:
+                return
             began = time.perf_counter()
             trial, grasp = self._waiting.pop(0), None
             if self.asked.sigma is not None and trial.number not in self._displaced:

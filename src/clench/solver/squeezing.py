@@ -124,7 +124,7 @@ def plan_squeeze(
             disturbance is left out of it.
         disturbances: rows (force [N], torque [Nm]) in the world about the centre of mass, shape (N, 6); None: the
             largest weight as a pull along ±x, ±y, ±z of the palm, and as a torque at the length scale about the same
-            axes (with `gravity=None`: the weight in any direction).
+            axes (with `gravity=None`: the weight in any direction, which also adds to given disturbances).
         margin: the largest that is asked for; beyond it, torques are made small instead [-].
         contact_model, friction, torsion, center_of_mass: see `grasp_quality`.
         reserve: part of the lowest friction that the plan counts on, where the mass can be held so [-].
@@ -202,12 +202,19 @@ def angle_offsets(hand: Hand, grasp: HeldSolution, torques: FloatArray) -> dict[
 
 def _disturbances(grasp: HeldSolution, mass: float, gravity: ArrayLike | None, given: ArrayLike | None) -> FloatArray:
     """Return the disturbances in the palm frame, torques over the length scale, shape (N, 6)."""
+    nothing = max(mass, _LEAST_DISTURBANCE / GRAVITY)
     if given is not None:
         rows = check_loads(given)
         R = grasp.T_world_palm.rotation
-        return np.hstack([rows[:, :3] @ R, rows[:, 3:] @ R / grasp.held.length])
+        asked = np.hstack([rows[:, :3] @ R, rows[:, 3:] @ R / grasp.held.length])
+        if gravity is not None:
+            return asked
+        # Without a direction the weight is no load of its own: it adds to every disturbance, whatever its direction.
+        either = np.vstack([np.zeros((1, 6)), asked])
+        summed: FloatArray = (gravity_any_direction(nothing)[:, None] + either).reshape(-1, 6)
+        return summed
     if gravity is None:
-        return gravity_any_direction(max(mass, _LEAST_DISTURBANCE / GRAVITY))
+        return gravity_any_direction(nothing)
     return six_pulls_and_twists(max(mass * GRAVITY, _LEAST_DISTURBANCE))
 
 

@@ -20,7 +20,8 @@ def print_plan(document: Mapping[str, Any], text: str) -> None:
         links = sorted({contact["link"] for contact in solution["contacts"] if not contact["passed"]})
         torque = max((abs(t) for t in solution["squeeze"]["torques"].values()), default=0.0)
         row = [str(number), grasp["kind"], grasp["preshape"], place, f"{grasp['epsilon']:.3f}"]
-        row += [f"{100 * grasp['confidence']:.0f} %", str(len(links))]
+        sure = grasp["confidence"]
+        row += ["" if sure is None else f"{100 * sure:.0f} %", str(len(links))]
         row += [f"{torque:.3f}", *(["yes" if grasp["hold"]["held"] else "no"] if tried else [])]
         table.add_row(*map(plain, row))
     console.print(table)
