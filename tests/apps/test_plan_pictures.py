@@ -173,7 +173,7 @@ def test_files_that_cannot_be_written(draw, plan, hand, ball, tmp_path) -> None:
 
 
 def test_the_command_writes_the_pictures(tmp_path, capsys) -> None:
-    options = ["--count", "1", "--effort", "16", "--most", "64", "--no-path", "--out", str(tmp_path / "out")]
+    options = ["--count", "1", "--effort", "16", "--most", "64", "--without-path", "--out", str(tmp_path / "out")]
     assert main(["plan", "--hand", "robonaut2", "--object", "ball", *options]) == 0
     said = capsys.readouterr().out
     for name in ("grasps.png", "contacts.png", "zones.png"):

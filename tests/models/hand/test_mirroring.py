@@ -39,15 +39,17 @@ def mirrored_object(obj: clench.GraspObject) -> clench.GraspObject:
 def test_mirrored_inputs_give_mirrored_answers(hand: clench.Hand, mug: clench.GraspObject) -> None:
     other, gum = hand.mirrored(), mirrored_object(mug)
     poses = [MUG_POSE, *clench.approach_poses(hand, mug, 20, 0)]
-    answers = clench.solve_batch(hand, mug, poses)
-    images = clench.solve_batch(other, gum, [mirrored_pose(pose) for pose in poses])
+    # Preshapes are drawn for each hand by itself, so a choice among them has no mirror image.
+    opened = clench.GraspCommand(MUG_POSE, preshape="open")
+    answers = clench.solve_batch(hand, mug, poses, opened)
+    images = clench.solve_batch(other, gum, [mirrored_pose(pose) for pose in poses], opened)
     assert answers.counts()["grasp"] >= 10
     assert images.status.tolist() == answers.status.tolist()
     assert images.certified.tolist() == answers.certified.tolist()
     np.testing.assert_allclose(images.joint_angles, answers.joint_angles, rtol=0.0, atol=1e-9)
     # Whole answers, too, of every order.
     for order in clench.ClosingOrder:
-        command = clench.GraspCommand(MUG_POSE, order=order)
+        command = clench.GraspCommand(MUG_POSE, order=order, preshape="open")
         one = clench.solve(hand, mug, command)
         image = clench.solve(other, gum, replace(command, hand_pose=mirrored_pose(MUG_POSE)))
         assert [(c.finger, c.link) for c in image.contacts] == [(c.finger, c.link) for c in one.contacts] != []

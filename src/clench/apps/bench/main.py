@@ -29,7 +29,7 @@ def main(argv: Sequence[str]) -> int:
     """
     name, *rest = list(argv) or ["--help"]
     if name in ("-h", "--help"):
-        lines = [f"  {n:<12}{(b.__doc__ or '').splitlines()[0]}" for n, b in BENCHMARKS.items()]
+        lines = [f"  {n:<14}{(b.__doc__ or '').splitlines()[0]}" for n, b in BENCHMARKS.items()]
         sys.stdout.write("usage: clench bench NAME ...\n\nbenchmarks:\n" + "\n".join(lines) + "\n")
         return 0
     if name not in BENCHMARKS:
