@@ -34,7 +34,7 @@ def shown() -> list[Table]:
         tables.append(table_with(title, *columns))
         return tables[-1]
 
-    patch.setattr(printing, "_table", noted)
+    patch.setattr(printing, "table_with", noted)
     patch.setattr(choice_tables, "table_with", noted)
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     pose = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])

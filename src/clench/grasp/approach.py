@@ -66,7 +66,7 @@ def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, 
         raise CommandError(f"approach poses: expected a seed of 0 or more, got {seed}.")
     q = _open_posture(hand, preshape)
     packed = pack_object(obj)
-    surface = _Surface(obj, packed)
+    surface = GraspableSurface(obj, packed)
     T_world_object = obj.pose.matrix
 
     def drawn(number: int) -> Pose:
@@ -77,8 +77,14 @@ def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, 
     return map(drawn, itertools.count())
 
 
-class _Surface:
-    """Draw points of the graspable surface by area."""
+class GraspableSurface:
+    """Draw points of the graspable surface by area.
+
+    `triangles` are those of the full tree; `shares` sums their areas up to each, as parts of the whole.
+
+    Raises:
+        ObjectError: no graspable surface.
+    """
 
     def __init__(self, obj: GraspObject, packed: PackedObject) -> None:
         self.tree = packed.full_tree
@@ -119,7 +125,7 @@ def _open_posture(hand: Hand, preshape: Mapping[str, float]) -> FloatArray:
 
 
 def _draw(
-    rng: np.random.Generator, hand: Hand, q: FloatArray, packed: PackedObject, surface: _Surface, name: str
+    rng: np.random.Generator, hand: Hand, q: FloatArray, packed: PackedObject, surface: GraspableSurface, name: str
 ) -> FloatArray:
     """Return a random `T_object_palm`, shape (4, 4), where the open hand is free, with the object before it."""
     stopped: tuple[float, FloatArray | None] = np.inf, None

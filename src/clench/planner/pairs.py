@@ -8,8 +8,9 @@ import numpy as np
 
 from clench.base.errors import ObjectError
 from clench.base.pose import FloatArray
+from clench.grasp.approach import GraspableSurface
 from clench.grasp.scene import PackedObject
-from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.objects.grasp_object import GraspObject
 
 from .regions import Region
 
@@ -112,20 +113,12 @@ def draw_surface(
     Raises:
         ObjectError: no graspable surface.
     """
-    tree = packed.full_tree
-    graspable = np.array([role is BodyRole.GRASPABLE for role in packed.body_roles])[tree.body]
-    triangles = np.flatnonzero(graspable)
-    a, b, c = tree.vertices[tree.triangles[triangles]].transpose(1, 0, 2)
-    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1) * tree.normals[triangles].any(axis=1)
-    if not areas.sum() > 0.0:
-        raise ObjectError(f"object '{obj.name}': expected a graspable body with a surface, found none.")
+    tree, surface = packed.full_tree, GraspableSurface(obj, packed)
     # One draw per equal share of the area: the places are spread more evenly than independent draws.
     shares = (np.arange(count) + rng.random(count)) / count
-    chosen = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), shares, side="right"), len(triangles) - 1)
+    drawn = np.minimum(np.searchsorted(surface.shares, shares, side="right"), len(surface.shares) - 1)
+    chosen = surface.triangles[drawn]
+    a, b, c = tree.vertices[tree.triangles[chosen]].transpose(1, 0, 2)
     root, other = np.sqrt(rng.random(count)), rng.random(count)
-    points = (
-        (1.0 - root)[:, None] * a[chosen]
-        + (root * (1.0 - other))[:, None] * b[chosen]
-        + (root * other)[:, None] * c[chosen]
-    )
-    return points, tree.normals[triangles[chosen]]
+    points = (1.0 - root)[:, None] * a + (root * (1.0 - other))[:, None] * b + (root * other)[:, None] * c
+    return points, tree.normals[chosen]

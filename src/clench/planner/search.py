@@ -11,11 +11,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from clench.base.defaults import FRICTION
 from clench.base.errors import CommandError
-from clench.base.pose import FloatArray
+from clench.base.pose import FloatArray, Pose
 from clench.base.short_repr import described
 from clench.grasp.closing import core_count
+from clench.grasp.motion import open_posture
 from clench.grasp.scene import pack_object
+from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.preshapes import Preshape, opposition_zones
@@ -64,11 +67,13 @@ class GraspSearch:
         self.threads = self.asked.threads or core_count()
         packed = pack_object(self.obj)
         self.shapes, self.arms = _ways(self.hand, self.asked)
-        widest = max((float(s.aperture.max(initial=0.0)) for s in self.shapes), default=0.0)
-        friction = self.asked.lowest_friction or 0.6
-        pairs = opposing_pairs(self.obj, packed, friction, widest, self.asked.touch, self.asked.avoid)
+        self._widest = max(float(s.aperture.max(initial=0.0)) for s in self.shapes)
+        friction = self.asked.lowest_friction or FRICTION
+        pairs = opposing_pairs(self.obj, packed, friction, self._widest, self.asked.touch, self.asked.avoid)
         self._proposer = Proposer(self.arms, self.shapes, pairs)
-        self._approach = Approach(self.hand, _postures(self.hand, self.shapes), packed)
+        commands = (GraspCommand(Pose.identity(), preshape=shape.angles) for shape in self.shapes)
+        postures = np.array([open_posture(self.hand, command) for command in commands])
+        self._approach = Approach(self.hand, postures, packed)
         self._closer = Closer(self.hand, self.obj, self.asked, self.arms, self.shapes, self.threads)
         self._finisher = Finisher(self.hand, self.obj, self.asked, self._closer)
         self._waiting: list[Trial] = []
@@ -118,7 +123,7 @@ class GraspSearch:
             rejected={reason.value: self.rejected[reason] for reason in Rejection},
             waiting=len(self._waiting),
             late=self._is_late() and not self._proposer.is_hopeless,
-            widest=max(float(s.aperture.max(initial=0.0)) for s in self.shapes),
+            widest=self._widest,
             times=dict(self.times),
         )
 
@@ -224,14 +229,3 @@ def _ways(hand: Hand, asked: PlanOptions) -> tuple[tuple[Preshape, ...], tuple[A
             f"oppose. 'clench hand' shows what was understood of it."
         )
     return tuple(shapes), tuple(arms)
-
-
-def _postures(hand: Hand, shapes: tuple[Preshape, ...]) -> FloatArray:
-    """Return the open posture at every preshape, shape (K, J) [rad]."""
-    rows = []
-    for shape in shapes:
-        q = np.array([j.open_value for j in hand.joints])
-        for name, angle in shape.angles.items():
-            q[hand.joint_index(name)] = angle
-        rows.append(hand.coupled(q))
-    return np.array(rows)

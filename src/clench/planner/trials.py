@@ -42,17 +42,14 @@ class Trial:
 
     Args:
         number: of the proposal, from 0. arm: its arm. T_object_palm: where the palm is, shape (4, 4).
-        q: posture at the touch [rad], shape (J,). score: mean of bounds of epsilon, see `FRICTION_SHARES`.
-        bound: lower bound of epsilon at the lowest friction. kind: of the grasp.
+        score: mean of bounds of epsilon, see `FRICTION_SHARES`. kind: of the grasp.
         links: places of the links in the object's frame [m], shape (L, 3).
     """
 
     number: int
     arm: Arm
     T_object_palm: FloatArray
-    q: FloatArray
     score: float
-    bound: float
     kind: GraspKind
     links: FloatArray
 
@@ -113,12 +110,11 @@ class Closer:
 
     def solve(self, arm: Arm, T_object_palm: FloatArray) -> GraspBatch:
         """Return the answers of one arm at places of the palm, shape (N, 4, 4)."""
-        number = self.arms.index(arm)
-        if number not in self.solvers:
-            self.solvers[number] = BatchSolver(self.hand, self.obj, self.command(arm))
+        if arm.shape not in self.solvers:
+            self.solvers[arm.shape] = BatchSolver(self.hand, self.obj, self.command(arm))
         T = self.obj.pose.matrix @ T_object_palm
         rows = np.concatenate([quaternions_from_rotations(T[:, :3, :3]), T[:, :3, 3]], axis=1)
-        return self.solvers[number].solve(rows, None, self.threads)
+        return self.solvers[arm.shape].solve(rows, None, self.threads)
 
     def displaced_score(self, trial: Trial, sigma: tuple[float, float]) -> float:
         """Return the mean score of a trial when the object is displaced at random, 0 where no grasp is left [N/N].
@@ -178,9 +174,7 @@ class Closer:
                 int(numbers[n]),
                 arm,
                 T[n],
-                batch.joint_angles[n],
                 float(score[n]),
-                float(bound[n]),
                 KINDS[kinds[n]],
                 links,
             )

@@ -19,7 +19,7 @@ from . import style
 from .preshape_sheet import draw_preshapes, sheet_height
 from .raster import Camera, halved, rasterise
 from .surfaces import PALM_COLOR, Surface, posed_surface
-from .views import GAP, VIEW, fitted_camera, frame_axes, lit, scale_bar, two_views
+from .views import GAP, VIEW, fitted_camera, frame_axes, lit, palm_views, scale_bar, two_views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,15 +116,9 @@ def _in_planes(hand: Hand, finger: Finger, source: CollisionSource, path: FloatA
 
 def _directions(hand: Hand, maps: list[FingerMap]) -> tuple[list[FloatArray], FloatArray]:
     """Return from where the hand is seen, a little aslant of its palm and of its side, and what is up."""
-    normal = hand.palm_normal
     fingers = [m for m in maps if not m.finger.is_thumb] or maps
     stretch = np.mean([m.paths[:, 0].mean(axis=0) - m.base for m in fingers], axis=0)
-    above = stretch - normal * (stretch @ normal)
-    if np.linalg.norm(above) < 1e-6:
-        above = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    above = above / np.linalg.norm(above)
-    side = np.cross(above, normal)
-    return [normal + 0.25 * side + 0.2 * above, side + 0.35 * normal + 0.2 * above], above
+    return palm_views(hand.palm_normal, stretch)
 
 
 def _draw_view(axes: Axes, hand: Hand, maps: list[FingerMap], surface: Surface, camera: Camera, normal: float) -> None:

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.base.pose import FloatArray, Pose
+from clench.grasp.motion import open_posture
+from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
@@ -56,7 +58,12 @@ def draw_preshapes(
     title = "preshapes, before the fingers close: the axis along which the pads oppose best on the way"
     style.write(figure, GAP / width, (top - 8) / height, title, fontsize=12, fontweight="bold", va="top")
     own = [hand.palm, *(i for finger in hand.fingers for i in finger.links)]
-    surfaces = [posed_surface(hand, _posture(hand, shape), source, np.eye(4), COARSE) for shape in preshapes]
+    surfaces = [
+        posed_surface(
+            hand, open_posture(hand, GraspCommand(Pose.identity(), preshape=shape.angles)), source, np.eye(4), COARSE
+        )
+        for shape in preshapes
+    ]
     focus = np.concatenate([s.corners[np.isin(s.groups, own)].reshape(-1, 3) for s in surfaces])
     if not len(focus):
         return
@@ -74,13 +81,6 @@ def draw_preshapes(
 def best_zone(shape: Preshape) -> int | None:
     """Return the number of the zone whose pads oppose best; None without zones."""
     return int(shape.quality.argmax()) if len(shape.quality) else None
-
-
-def _posture(hand: Hand, shape: Preshape) -> FloatArray:
-    q = hand.open_angles()
-    for name, angle in shape.angles.items():
-        q[hand.joint_index(name)] = angle
-    return hand.coupled(q)
 
 
 def _best_view(shape: Preshape, directions: Sequence[FloatArray]) -> FloatArray:

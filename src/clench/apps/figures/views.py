@@ -24,6 +24,20 @@ _TOP: Final = 70
 _BOTTOM: Final = 60
 
 
+def palm_views(normal: FloatArray, stretch: FloatArray) -> tuple[list[FloatArray], FloatArray]:
+    """Return from where a hand is seen, a little aslant of its palm and of its side, and what is up.
+
+    Args:
+        normal: of the palm, unit, shape (3,). stretch: along the fingers, shape (3,).
+    """
+    above = stretch - normal * (stretch @ normal)
+    if np.linalg.norm(above) < 1e-6:
+        above = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    above = above / np.linalg.norm(above)
+    side = np.cross(above, normal)
+    return [normal + 0.25 * side + 0.2 * above, side + 0.35 * normal + 0.2 * above], above
+
+
 def two_views(text: int, below: int = 0) -> tuple[Figure, list[Axes]]:
     """Return a figure with two square views, room for text to the right of them, and room below, in pixels."""
     width, height = 2 * VIEW[0] + text + 4 * GAP, VIEW[1] + _TOP + _BOTTOM + below

@@ -16,7 +16,7 @@ from clench.solver.preshapes import APERTURES, Preshape, opposition_zones
 from . import style
 from .raster import Camera, halved, rasterise
 from .surfaces import posed_surface, without_forearm
-from .views import GAP, VIEW, fitted_camera, frame_axes, lit, scale_bar, two_views
+from .views import GAP, VIEW, fitted_camera, frame_axes, lit, palm_views, scale_bar, two_views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,16 +82,11 @@ def _ends(zones: FloatArray) -> FloatArray:
 
 def _sides(hand: Hand) -> tuple[list[FloatArray], FloatArray]:
     """Return from where the hand is seen, a little aslant of its palm and of its side, and what is up."""
-    normal, q = hand.palm_normal, hand.open_angles()
+    q = hand.open_angles()
     fingers = [finger for finger in hand.fingers if not finger.is_thumb] or list(hand.fingers)
     lines = [finger_line(hand, finger, q) for finger in fingers]
     stretch = np.mean([line.tip - line.anchors[0] for line in lines], axis=0)
-    above = stretch - normal * (stretch @ normal)
-    if np.linalg.norm(above) < 1e-6:
-        above = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    above = above / np.linalg.norm(above)
-    side = np.cross(above, normal)
-    return [normal + 0.25 * side + 0.2 * above, side + 0.35 * normal + 0.2 * above], above
+    return palm_views(hand.palm_normal, stretch)
 
 
 def _draw(axes: Axes, zones: FloatArray, ends: FloatArray, camera: Camera) -> None:
