@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,15 +14,14 @@ from clench.base.pose import FloatArray
 from clench.base.tolerances import PASSED_GAP
 from clench.models.hand.hand import Hand
 
-from .closing import ClosedHand, HandPlan, close_items_again, only_items
 from .depths import LinkDepth
+from .hand_plan import HandPlan
 from .mechanics.contacts import without_repeats
 from .plan import FingerPlan
 from .scene import PackedObject
 from .surface import object_surface
 
 if TYPE_CHECKING:
-    from clench.kernels.exact import ExactArrays
     from clench.kernels.layout import ClosingArrays
 
 
@@ -131,7 +130,6 @@ def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandi
 
 
 def read_candidates(
-    hand: Hand,
     plan: HandPlan,
     packed: PackedObject,
     answer: ClosingArrays,
@@ -141,7 +139,7 @@ def read_candidates(
     """Return one candidate per item, in item order.
 
     Args:
-        hand, plan: what closed. packed, T_palm_object: the object, shape (4, 4). answer: what the kernels computed.
+        plan: what closed. packed, T_palm_object: the object, shape (4, 4). answer: what the kernels computed.
         overlaps: as `start_overlaps` gives them, per entry.
     """
     from clench.kernels.layout import SUNK
@@ -153,22 +151,19 @@ def read_candidates(
         travel, contacts = answer.travel.copy(), np.where(still, 0, answer.contacts)
         travel[still] = 0.0
         answer = answer._replace(travel=travel, contacts=contacts)
-    touches, postures = _read_items(hand, plan, packed, T_palm_object, answer)
+    touches, postures = _read_items(plan, packed, T_palm_object, answer)
     sunk = [LinkDepth(SUNK - link, 0.0, None) if link <= SUNK else None for link in answer.overlap.tolist()]
     groups, low, skipped = plan.arrays.entry_group.tolist(), plan.items.low.tolist(), answer.skipped.tolist()
     candidates = []
     for i, entry in enumerate(entries):
-        finger, q = plan.plans[entry], postures[i]
-        if any(finger.breaks) and not blocked[i]:
-            q = finger.turned(hand, answer.turn[i, plan.joints_of(entry)])
         candidates.append(
             FingerCandidate(
                 item=i,
-                plan=finger,
+                plan=plan.plans[entry],
                 posture=plan.posture[entry],
                 plane=None if plan.whole[i] else low[i],
                 travel=answer.travel[i, groups[entry] : groups[entry + 1]],
-                q=q,
+                q=postures[i],
                 touches=touches[i],
                 overlap=overlaps[entry] or sunk[i],
                 late=not blocked[i] and sunk[i] is not None,
@@ -178,34 +173,17 @@ def read_candidates(
     return candidates
 
 
-def closed_anew(
-    hand: Hand,
-    plan: HandPlan,
-    exact: ExactArrays,
-    closed: ClosedHand,
-    packed: PackedObject,
-    candidate: FingerCandidate,
-    rounds: int,
-) -> FingerCandidate:
-    """Return a set closed again, with what stands in its way now; the arguments are those of `close_items_again`."""
-    again = close_items_again(plan, exact, packed, closed, [candidate.item], rounds)
-    nowhere = [None] * len(plan.plans)
-    one, T = only_items(plan, [candidate.item]), closed.T_palm_object
-    (found,) = read_candidates(hand, one, packed, again.answer, T, nowhere)
-    return replace(found, item=candidate.item)
-
-
 def _read_items(
-    hand: Hand, plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, answer: ClosingArrays
+    plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, answer: ClosingArrays
 ) -> tuple[list[tuple[Touch, ...]], FloatArray]:
     """Return the touches of every item, in stage order, and the angles of all joints, (I, J) [rad]."""
     from clench.kernels.touches import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays, read_touches
 
     shape = answer.hit.shape[:2]
     read = TouchArrays(np.empty((*shape, TOUCH_INTEGERS), dtype=np.int64), np.empty((*shape, TOUCH_FLOATS)))
-    postures = np.empty((shape[0], len(hand.joints)))
+    postures = np.empty((shape[0], len(plan.hand.joints)))
     T = np.ascontiguousarray(T_palm_object[:3])
-    read_touches(plan.arrays, plan.frames(hand), object_surface(packed), plan.items, answer, T, read, postures)
+    read_touches(plan.arrays, plan.frames, object_surface(packed), plan.items, answer, T, read, postures)
     touches = []
     for i, n in enumerate(answer.contacts.tolist()):
         numbers, values = read.number[i, :n].tolist(), read.value[i, :n].tolist()

@@ -25,6 +25,7 @@ def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
         posture=np.array([plan.posture for plan in plans], dtype=np.float64),
         group_leader=_whole([leader for plan in plans for leader in plan.leaders]),
         chain_joint=_whole([p.joint for plan in plans for p in plan.joints]),
+        chain_turn=np.array([p.turn for plan in plans for p in plan.joints], dtype=np.float64),
     )
 
 
@@ -70,6 +71,8 @@ def hand_frames(hand: Hand) -> FrameArrays:
         posture=np.empty((0, len(joints))),
         group_leader=_whole([]),
         chain_joint=_whole([]),
+        chain_turn=np.empty(0),
+        breakaway=_whole([c.breakaway for c in couplings]),
     )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .advance import advance, make_work
-from .compiling import allocating_kernel, inner_kernel, kernel
+from .advance import advance
+from .compiling import inner_kernel, kernel
 from .exact import ExactArrays, describe_pair, last_mover, pose_movers
 from .family_pose import copy_pose, pose_families
 from .later_family import enter_family, is_held
@@ -20,16 +20,15 @@ from .layout import (
     HandArrays,
     Ints,
     ItemArrays,
-    RoundArrays,
     SectionArrays,
     Work,
 )
 from .segments import ALL, lock_held, lock_joints, move_groups, next_segment
 from .settling import settle
+from .solve_layout import ObjectArrays
 from .stage_sweep import sweep_stage
-from .sweeping import SweepWork, make_sweep_work
+from .sweeping import SweepWork
 from .touching import describe_hit, settle_hit
-from .tree import MeshTree
 
 
 @inner_kernel
@@ -195,9 +194,7 @@ def write_contact(
 def close_item(
     hand: HandArrays,
     exact: ExactArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
+    obj: ObjectArrays,
     T_palm_object: Floats,
     shared: SectionArrays,
     own: SectionArrays,
@@ -209,8 +206,20 @@ def close_item(
     sweep: SweepWork,
     answer: ClosingArrays,
 ) -> None:
-    """Close one item: its groups from the palm outwards, up to `times` over, or all at once."""
-    entry = items.entry[i]
+    """Close one item: its groups from the palm outwards, up to `times` over, or all at once (docs/method.md section 4).
+
+    Args:
+        hand: the fingers. exact: what the exact sweeps need. obj: the object in its own frame.
+        T_palm_object: where it is, shape (3, 4).
+        shared: sections with every entry's first family, by global plane. own: arena for later families, with a row for
+            every plane of the largest entry.
+        items: what closes. i: the one to close. times: how often all groups are gone through at most; fewer where
+            nothing moves any more. together: all groups move at once instead. Where joints of several families do, or
+            in several rounds, an item has no planes, since those of later families are cut where the earlier ones are
+            at rest.
+        work, sweep: scratch space. answer: written at row `i`, which must be cleared.
+    """
+    entry, closed = items.entry[i], obj.closed
     start = hand.entry_family[entry]
     if exact.wanted[i]:
         for link in range(sweep.poses.shape[0]):
@@ -229,7 +238,19 @@ def close_item(
                 family += 1
                 swept = exact.wanted[i] != 0
                 enter_family(
-                    hand, family, start, tree, rounds, closed, T_palm_object, own, items, i, swept, work, answer
+                    hand,
+                    family,
+                    start,
+                    obj.tree,
+                    obj.rounds,
+                    closed,
+                    T_palm_object,
+                    own,
+                    items,
+                    i,
+                    swept,
+                    work,
+                    answer,
                 )
             if answer.overlap[i] <= SUNK:
                 break
@@ -268,76 +289,3 @@ def close_item(
     answer.skipped[i] = sweep.skipped[0]
     pose_families(hand, entry, answer.turn[i], work, answer.pose[i])
     settle(hand, exact, T_palm_object, start, shared, own, items, i, work, sweep, answer)
-
-
-@allocating_kernel
-def close_items(
-    hand: HandArrays,
-    exact: ExactArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    shared: SectionArrays,
-    own: SectionArrays,
-    items: ItemArrays,
-    times: int,
-    together: bool,
-    answer: ClosingArrays,
-) -> None:
-    """Close every item of work (docs/method.md section 4).
-
-    Args:
-        hand: the fingers. exact: what the exact sweeps need.
-        tree, rounds, closed: the object in its own frame; `closed` when its winding is known.
-        T_palm_object: where it is, shape (3, 4).
-        shared: sections with every entry's first family, by global plane. own: arena for later families, with a row for
-            every plane of the largest entry.
-        items: what to close. times: how often all groups are gone through at most; fewer where nothing moves any more.
-        together: all groups move at once instead. Where joints of several families do, or in several rounds, an item
-            has no planes, since those of later families are cut where the earlier ones are at rest.
-        answer: written; `travel`, `turn`, `contacts` and `overflow` must be zero.
-    """
-    work = make_work(hand.chain.rate.shape[0], hand.outlines)
-    sweep = make_sweep_work(hand.chain.rate.shape[0], exact.checked.shape[0])
-    close_each(
-        hand, exact, tree, rounds, closed, T_palm_object, shared, own, items, times, together, work, sweep, answer
-    )
-
-
-@inner_kernel
-def close_each(
-    hand: HandArrays,
-    exact: ExactArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    shared: SectionArrays,
-    own: SectionArrays,
-    items: ItemArrays,
-    times: int,
-    together: bool,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> None:
-    """Close one item after another; see `close_items`."""
-    for i in range(items.entry.shape[0]):
-        close_item(
-            hand,
-            exact,
-            tree,
-            rounds,
-            closed,
-            T_palm_object,
-            shared,
-            own,
-            items,
-            i,
-            times,
-            together,
-            work,
-            sweep,
-            answer,
-        )

@@ -14,6 +14,7 @@ from numba import njit
 from clench.base import tolerances
 
 from .handing import handed
+from .kernel_cache import forgive_unreadable, index_of
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -75,11 +76,6 @@ def _read(path: Path) -> tuple[bytes, tuple[str, ...]]:
     return hashlib.sha256(content).digest(), tuple(_IMPORTED.findall(content.decode()))
 
 
-def index_of(dispatcher: Any) -> Any:
-    """Return what Numba keeps of a kernel on disk: an `IndexDataCacheFile`, which it does not make public."""
-    return dispatcher._cache._cache_file
-
-
 def is_kept(function: Any) -> bool:
     """Say whether a kernel is on disk as it is now; true where NUMBA_DISABLE_JIT leaves functions as they are."""
     return not hasattr(function, "get_call_template") or bool(index_of(function)._load_index())
@@ -94,6 +90,7 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
     dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return cast(Kernel, dispatcher)
+    forgive_unreadable(dispatcher)
     index_of(dispatcher)._source_stamp = source_stamp(Path(function.__code__.co_filename))
     choose = dispatcher.get_call_template
 

@@ -14,7 +14,7 @@ import numba.cuda
 import numpy as np
 
 from .advance import make_work
-from .batch_closing import among, answer_at, with_lengths
+from .bundles import answer_at
 from .closing import close_item
 from .exact import ExactArrays
 from .family_section import cut_first_families, needs_planes
@@ -29,6 +29,7 @@ from .layout import (
     Work,
 )
 from .overlap import look_for_overlaps
+from .solve_layout import Arena, Closed, ObjectArrays, ProblemArrays
 from .sweeping import SweepWork, make_sweep_work
 from .tree import MeshTree
 
@@ -40,7 +41,7 @@ BLOCK = 64
 
 
 class Job(NamedTuple):
-    """Hold what the device reads and writes: see `close_poses_on_device`.
+    """Bundle what the device reads and writes: see `close_on_device`.
 
     Args:
         shared, work: of every pose. own, item_work, sweep: of every pose and item, pose after pose.
@@ -48,20 +49,21 @@ class Job(NamedTuple):
 
     hand: HandArrays
     exact: ExactArrays
+    items: ItemArrays
     tree: MeshTree
     rounds: RoundArrays
     closed: bool
+    crossing: bool
+    times: int
+    together: bool
     T_palm_object: Floats
-    link_pose: Floats
-    length: Floats
-    items: ItemArrays
-    asked: Ints
     shared: SectionArrays
     work: Work
     own: SectionArrays
     item_work: Work
     sweep: SweepWork
-    overlaps: Ints
+    crossed: Ints
+    overflow: Ints
     answers: ClosingArrays
 
 
@@ -72,54 +74,48 @@ def why_no_device() -> str | None:
     return " ".join((cuda.cuda_error() or "no device was found.").split())
 
 
-def close_poses_on_device(
-    hand: HandArrays,
-    exact: ExactArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    link_pose: Floats,
-    length: Floats,
-    items: ItemArrays,
-    asked: Ints,
-    shared: SectionArrays,
-    own: SectionArrays,
-    overlaps: Ints,
-    answers: ClosingArrays,
-) -> None:
-    """Cut the object, look for overlaps at the start, and close items once, joint after joint, for every pose.
-
-    Args:
-        hand, exact, tree, rounds, closed, items: see `close_items`. T_palm_object: where the object is, (N, 3, 4).
-        link_pose, length: that of `exact` and of the chain for every pose, (N, ...), or for all of them, (1, ...).
-        asked: whether an item is to be closed at a pose, (N, I); answers of others are left as they are.
-        shared, own: say how large an arena is. overlaps: see `look_for_overlaps`, (N, E); such entries are not closed.
-        answers: see `ClosingArrays`, with the poses first; `overflow` is written for all items of a pose.
-    """
-    poses, count = asked.shape
-    joints = hand.chain.rate.shape[0]
-    work = _plain(make_work)(joints, hand.outlines)
-    sweep = _plain(make_sweep_work)(joints, exact.checked.shape[0])
+def close_on_device(problem: ProblemArrays, T_palm_objects: Floats, arena: Arena, closed: Closed) -> None:
+    """Do the stage `CLOSE` of `solve_poses` on the device for all poses; `arena` says how large arenas are."""
+    poses, count = closed.free.contacts.shape
+    target, command = problem.target, problem.command
+    work = _plain(make_work)(problem.hand.chain.rate.shape[0], problem.hand.outlines)
+    sweep = _plain(make_sweep_work)(problem.hand.chain.rate.shape[0], problem.across.shape[0])
     given = _each(
         _device().put,
         Job(
-            *(hand, exact, tree, rounds, bool(closed), T_palm_object, link_pose, length, items, asked),
-            *(shared, work, own, work, sweep, overlaps, answers),
+            hand=problem.hand,
+            exact=problem.exact,
+            items=problem.items,
+            tree=target.tree,
+            rounds=target.rounds,
+            closed=bool(target.closed),
+            crossing=bool(command.crossing),
+            times=command.times,
+            together=bool(command.together),
+            T_palm_object=T_palm_objects,
+            shared=arena.shared,
+            work=work,
+            own=arena.own,
+            item_work=work,
+            sweep=sweep,
+            crossed=closed.crossed,
+            overflow=closed.overflow,
+            answers=closed.free,
         ),
     )
     many = given._replace(
-        shared=_rows(shared, poses),
+        shared=_rows(arena.shared, poses),
         work=_rows(work, poses),
-        own=_rows(own, poses * count),
+        own=_rows(arena.own, poses * count),
         item_work=_rows(work, poses * count),
         sweep=_rows(sweep, poses * count),
     )
     _cut[-(-poses // BLOCK), BLOCK](many)
     _close[-(-poses * count // BLOCK), BLOCK](many)
-    overlaps[:] = _device().get(many.overlaps)
-    for column, values in zip(answers, many.answers, strict=True):
+    closed.crossed[:] = _device().get(many.crossed)
+    for column, values in zip(closed.free, many.answers, strict=True):
         column[:] = _device().get(values)
+    closed.overflow[:] = np.maximum(_device().get(many.overflow), closed.free.overflow.max(axis=1, initial=0))
 
 
 class _Device(NamedTuple):
@@ -161,7 +157,7 @@ def _inlined(function: Any) -> Any:
     return cuda.jit(device=True, inline="always")(_plain(function))
 
 
-_among, _answer_at, _with_lengths = _inlined(among), _inlined(answer_at), _inlined(with_lengths)
+_answer_at = _inlined(answer_at)
 
 
 @_inlined
@@ -233,51 +229,41 @@ def _cut(job: Job) -> None:
     wanted, planar = 0, needs_planes(job.items)
     if planar:
         wanted = cut_first_families(job.hand, job.tree, job.rounds, T, shared, work.pose)
-    for entry in range(job.overlaps.shape[1]):
-        job.overlaps[n, entry] = -1
-    for i in range(job.asked.shape[1]):
-        job.answers.overflow[n, i] = wanted
-    if planar and wanted == 0:
-        look_for_overlaps(job.hand, job.tree, job.rounds, job.closed, T, shared, job.overlaps[n], work)
+    for entry in range(job.crossed.shape[1]):
+        job.crossed[n, entry] = -1
+    job.overflow[n] = wanted
+    if planar and job.crossing and wanted == 0:
+        look_for_overlaps(job.hand, job.tree, job.rounds, job.closed, T, shared, job.crossed[n], work)
 
 
 @cuda.jit
 def _close(job: Job) -> None:
     """Close one item at one pose."""
     index = cuda.grid(1)
-    items = job.asked.shape[1]
+    items = job.answers.contacts.shape[1]
     if index >= job.T_palm_object.shape[0] * items:
         return
     n, i = index // items, index % items
-    if job.answers.overflow[n, i] > 0 or job.asked[n, i] == 0:
-        return
-    answer, one = _answer_at(job.answers, n), min(n, job.link_pose.shape[0] - 1)
+    answer = _answer_at(job.answers, n)
     for k in range(answer.travel.shape[1]):
         answer.travel[i, k] = 0.0
     for k in range(answer.turn.shape[1]):
         answer.turn[i, k] = 0.0
-    answer.contacts[i], answer.skipped[i], answer.overlap[i] = 0, 0, -1
-    if job.overlaps[n, job.items.entry[i]] >= 0:
+    answer.contacts[i], answer.skipped[i], answer.overlap[i], answer.overflow[i] = 0, 0, -1, 0
+    if job.overflow[n] > 0 or job.crossed[n, job.items.entry[i]] >= 0:
         return
-    shared, own = _sections_at(job.shared, n), _sections_at(job.own, index)
-    work = _work_at(job.item_work, index)
-    sweep = _sweep_at(job.sweep, index)
-    hand, T = _with_lengths(job.hand, job.length[one]), job.T_palm_object[n]
-    exact = _among(job.exact, job.exact.object, job.link_pose[one], job.exact.checked)
     close_item(
-        hand,
-        exact,
-        job.tree,
-        job.rounds,
-        job.closed,
-        T,
-        shared,
-        own,
+        job.hand,
+        job.exact,
+        ObjectArrays(job.tree, job.rounds, job.closed, job.exact.object),
+        job.T_palm_object[n],
+        _sections_at(job.shared, n),
+        _sections_at(job.own, index),
         job.items,
         i,
-        1,
-        False,
-        work,
-        sweep,
+        job.times,
+        job.together,
+        _work_at(job.item_work, index),
+        _sweep_at(job.sweep, index),
         answer,
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from .compiling import allocating_kernel, inner_kernel
 from .family_pose import compose, compose_inverse, copy_pose
-from .layout import Floats, Ints
+from .layout import ChainArrays, Floats, Ints
 
 
 class FrameArrays(NamedTuple):
@@ -23,7 +23,8 @@ class FrameArrays(NamedTuple):
         direction: in which joints close, (J,). lower, upper: limits [rad], (J,).
         leader, follower: of each coupling, (C,). ratio: [-], offset: [rad], (C,).
         posture: open angles of each entry [rad], (E, J). group_leader: joint that leads each group, (G,).
-        chain_joint: joint of the hand that each joint of `ChainArrays` is.
+        chain_joint: joint of the hand that each joint of `ChainArrays` is. chain_turn: +1 where its angle grows with
+            its turn, else -1. breakaway: whether the follower of a coupling can stay behind, (C,).
     """
 
     parent: Ints
@@ -43,6 +44,8 @@ class FrameArrays(NamedTuple):
     posture: Floats
     group_leader: Ints
     chain_joint: Ints
+    chain_turn: Floats
+    breakaway: Ints
 
 
 @inner_kernel
@@ -110,6 +113,42 @@ def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: F
         j = frames.group_leader[g]
         q[j] = inside(q[j] + frames.direction[j] * travel[g], frames.lower[j], frames.upper[j])
     couple(frames, q)
+
+
+@inner_kernel
+def put_closed(
+    frames: FrameArrays,
+    chain: ChainArrays,
+    entry: int,
+    first: int,
+    last: int,
+    travel: Floats,
+    turn: Floats,
+    q: Floats,
+) -> None:
+    """Do as `put_angles`, but by the turns of the joints (J,) where joints of an entry break away."""
+    breaks = False
+    for g in range(first, last):
+        breaks = breaks or chain.breaks[g] != 0
+    if not breaks:
+        put_angles(frames, entry, first, last, travel, q)
+        return
+    for j in range(q.shape[0]):
+        q[j] = frames.posture[entry, j]
+    for k in range(turn.shape[0]):
+        if first <= chain.joint_group[k] < last:
+            j = frames.chain_joint[k]
+            q[j] = inside(q[j] + frames.chain_turn[k] * turn[k], frames.lower[j], frames.upper[j])
+
+
+@inner_kernel
+def tie(frames: FrameArrays, q: Floats) -> None:
+    """Do as `couple`, but leave followers that can break away where they are; see `Hand.tied`."""
+    for c in range(frames.leader.shape[0]):
+        if not frames.breakaway[c]:
+            f = frames.follower[c]
+            angle = frames.ratio[c] * q[frames.leader[c]] + frames.offset[c]
+            q[f] = inside(angle, frames.lower[f], frames.upper[f])
 
 
 @inner_kernel

@@ -29,6 +29,8 @@ from numba.extending import (
     unbox,
 )
 
+from .kernel_cache import forgive_unreadable
+
 Content = TypeVar("Content")
 
 
@@ -174,6 +176,11 @@ def room_for(content: Any) -> Any:
 def put(content: Any, address: int) -> None:
     """Write a tuple to an address."""
     write(content, address)
+
+
+if not cast(Any, numba.config).DISABLE_JIT:
+    for _kernel in (room_for, put):
+        forgive_unreadable(_kernel)
 
 
 @intrinsic

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from clench.base.tolerances import ALLOWED_PENETRATION
 
-from .compiling import allocating_kernel, inner_kernel
+from .compiling import inner_kernel
 from .layout import Floats, Ints
-from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, depth_of, make_depth_work, may_hold_part
+from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
 
 #: No link overlaps, as far as planes do not tell; one does that closing does not move; one of all of them.
 FREE, RESTING_LINK, ANY_LINK = 0, 1, 2
+#: From here on: this plus a link that planes, or sweeps, say overlaps.
+CROSSED = 3
 
 
 @inner_kernel
@@ -40,38 +42,16 @@ def start_overlap(
 ) -> int:
     """Return whether links of a finger that the planes do not tell of overlap the object; see the codes above.
 
+    Links that closing moves are judged on the planes; those that only the posture moves lie on none, and a part of the
+    object inside a link may lie between them.
+
     Args:
-        whole: see `find_start_overlaps`, as the rest.
+        link_pose: see `ExactArrays`. meshes: of the links. own, resting: which are the finger's, and which of those
+            closing does not move, (M,). solid: the object. T_palm_object: where it is, (3, 4).
+        whole: links close over their full width, and all of them are looked at: there may be no planes.
+        work: scratch space.
     """
     around = whole or may_hold_part(meshes, link_pose, solid, T_palm_object, work.points)
     if not any_deep(meshes, own if around else resting, link_pose, solid, T_palm_object, work):
         return FREE
     return ANY_LINK if around else RESTING_LINK
-
-
-@allocating_kernel
-def find_start_overlaps(
-    link_pose: Floats,
-    meshes: LinkMeshArrays,
-    own: Ints,
-    resting: Ints,
-    solid: ObjectMesh,
-    T_palm_object: Floats,
-    whole: bool,
-    blocked: Ints,
-) -> None:
-    """Write a code for every entry, (E,).
-
-    Links that closing moves are judged on the planes; those that only the posture moves lie on none, and a part of the
-    object inside a link may lie between them.
-
-    Args:
-        link_pose: see `ExactArrays`. meshes: of the links. own, resting: which are each finger's, and which of those
-            closing does not move, (E, M). solid: the object. T_palm_object: where it is, (3, 4).
-        whole: links close over their full width, and all of them are looked at: there may be no planes.
-    """
-    work = make_depth_work()
-    for entry in range(blocked.shape[0]):
-        blocked[entry] = start_overlap(
-            link_pose[entry], meshes, own[entry], resting[entry], solid, T_palm_object, whole, work
-        )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .compiling import inner_allocating_kernel, inner_kernel, kernel
 from .family_pose import back
-from .frames import FrameArrays, place_links, put_angles
+from .frames import FrameArrays, place_links, put_angles, put_closed
 from .layout import (
     HIT_CURVE_X,
     HIT_CURVE_Z,
@@ -238,7 +238,7 @@ def read_touches(
 ) -> None:
     """Read the contacts of every item, and the angles of all joints, (I, J).
 
-    Rows beyond `ClosingArrays.contacts` are left as they are. The angles are those of joints that do not break away.
+    Rows beyond `ClosingArrays.contacts` are left as they are.
     """
     for i in range(items.entry.shape[0]):
         entry = items.entry[i]
@@ -246,4 +246,4 @@ def read_touches(
             number, value = touches.number[i, n], touches.value[i, n]
             read_touch(hand, frames, surface, entry, answer, i, n, T_palm_object, number, value)
         first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
-        put_angles(frames, entry, first, last, answer.travel[i], postures[i])
+        put_closed(frames, hand.chain, entry, first, last, answer.travel[i], answer.turn[i], postures[i])

@@ -19,10 +19,7 @@ import numba
 import numpy as np
 
 from .advance import advance
-from .batch_judging import Scratch, judge_pose
-from .batch_layout import ObjectArrays, Solved, Wanted
-from .batch_solving import Asked, Closed, Room, solve_poses
-from .closing import close_item, close_items
+from .closing import close_item
 from .compiling import is_kept
 from .exact import planes_only
 from .family_section import cut_first_families
@@ -40,13 +37,15 @@ from .layout import (
 )
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, measure_depths
 from .nearness import smallest_gap
-from .overlap import find_overlaps
 from .settling import settle_pair
+from .solve_layout import Arena, Closed, CommandArrays, ObjectArrays, ProblemArrays, Solved, Workspace
+from .solve_poses import solve_poses
 from .stage_sweep import sweep_stage
 from .sweeping import SweepWork
 from .touches import SurfaceArrays, TouchArrays, read_touches
 from .touching import describe_hit, settle_hit
 from .tree import MeshTree, build_tree
+from .verdict import judge_pose
 
 #: What each process compiles, in this order: first the parts of what both end with.
 HERE: tuple[Any, ...] = (
@@ -55,14 +54,12 @@ HERE: tuple[Any, ...] = (
     settle_hit,
     describe_hit,
     judge_pose,
-    find_overlaps,
     relate_poses,
     place_links,
     measure_depths,
     find_contained,
     read_touches,
     smallest_gap,
-    close_items,
 )
 THERE: tuple[Any, ...] = (cut_first_families, advance, close_item, solve_poses)
 
@@ -130,7 +127,7 @@ def sample_values() -> dict[str, Any]:
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
     }
     values |= {"links": values["exact"].links, "target": values["exact"].object}
-    values["frames"] = FrameArrays(*_arrays("i1 i1 f3 f2 f2 f1 i1 f1 f1 f1 i1 i1 f1 f1 f2 i1 i1"))
+    values["frames"] = FrameArrays(*_arrays("i1 i1 f3 f2 f2 f1 i1 f1 f1 f1 i1 i1 f1 f1 f2 i1 i1 f1 i1"))
     owners = _arrays("b1")[0]
     values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1"), tree, owners])
     values["solid"] = ObjectMesh(tree, owners, True, _arrays("f2")[0])
@@ -141,7 +138,7 @@ def sample_values() -> dict[str, Any]:
     values["tree"] = tree
     values |= dict.fromkeys(("closed", "together"), True)
     values |= dict.fromkeys(("family", "start", "base", "low", "high", "times", "group", "plane", "entry", "i", "n"), 0)
-    values |= _batch_values(values)
+    values |= _solve_values(values)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
         "f2": ("T_palm_object", "first", "second", "out", "postures"),
@@ -153,23 +150,29 @@ def sample_values() -> dict[str, Any]:
     return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
 
 
-def _batch_values(values: dict[str, Any]) -> dict[str, Any]:
-    """Return values of what `solve_poses` alone takes."""
+def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
+    """Return values of what `solve_poses` takes, and of its scratch space."""
     target = ObjectArrays(values["tree"], values["rounds"], True, values["exact"].object)
+    counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 i1 i1 f1 i1 i1"), 0.0, 0, *[True] * 6, 0, True]
     parts: list[Any] = [values[name] for name in ("hand", "exact", "items")]
     parts += [target, target, *(values[name] for name in ("frames", "surface", "mesh", "meshes")), *_arrays("i2 i2")]
-    counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 f1 i1 i1"), 0.0, True, True, 0]
     answers = ClosingArrays(*_arrays("f3 f3 i2 i4 f4 f5 i2 i2 i2"))
-    sections = values["sections"]
-    written: list[Any] = [*_arrays("i1 f1 f3"), values["touches"], DepthWork(*_arrays("f1 s1 f3 f2 s2"))]
+    parts.append(command := CommandArrays(*counts))
+    arena, closed = Arena(*[values["sections"]] * 4), [answers, *_arrays("i2 i2 i1"), answers, *_arrays("i2 i1")]
+    written: list[Any] = [values["work"], values["sweep"], DepthWork(*_arrays("f1 s1 f3 f2 s2")), values["answer"]]
+    written += [values["items"], *_arrays("i1 f4 f1 f1 f1 f3"), values["touches"]]
     return {
-        "asked": kept(Asked(*parts)),
-        "room": kept(Room(sections, sections, sections, sections, values["answer"])),
-        "wanted": Wanted(*counts),
-        "found": Closed(answers, *_arrays("i2 i2 i1")),
+        "obj": target,
+        "problem": kept(ProblemArrays(*parts)),
+        "command": command,
+        "arena": kept(arena),
+        "space": Workspace(arena, *written),
+        "found": Closed(*closed),
+        "final": values["answer"],
         "solved": Solved(*_arrays("f2 i1 i1 i2 i2 i2 i4 f4")),
-        "scratch": Scratch(*written),
         "T_palm_objects": _arrays("f3")[0],
+        "stages": 0,
+        "nested": True,
     }
 
 
@@ -179,21 +182,15 @@ def _arrays(kinds: str) -> list[Any]:
 
 
 @cache
-def announce(*, in_full: bool = False) -> None:
-    """Say on standard error that what comes compiles, where it does; once per process.
-
-    Args:
-        in_full: it is what only some questions need: why a set was chosen, other orders than joint after joint.
-    """
-    if not in_full and _is_cold():
+def announce() -> None:
+    """Say on standard error that what comes compiles, where it does; once per process."""
+    if _is_cold():
         sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
-    if in_full and _is_cold(close_items):
-        sys.stderr.write("clench: compiling the kernels of all sets, once on this machine; up to a minute more.\n")
 
 
-def _is_cold(kernel: Any = solve_poses) -> bool:
-    """Say whether the cache on disk lacks a kernel."""
-    return not is_kept(kernel)
+def _is_cold() -> bool:
+    """Say whether the cache on disk lacks the kernel of every solve."""
+    return not is_kept(solve_poses)
 
 
 if __name__ == "__main__":

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from clench.base.pose import FloatArray
-from clench.grasp.closing import share_out
 from clench.grasp.depths import link_mesh_arrays, object_mesh
 from clench.grasp.scene import PackedObject
+from clench.grasp.threads import share_out
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole

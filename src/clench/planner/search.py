@@ -15,9 +15,9 @@ from clench.base.defaults import FRICTION
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose
 from clench.base.short_repr import described
-from clench.grasp.closing import core_count
 from clench.grasp.motion import open_posture
 from clench.grasp.scene import pack_object
+from clench.grasp.threads import core_count
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -1,97 +1,136 @@
-"""The sets of every finger, and the choice among them; made when they are read where they decide nothing."""
+"""The alternative sets of every finger: which ones are closed, who chooses among them, and the choice itself."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from clench.base.deferring import once
 from clench.grasp.blocking import start_overlaps
 from clench.grasp.calibration import Calibration
 from clench.grasp.candidates import FingerCandidate, read_candidates
 from clench.grasp.choice import HandChoice, choose
-from clench.grasp.closing import ClosedHand, HandPlan, close_hand
+from clench.grasp.containment import link_within_link
 from clench.grasp.criteria import Setting
-from clench.grasp.criterion_registry import is_built_in, score_hand
-from clench.grasp.depths import LinkDepth
+from clench.grasp.criterion_registry import ALWAYS, is_built_in, score_hand
 from clench.grasp.explaining import explain_choice
 from clench.grasp.feasibility import judge_sets
+from clench.grasp.hand_plan import HandPlan
+from clench.grasp.packed_problem import PackedProblem, Terms, pack_problem
+from clench.grasp.solving import close_items, row_of
+from clench.models.command import ClosingOrder
 
-from .planning import planned
+from .planning import plan_hand
 
 if TYPE_CHECKING:
-    from .planning import Planned
+    from clench.grasp.depths import LinkDepth
+    from clench.kernels.solve_layout import Closed
+
     from .problem import Problem
 
 Groups = list[list[FingerCandidate]]
+#: NumPy adds up more numbers in another order than the kernels do.
+_MOST_JOINTS: Final = 7
 
 
-class ClosedSets(NamedTuple):
-    """The result of closing: the kernels' answer, overlaps at the start per entry, and sets per item."""
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Say which sets are closed, and who chooses among them.
 
-    closed: ClosedHand
-    overlaps: list[LinkDepth | None]
-    sets: list[FingerCandidate]
+    Args:
+        problem: packed for the kernels. by_kernel: the kernels choose; else `Alternatives` do, from the sets that are
+            read.
+    """
+
+    problem: PackedProblem
+    by_kernel: bool
+
+    @property
+    def plan(self) -> HandPlan:
+        """The plan of the sets that are closed."""
+        return self.problem.plan
+
+
+def candidates_of(problem: Problem, calibration: Calibration) -> Candidates:
+    """Return which sets a solve closes.
+
+    The full width goes before every plane: it alone passes through nothing, or a plane has its angles. So where each
+    finger has one full width, the planes are not closed, and there is nothing to choose. Among planes alone the kernels
+    choose by sums of the criteria that are always scored. Criteria that others wrote are asked about every set at once,
+    so that what they raise is raised by the solve. Sets that are all to be measured are closed at once, too.
+    """
+    plan, command = plan_hand(problem), problem.command
+    tip_only = command.order == ClosingOrder.FINGERTIP
+    if command.check_sets or not is_built_in(calibration.criteria):
+        return Candidates(pack_problem(plan, problem.packed, (), tip_only), False)
+    if plan.full_width is not None:
+        return Candidates(pack_problem(plan.full_width, problem.packed, (), tip_only), True)
+    few = all(len(p.finger.joints) <= _MOST_JOINTS for p in plan.plans)
+    by_sums = not any(plan.whole) and not plan.several and few and not tip_only and _sums_alone(calibration)
+    terms = _terms(calibration) if by_sums else ()
+    return Candidates(pack_problem(plan, problem.packed, terms, tip_only), by_sums)
+
+
+def _sums_alone(calibration: Calibration) -> bool:
+    """Say whether a calibration chooses by the sum of the criteria that are always scored, without limits."""
+    weighs_joints = any(weight != 1.0 for weight in calibration.joints.values())
+    return set(calibration.criteria) <= set(ALWAYS) and not calibration.limits and not weighs_joints
+
+
+def _terms(calibration: Calibration) -> Terms:
+    """Return the criteria that are always scored of a calibration: which, and what one unit adds to the sum."""
+    terms = [name for name in calibration.criteria if name in ALWAYS]
+    return tuple((ALWAYS.index(name), calibration.worth(name, 1.0)) for name in terms)
 
 
 def finger_sets(problem: Problem) -> Groups:
-    """Return the sets of every finger that the choice is made of."""
-    made = planned(problem)
-    return group_by_finger(made.plan, close_sets(problem, made, lambda stage: None).sets)
+    """Return all sets of every finger."""
+    plan = plan_hand(problem)
+    packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
+    closed = close_items(packed, problem.T_palm_object[:3])
+    return group_by_finger(plan, read_sets(problem, plan, closed))
 
 
-def close_sets(problem: Problem, made: Planned, lap: Callable[[str], None]) -> ClosedSets:
-    """Close every alternative of every finger that is planned, and judge what it passes through.
+def overlaps_of(problem: Problem, plan: HandPlan, closed: Closed) -> list[LinkDepth | None]:
+    """Return the link of every entry that overlaps the object at the start, or None; `closed` is for one pose."""
+    return start_overlaps(plan, closed.blocked[0], problem.packed, problem.T_palm_object)
+
+
+def read_sets(problem: Problem, plan: HandPlan, closed: Closed) -> list[FingerCandidate]:
+    """Return the sets that were closed at the problem's pose, judged; `closed` is for this pose alone."""
+    overlaps = overlaps_of(problem, plan, closed)
+    sets = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
+    _judge(problem, sets)
+    return sets
+
+
+def with_planes(problem: Problem, overlaps: Sequence[LinkDepth | None], whole: Sequence[FingerCandidate]) -> Groups:
+    """Return the sets of every finger: planes are closed now, the full widths are given.
 
     Args:
-        problem: the three inputs. made: the plan. lap: is told the name of each stage that ends.
+        problem: the three inputs. overlaps: per entry. whole: the full width of every finger.
     """
-    hand, packed, T, plan = problem.hand, problem.packed, problem.T_palm_object, made.plan
-    closed = close_hand(plan, made.exact, packed, T, problem.rounds)
-    lap("close")
-    overlaps = start_overlaps(hand, plan, made.exact.link_pose, closed, packed, T, problem.source)
-    sets = read_candidates(hand, plan, packed, closed.answer, T, overlaps)
-    _judge(problem, sets)
-    lap("sets")
-    return ClosedSets(closed, overlaps, sets)
+    plan = plan_hand(problem).planes
+    packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
+    closed = close_items(packed, problem.T_palm_object[:3])
+    sets = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
+    _judge(problem, [*sets, *whole])
+    groups = group_by_finger(plan, sets)
+    return [[*group, full] for group, full in zip(groups, whole, strict=True)]
+
+
+def group_by_finger(plan: HandPlan, sets: Sequence[FingerCandidate]) -> Groups:
+    """Return the sets of each finger that closes, in the command's order."""
+    groups: Groups = [[] for _ in plan.fingers]
+    for finger, candidate in zip(plan.item_finger, sets, strict=True):
+        groups[finger].append(candidate)
+    return groups
 
 
 def _judge(problem: Problem, sets: Sequence[FingerCandidate]) -> None:
     p = problem
     judge_sets(p.hand, sets, p.packed, p.T_palm_object, p.source, p.command.check_sets, p.together)
-
-
-def with_planes(
-    problem: Problem, overlaps: Sequence[LinkDepth | None], full_width: Sequence[FingerCandidate]
-) -> Groups:
-    """Return the sets of every finger, the full widths as they were closed already, with what overlaps per entry."""
-    made, T = planned(problem).planes, problem.T_palm_object
-    closed = close_hand(made.plan, made.exact, problem.packed, T, problem.rounds)
-    sets = read_candidates(problem.hand, made.plan, problem.packed, closed.answer, T, overlaps)
-    _judge(problem, [*sets, *full_width])
-    groups = group_by_finger(made.plan, sets)
-    return [[*group, whole] for group, whole in zip(groups, full_width, strict=True)]
-
-
-def group_by_finger(plan: HandPlan, candidates: list[FingerCandidate]) -> Groups:
-    """Return the candidates of each finger that closes, in the command's order."""
-    groups: dict[int, list[FingerCandidate]] = {finger: [] for finger in plan.finger}
-    for entry, candidate in zip(plan.items.entry.tolist(), candidates, strict=True):
-        groups[plan.finger[entry]].append(candidate)
-    return list(groups.values())
-
-
-def decided(problem: Problem, calibration: Calibration) -> Planned | None:
-    """Return the plan of the sets that are chosen whatever the others are, or None where the choice is open.
-
-    The full width goes before every plane: it alone passes through nothing, or a plane has its angles. So where each
-    finger has one full width there is nothing to choose. Criteria that others wrote are asked about every set at once,
-    so that what they raise is raised by the solve; so are sets that are all to be measured.
-    """
-    if problem.command.check_sets or not is_built_in(calibration.criteria):
-        return None
-    return planned(problem).full_width
 
 
 @dataclass(eq=False)
@@ -123,6 +162,18 @@ class Alternatives:
     def of_finger(self, k: int) -> Sequence[FingerCandidate]:
         """Return the sets of a finger, as closed without the other fingers, with their scores."""
         return self._scored()[0][k]
+
+    def chosen_items(self) -> tuple[list[int], bool]:
+        """Return the items that are chosen, and whether links lie inside each other where they begin to close."""
+        best = [self.of_finger(k)[i] for k, i in enumerate(self.choice.chosen)]
+        problem = self.problem
+        opened = problem.start.copy()
+        for c in best:
+            own = c.plan.finger.own
+            opened[own] = c.plan.posture[own]
+        checked = plan_hand(problem).bodies.across
+        nested = link_within_link(problem.hand, opened, problem.source, checked) is not None
+        return [c.item for c in best], nested
 
     def explained(self, best: Sequence[FingerCandidate], changed: Sequence[int]) -> dict[str, Any]:
         """Return the choice as plain values; see `explain_choice`.

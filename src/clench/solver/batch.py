@@ -18,7 +18,7 @@ from clench.base.argument_types import check_type
 from clench.base.errors import CommandError
 from clench.base.pose import FloatArray, Pose
 from clench.base.pose_arrays import pose_rows
-from clench.grasp.closing import core_count
+from clench.grasp.threads import core_count
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -1,4 +1,4 @@
-"""Solve one command at arrays of poses: by the kernels of a batch, or one by one where those do not cover it."""
+"""Solve one command at arrays of poses: by one call of the kernels."""
 
 from __future__ import annotations
 
@@ -11,23 +11,21 @@ import numpy as np
 
 from clench.base.deferring import once
 from clench.base.pose import FloatArray, Pose
-from clench.grasp.batch_run import solve_packed, solve_pose
-from clench.grasp.batching import PackedProblem
 from clench.grasp.calibration import calibration_of
 from clench.grasp.motion import asked_fingers, palm_pose
 from clench.grasp.plan import closing_joints
+from clench.grasp.solving import Answers, solve_packed
 from clench.models.command import GraspCommand
 
+from .alternatives import candidates_of
 from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
-from .packing import packed_problem
-from .planning import planned
 from .problem import check_calibration, make_problem
-from .single import solve_posture
+from .single import PoseSolver, solve_posture
 from .solution import FingerStatus, GraspSolution
 
 if TYPE_CHECKING:
-    from clench.kernels.batch_layout import Solved
+    from clench.kernels.solve_layout import Solved
     from clench.models.hand.hand import Finger, Hand
     from clench.models.objects.grasp_object import GraspObject
 
@@ -53,20 +51,15 @@ class BatchSolver:
         asked = asked_fingers(hand, command)
         self.moving = [finger for finger in asked if closing_joints(hand, finger)]
         self._idle = [finger for finger in asked if finger not in self.moving]
-        self.packed = self._pack()
+        self._calibration = calibration_of(command.criteria)
+        check_calibration(hand, self._calibration)
+        #: The sets that are closed; None for a command with several orders, which is solved pose by pose.
+        self.candidates = None if command.orders else candidates_of(self._start, self._calibration)
 
     @property
     def fingers(self) -> list[Finger]:
         """The fingers asked for: first those that close, in the command's order."""
         return [*self.moving, *self._idle]
-
-    def _pack(self) -> PackedProblem | None:
-        problem, command = self._start, self._question.command
-        if command.orders:
-            return None
-        calibration = calibration_of(command.criteria)
-        check_calibration(problem.hand, calibration)
-        return packed_problem(problem, planned(problem), calibration)
 
     def solve(
         self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int, device: str = CPU
@@ -79,37 +72,54 @@ class BatchSolver:
         """
         if object_rows is None:
             object_rows = np.repeat(self._start.T_world_object.wxyz_xyz[None], len(hand_rows), axis=0)
-        if self.packed is None:
+        if self.candidates is None:
             return self._one_by_one(hand_rows, object_rows, threads)
         palms = self._palms(hand_rows)
-        solved = solve_packed(self.packed, _related(palms, object_rows), threads, device == CUDA)
+        solved = self._run(palms, object_rows, threads, device == CUDA).solved
         columns = self._columns(solved, hand_rows, object_rows)
         return GraspBatch(**columns, contacts=_contacts_of(solved, palms))
 
     def solve_one(self, hand_pose: Pose, object_pose: Pose) -> GraspBatch:
-        """Return the answer for one pose, by the kernels of a batch; its contacts are made when they are first read."""
-        assert self.packed is not None
+        """Return the answer for one pose; its contacts are made when they are first read."""
         hand_rows, object_rows = np.array([hand_pose.wxyz_xyz]), np.array([object_pose.wxyz_xyz])
         # What is read later does not follow what is done to the answer.
         palms = self._palms(hand_rows).copy()
-        solved = solve_pose(self.packed, _related(palms, object_rows)[0]).solved
+        solved = self._run(palms, object_rows, 1, False).solved
         columns = self._columns(solved, hand_rows, object_rows)
         contacts = once(partial(_contacts_of, solved, palms))
         return GraspBatch.with_late(lambda _: contacts(), **columns)
+
+    def _run(self, palms: FloatArray, object_rows: FloatArray, threads: int, on_device: bool) -> Answers:
+        """Close, choose and judge at all poses."""
+        candidates = self.candidates
+        assert candidates is not None
+
+        def choose(n: int, answers: Answers) -> tuple[list[int], bool]:
+            problem = self._start.at(_pose(palms[n]), _pose(object_rows[n]))
+            return PoseSolver(problem, self._calibration, candidates).choose(answers)
+
+        return solve_packed(
+            candidates.problem,
+            _related(palms, object_rows),
+            choose=None if candidates.by_kernel else choose,
+            threads=threads,
+            on_device=on_device,
+        )
 
     def _palms(self, hand_rows: FloatArray) -> FloatArray:
         """Return the poses of the palm, (N, 7)."""
         command, problem = self._question.command, self._start
         if command.root_link is None:
             return hand_rows
-        placed = (replace(command, hand_pose=Pose(row[4:], row[:4])) for row in hand_rows)
+        placed = (replace(command, hand_pose=_pose(row)) for row in hand_rows)
         poses = [palm_pose(problem.hand, each, problem.start).wxyz_xyz for each in placed]
         return np.array(poses).reshape(-1, 7)
 
     def _columns(self, solved: Solved, hand_rows: FloatArray, object_rows: FloatArray) -> dict[str, Any]:
         """Name what the kernels computed, but for the contacts."""
-        assert self.packed is not None
-        chosen = np.full(solved.chosen.shape, -1) if self.packed.wanted.whole else self.packed.items.low[solved.chosen]
+        assert self.candidates is not None
+        plan = self.candidates.plan
+        chosen = np.where(np.array(plan.whole), -1, plan.items.low)[solved.chosen]
         idle = np.full((len(hand_rows), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
         return {
             **self.names,
@@ -141,7 +151,7 @@ class BatchSolver:
         asked = self._question
 
         def run(rows: tuple[FloatArray, FloatArray]) -> GraspSolution:
-            hand_pose, object_pose = (Pose(row[4:], row[:4]) for row in rows)
+            hand_pose, object_pose = map(_pose, rows)
             return solve_posture(
                 asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose)
             )
@@ -239,6 +249,10 @@ def turned(R: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return vectors (N, 3) turned by matrices (N, 3, 3), each with the same bits however many there are."""
     x, y, z = (vectors[:, None, k] for k in range(3))
     return R[:, :, 0] * x + R[:, :, 1] * y + R[:, :, 2] * z
+
+
+def _pose(row: FloatArray) -> Pose:
+    return Pose(row[4:], row[:4])
 
 
 def _plane(plane: int | None) -> int:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from clench.base.deferring import DeferredMapping
 from clench.base.pose import FloatArray, Pose
 from clench.grasp.calibration import calibration_of
-from clench.grasp.closing import core_count, share_out
 from clench.grasp.explaining import say_what_decided
 from clench.grasp.motion import open_posture
+from clench.grasp.threads import core_count, share_out
 from clench.models.command import GraspCommand
 
 from .batch_solver import BatchSolver

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -75,6 +75,11 @@ class Problem:
         T[3, 3] = 1.0
         relate_poses(rows[:1], rows[1:], T[None, :3])
         return T
+
+    def at(self, T_world_palm: Pose, T_world_object: Pose) -> Problem:
+        """Return the same problem with hand and object at other poses."""
+        command = self.command.at(T_world_palm, T_world_object)
+        return replace(self, command=command, T_world_palm=T_world_palm, T_world_object=T_world_object)
 
 
 def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:

@@ -1,37 +1,30 @@
-"""One closing from one posture: the sets of every finger, the choice among them, and what is promised of it."""
+"""Solve a command from one posture: a batch of one, whose numbers are known at once and whose reasons when read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from clench.base.deferring import DeferredMapping, once
 from clench.grasp.calibration import Calibration, calibration_of
-from clench.grasp.candidates import FingerCandidate, combined_posture
-from clench.grasp.criteria import Setting
+from clench.grasp.candidates import FingerCandidate, read_candidates
 from clench.grasp.criterion_registry import score_sets
-from clench.grasp.exact import hand_bodies
-from clench.grasp.sequence import close_in_sequence
-from clench.grasp.simultaneous import close_together
+from clench.grasp.solving import Answers, row_of, solve_packed
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
-from .alternatives import Alternatives, close_sets, decided, group_by_finger, with_planes
-from .assembly import Answer, assemble
-from .certificate import judge
+from .alternatives import Alternatives, Candidates, candidates_of, group_by_finger, overlaps_of, read_sets, with_planes
+from .assembly import Answer, assemble, joint_limits, plain_steps
+from .certificate import judge, promised
 from .clock import Clock
-from .directly import solve_directly
+from .grasp_batch import STATUSES
 from .orders import best_order
-from .planning import Planned, planned
+from .planning import plan_hand
 from .problem import Problem, check_calibration, make_problem, make_setting
 from .solution import GraspSolution
-
-if TYPE_CHECKING:
-    from clench.grasp.closing import ClosedHand
 
 
 def solve_posture(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSolution:
@@ -48,51 +41,102 @@ def _solve_order(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspSo
     problem = make_problem(hand, obj, command)
     calibration = calibration_of(command.criteria)
     check_calibration(hand, calibration)
-    setting = once(partial(make_setting, problem, calibration))
     clock.lap("read")
-    in_full = partial(_answer, problem, calibration, setting, clock)
-    solution = solve_directly(problem, calibration, setting, in_full, clock)
-    return solution or assemble(in_full(), problem, clock.stages())
-
-
-def _answer(problem: Problem, calibration: Calibration, setting_of: Callable[[], Setting], clock: Clock) -> Answer:
-    """Close what is asked for, choose, close again what is in each other's way, and judge it."""
-    setting = setting_of()
-    full_width = decided(problem, calibration)
-    made = full_width or planned(problem)
+    candidates = candidates_of(problem, calibration)
     clock.lap("plan")
-    found = close_sets(problem, made, clock.lap)
-    if full_width:
-        close = partial(with_planes, problem, found.overlaps, found.sets)
-        alternatives = Alternatives(problem, calibration, setting, close)
-        best, names = list(found.sets), calibration.criteria
-        chosen = planned(problem).plane_counts
-        score_sets(best, names, setting)
-    else:
-        close = partial(group_by_finger, made.plan, found.sets)
-        alternatives = Alternatives(problem, calibration, setting, close)
-        chosen, names = alternatives.choice.chosen, alternatives.choice.used
-        best = [alternatives.of_finger(k)[i] for k, i in enumerate(chosen)]
-    clock.lap("choose")
-    again = _with_each_other(problem, made, found.closed, best)
-    changed = [k for k, (old, new) in enumerate(zip(best, again, strict=True)) if new is not old]
-    for k in changed:
-        best[k] = replace(again[k], clear=best[k].clear)
-    score_sets([best[k] for k in changed], names, setting)
-    clock.lap("sequence")
-    explained = DeferredMapping(partial(alternatives.explained, best, changed))
-    final = combined_posture(problem.hand, problem.start, best)
-    at_start, at_end, certificate = judge(problem, best, final, made.exact)
-    clock.lap("judge")
-    return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
+    solver = PoseSolver(problem, calibration, candidates)
+    answers = solver.solve()
+    clock.lap("close")
+    return solver.solution(answers, clock.stages())
 
 
-def _with_each_other(
-    problem: Problem, made: Planned, closed: ClosedHand, best: Sequence[FingerCandidate]
-) -> list[FingerCandidate]:
-    """Return the chosen sets, closed again where fingers are in each other's way."""
-    hand, packed, plan, exact = problem.hand, problem.packed, made.plan, made.exact
-    bodies = hand_bodies(hand, problem.source, problem.start)
-    if plan.together:
-        return close_together(hand, plan, exact, closed, packed, best, bodies)
-    return close_in_sequence(hand, plan, exact, closed, packed, best, problem.start, problem.rounds, bodies)
+class PoseSolver:
+    """A solver for one problem at its pose.
+
+    Args:
+        problem: the three inputs. calibration: what the choice counts. candidates: the sets to close.
+    """
+
+    def __init__(self, problem: Problem, calibration: Calibration, candidates: Candidates) -> None:
+        self._problem, self._calibration, self._candidates = problem, calibration, candidates
+        self._setting = once(partial(make_setting, problem, calibration))
+        self._alternatives: Alternatives | None = None
+
+    def solve(self) -> Answers:
+        """Close, choose and judge, as a batch of one."""
+        T = self._problem.T_palm_object[None, :3]
+        choose = None if self._candidates.by_kernel else lambda n, answers: self.choose(answers)
+        return solve_packed(self._candidates.problem, T, choose=choose)
+
+    def choose(self, answers: Answers) -> tuple[list[int], bool]:
+        """Choose among the sets that are closed at the pose; see `Alternatives.chosen_items`."""
+        plan = self._candidates.plan
+        read = partial(read_sets, self._problem, plan, answers.closed)
+        self._alternatives = self._alternatives_of(lambda: group_by_finger(plan, read()))
+        return self._alternatives.chosen_items()
+
+    def _alternatives_of(self, close: Callable[[], list[list[FingerCandidate]]]) -> Alternatives:
+        return Alternatives(self._problem, self._calibration, self._setting(), close)
+
+    def solution(self, answers: Answers, stages: Mapping[str, float]) -> GraspSolution:
+        """Return the solution of answers for this pose alone; contacts, reasons and scores are made when read."""
+        problem, solved = self._problem, answers.solved
+        names = problem.hand.joint_names
+        return GraspSolution.deferred(
+            once(lambda: assemble(self._answer(answers), problem, stages)),
+            status=STATUSES[int(solved.status[0])],
+            joint_angles=dict(zip(names, solved.angles[0].tolist(), strict=True)),
+            certified=bool(solved.certified[0]),
+            hand_pose=problem.T_world_palm,
+            object_pose=problem.T_world_object,
+            joint_limits=joint_limits(problem.hand),
+            timing=stages,
+            quality=None,
+            squeeze=None,
+            pregrasp=None,
+            speeds=dict(problem.command.speeds),
+            rounds=problem.command.rounds,
+            next_steps=plain_steps(problem.command),
+        )
+
+    def _answer(self, answers: Answers) -> Answer:
+        """Read the answer: sets, contacts, scores, what overlaps, and why these sets were chosen."""
+        problem, plan = self._problem, self._candidates.plan
+        alternatives, free = self._alternatives, None
+        if alternatives is None:
+            free = read_sets(problem, plan, answers.closed)
+            alternatives = self._alternatives_of(self._late_sets(answers, free))
+        items = answers.solved.chosen[0].tolist()
+        if free is None:
+            chosen, names = alternatives.choice.chosen, alternatives.choice.used
+            best = [alternatives.of_finger(k)[i] for k, i in enumerate(chosen)]
+        else:
+            names, best = tuple(self._calibration.criteria), [free[i] for i in items]
+            chosen = plan_hand(problem).plane_counts if any(plan.whole) else plan.items.low[items].tolist()
+            score_sets(best, names, self._setting())
+        changed = self._closed_again(answers, best)
+        score_sets([best[k] for k in changed], names, self._setting())
+        final = answers.solved.angles[0]
+        certificate = promised(problem) if answers.solved.certified[0] else None
+        at_start, at_end, certificate = judge(problem, best, final, plan.exact, certificate)
+        explained = DeferredMapping(partial(alternatives.explained, best, changed))
+        return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
+
+    def _late_sets(self, answers: Answers, free: list[FingerCandidate]) -> Callable[[], list[list[FingerCandidate]]]:
+        """Return what gives all sets of every finger, of which the kernels chose."""
+        problem, plan = self._problem, self._candidates.plan
+        if any(plan.whole):
+            return lambda: with_planes(problem, overlaps_of(problem, plan, answers.closed), free)
+        return lambda: group_by_finger(plan, free)
+
+    def _closed_again(self, answers: Answers, best: list[FingerCandidate]) -> list[int]:
+        """Put the sets that closed again in the place of the chosen ones; return the numbers of their fingers."""
+        problem, closed = self._problem, answers.closed
+        picked = self._candidates.plan.only(answers.solved.chosen[0].tolist())
+        changed = closed.anew[0].nonzero()[0].tolist()
+        if changed:
+            nowhere = [None] * len(picked.plans)
+            sets = read_candidates(picked, problem.packed, row_of(closed.final, 0), problem.T_palm_object, nowhere)
+            for k in changed:
+                best[k] = replace(sets[k], item=best[k].item, clear=best[k].clear)
+        return list(changed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -33,8 +34,8 @@ class Tracker:
 
     Args:
         hand, obj: as for `clench.solve`.
-        command: what is asked for, at the first pose, or the first pose; one open posture per finger and order
-            `proximal-first`. If it leaves the posture to clench, the best posture at the first pose is kept.
+        command: what is asked for, at the first pose, or the first pose; one open posture per finger and one order.
+            If it leaves the posture to clench, the best posture at the first pose is kept.
         margin: see above [-]; 0 chooses as `clench.solve` does.
 
     Raises:
@@ -48,11 +49,12 @@ class Tracker:
         check_type(obj, GraspObject, "obj")
         command = as_command(command)
         self._solver = BatchSolver(hand, obj, first_choice(hand, obj, command))
-        if self._solver.packed is None:
+        candidates = self._solver.candidates
+        if candidates is None or not candidates.by_kernel:
             raise CommandError(
-                "Tracker: expected a command with one open posture per finger, order 'proximal-first', 1 round, joints "
-                "that do not break away, and without check_sets; without full_width also criteria that are "
-                "range_of_motion, touching_links and limit_distance alone. Use clench.solve for this one."
+                "Tracker: expected a command with one closing order and one open posture per finger, and without "
+                "check_sets; without full_width also criteria that are range_of_motion, touching_links and "
+                "limit_distance alone. Use clench.solve for this one."
             )
         self._margin = margin
         self._hand_pose = command.hand_pose
@@ -81,14 +83,15 @@ class Tracker:
 
     def _stay(self, answer: GraspBatch) -> None:
         """Keep the planes that the fingers are on; see the class."""
-        packed = self._solver.packed
-        assert packed is not None
-        if packed.wanted.whole or not self._margin:
+        candidates = self._solver.candidates
+        assert candidates is not None
+        plan = candidates.plan
+        if any(plan.whole) or not self._margin:
             return
-        from clench.kernels.batch_judging import SAME_TOTAL
+        from clench.kernels.choosing import SAME_TOTAL
 
-        entries = np.arange(len(packed.wanted.present))
+        entries = np.arange(len(plan.fingers))
         planes = answer.planes[0, : len(entries)]
-        here = (packed.items.entry == entries[:, None]) & (packed.items.low == planes[:, None])
-        wanted = packed.wanted._replace(present=here.argmax(axis=1), margin=self._margin / SAME_TOTAL)
-        self._solver.packed = packed.wanting(wanted)
+        here = (plan.items.entry == entries[:, None]) & (plan.items.low == planes[:, None])
+        problem = candidates.problem.staying(here.argmax(axis=1), self._margin / SAME_TOTAL)
+        self._solver.candidates = replace(candidates, problem=problem)

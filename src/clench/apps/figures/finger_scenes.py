@@ -14,7 +14,7 @@ from clench.grasp.plan import FingerPlan, LinkOutline
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
-from clench.solver.planning import planned
+from clench.solver.planning import plan_hand
 from clench.solver.problem import make_problem
 from clench.solver.solution import Candidate, Contact, GraspSolution
 
@@ -55,7 +55,7 @@ class FingerScenes:
         self.T_palm_world = invert(solution.hand_pose.matrix)
         self.T_palm_object = self.T_palm_world @ solution.object_pose.matrix
         # The planes that the solve used: planned once for a hand and a posture, and kept.
-        plans = [plan for plan in planned(problem).plan.plans if plan.finger.name == name]
+        plans = [plan for plan in plan_hand(problem).plans if plan.finger.name == name]
         self.plan: FingerPlan = plans[min(candidate.posture, len(plans) - 1)]
         self.poses_open = hand.link_poses(self.plan.posture)
         self.moved_by = self._moved_by()

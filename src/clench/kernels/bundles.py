@@ -1,4 +1,4 @@
-"""What the closing of a hand reads and writes, at one of many poses and with other fingers in its way."""
+"""Bundles with a few other arrays: of one of many poses, with other links in the way, or with other limits."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def clear_answer(answer: ClosingArrays, i: int) -> None:
 
 
 @inner_allocating_kernel
-def among(exact: ExactArrays, obj: BodyArrays, link_pose: Floats, checked: Ints) -> ExactArrays:
-    """Return what sweeps read, with another object, links elsewhere, and other links that may not overlap."""
+def among(exact: ExactArrays, wanted: Ints, obj: BodyArrays, link_pose: Floats, checked: Ints) -> ExactArrays:
+    """Return what sweeps read, for other items and another object, with links elsewhere and others to be checked."""
     return ExactArrays(
         exact.joint_first,
-        exact.wanted,
+        wanted,
         whole(exact.links),
         whole(obj),
         exact.mover_first,
