@@ -19,7 +19,6 @@ def test_it_prints_rates_and_memory(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert main(SMALL) == 0
     lines = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines())
     assert lines["answers_right"] == "True"
-    assert lines["certified_one_by_one"] == lines["planes_one_by_one"] == "0"
     for key in ("certified_1_threads", "planes_1_threads"):
         assert float(lines[f"{key}_per_s"]) > 0.0
         assert float(lines[f"{key}_processor_ms"]) > 0.0

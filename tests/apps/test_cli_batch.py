@@ -40,7 +40,7 @@ def test_poses_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     document = json.loads(capsys.readouterr().out)
     assert document["schema"] == "clench.batch/1"
     assert (document["poses"], document["status"]["no_contact"]) == (2, 2)
-    assert document["certified"] == document["one_by_one"] == 0
+    assert document["certified"] == 0
 
 
 @pytest.mark.parametrize(

@@ -88,5 +88,5 @@ def test_report_of_an_execution(capsys):
     printing.print_weights({CODES: 1.0}, CODES)
     printing.print_files([Path(CODES)])
     batch = {"hand": CODES, "object": CODES, "poses": 1, "seconds": 1.0, "status": {CODES: 1}, "certified": 0}
-    printing.print_batch({**batch, "one_by_one": 1})
+    printing.print_batch(batch)
     assert odd(capsys.readouterr().out) == set()

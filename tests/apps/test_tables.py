@@ -48,7 +48,7 @@ def shown() -> list[Table]:
     printing.print_hand(describe_hand(hand, ()))
     printing.print_report(clench.execute(solution, clench.SimulatedHand(hand, mug, hold=clench.Hold())))
     batch = clench.solve_batch(hand, mug, [pose])
-    document = {"hand": "h", "object": "o", "poses": 1, "seconds": 1.0, "status": batch.counts(), "one_by_one": 0}
+    document = {"hand": "h", "object": "o", "poses": 1, "seconds": 1.0, "status": batch.counts()}
     printing.print_batch({**document, "certified": 1})
     printing.print_weights({"steadiness": 0.5}, "Fitted.")
     patch.undo()

@@ -1,61 +1,64 @@
 """All candidates of all fingers in one call: items, arenas that grow, and independence of each other."""
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from small_chain import CLOSING, POSTURE, chain
 
 from clench.base.pose import Pose
-from clench.grasp import closing
-from clench.grasp.closing import close_hand, items_around, kernel_threads, make_hand_plan, planes_tell, share_out
+from clench.grasp.hand_plan import make_hand_plan
+from clench.grasp.packed_problem import capacity_of, items_around, pack_problem, planes_tell
 from clench.grasp.plan import plan_finger
 from clench.grasp.scene import pack_object
-from clench.kernels.exact import planes_only
+from clench.grasp.solving import close_items, row_of
+from clench.grasp.threads import kernel_threads, share_out
+from clench.kernels.start_overlap import CROSSED, FREE
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 
 
-def plans(hand, count=3, q=None):
+def planned(hand, count=3, q=None, fingers=None, full_width=True):
+    """Return the plan of some fingers of a hand, without sweeps of their width."""
     posture = np.zeros(len(hand.joints)) if q is None else np.array(q)
-    return [plan_finger(hand, f, posture, count, CollisionSource.ENGINE) for f in hand.fingers]
+    some = [hand.fingers[k] for k in (range(len(hand.fingers)) if fingers is None else fingers)]
+    entries = [(plan_finger(hand, f, posture, count, CollisionSource.ENGINE), k, 0) for k, f in enumerate(some)]
+    plan = make_hand_plan(hand, posture, CollisionSource.ENGINE, entries, full_width=full_width)
+    return replace(plan, exact=plan.exact._replace(wanted=np.zeros(len(plan.whole), np.int64)))
 
 
-def close(found, obj, full_width=True, rounds=1):
-    plan = make_hand_plan(found, range(len(found)), [0] * len(found), full_width, False)
-    exact = planes_only(len(plan.whole), len(found))
-    return plan, close_hand(plan, exact, pack_object(obj), obj.pose.matrix, rounds)
+def close(plan, obj):
+    """Return the closed items of a plan, with planes for the full width, too."""
+    problem = pack_problem(plan, pack_object(obj), (), False)
+    every = problem.arrays._replace(items=plan.items)
+    return row_of(close_items(replace(problem, arrays=every), obj.pose.matrix[:3]).free, 0)
 
 
 BALL = GraspObject.load("sphere:r=0.02", pose=Pose([0.04, 0.001, 0.04]))
 
 
 def test_one_item_per_plane_and_one_for_the_full_width():
-    found = plans(chain([CLOSING, CLOSING], names=("a", "b")))
-    plan, _ = close(found, BALL)
+    hand = chain([CLOSING, CLOSING], names=("a", "b"))
+    plan = planned(hand)
     assert plan.items.entry.tolist() == [0] * 4 + [1] * 4
     assert plan.whole == (False, False, False, True) * 2
     assert plan.items.high.tolist() == [1, 2, 3, 3] * 2
-    plan, _ = close(found, BALL, full_width=False)
-    assert not any(plan.whole)
+    assert not any(planned(hand, full_width=False).whole)
 
 
 def test_fingers_close_as_they_would_alone():
     hand = chain([CLOSING, CLOSING], names=("a", "b"), upper=2.5)
-    found = plans(hand)
-    _, together = close(found, BALL)
-    _, alone = close(found[1:], BALL)
-    np.testing.assert_array_equal(together.answer.travel[4:, 2:], alone.answer.travel)
-    assert (together.answer.travel > 0.0).any()
+    both, alone = close(planned(hand), BALL), close(planned(hand, fingers=[1]), BALL)
+    np.testing.assert_array_equal(both.travel[4:, 2:], alone.travel)
+    assert (both.travel > 0.0).any()
 
 
 def test_each_plane_closes_as_it_would_alone():
     hand = chain([CLOSING, CLOSING], upper=2.5)
-    (three,) = plans(hand)
-    _, closed = close([three], BALL)
-    for k, offset in enumerate(three.families[0].offsets):
-        _, single = close([three], BALL, full_width=False)
-        np.testing.assert_array_equal(single.answer.travel[k], closed.answer.travel[k], err_msg=f"{offset}")
+    closed, single = close(planned(hand), BALL), close(planned(hand, full_width=False), BALL)
+    np.testing.assert_array_equal(single.travel, closed.travel[:3])
+    assert (single.travel > 0.0).any()
 
 
 @pytest.mark.parametrize("roles", [[CLOSING, CLOSING], [CLOSING, POSTURE, CLOSING]])
@@ -66,43 +69,42 @@ def test_a_section_that_outgrows_its_arena_is_cut_anew(roles):
     hand = chain(roles, upper=2.5)
     mesh = trimesh.creation.icosphere(subdivisions=4, radius=0.02)
     obj = GraspObject.from_meshes([(mesh.vertices, mesh.faces)], pose=Pose([0.04, 0.001, 0.04]))
-    found = plans(hand, q=[0.0, 0.3, 0.0][: len(roles)] if len(roles) == 3 else None)
-    arena = closing.arena_of(pack_object(obj).tree)
-    arena.capacity = 1
-    _, tight = close(found, obj)
-    assert arena.capacity > 1
-    arena.capacity = 4096
-    _, plenty = close(found, obj)
-    assert arena.capacity == 4096
-    np.testing.assert_array_equal(tight.answer.travel, plenty.answer.travel)
-    np.testing.assert_array_equal(tight.answer.point[..., :8], plenty.answer.point[..., :8])
-    assert plenty.answer.contacts.sum() > 4
+    plan = planned(hand, q=[0.0, 0.3, 0.0][: len(roles)] if len(roles) == 3 else None)
+    capacity = capacity_of(pack_object(obj))
+    capacity.segments = 1
+    tight = close(plan, obj)
+    assert capacity.segments > 1
+    capacity.segments = 4096
+    plenty = close(plan, obj)
+    assert capacity.segments == 4096
+    np.testing.assert_array_equal(tight.travel, plenty.travel)
+    np.testing.assert_array_equal(tight.point, plenty.point)
+    assert plenty.contacts.sum() > 4
 
 
 def test_overlap_at_the_start_is_noted_on_planes_for_the_finger_it_concerns():
-    hand = chain([CLOSING], names=("a", "b"))
-    _, closed = close(plans(hand), BALL, full_width=False)
-    assert closed.overlaps.tolist() == [-1, -1]
-    inside = BALL.posed(Pose([0.02, 0.0, 0.02]))
-    plan, closed = close(plans(hand), inside, full_width=False)
-    assert (closed.overlaps >= 0).all()
-    assert plan.arrays.outlines.link[closed.overlaps].tolist() == [1, 2]
+    plan = planned(chain([CLOSING], names=("a", "b")), full_width=False)
+    packed = pack_object(BALL)
+    problem = pack_problem(plan, packed, (), False)
+    free = close_items(problem, BALL.pose.matrix[:3])
+    assert free.blocked.tolist() == [[FREE, FREE]]
+    inside = close_items(problem, Pose([0.02, 0.0, 0.02]).matrix[:3])
+    assert inside.blocked.tolist() == [[CROSSED + 1, CROSSED + 2]]
+    assert not inside.free.travel.any()
 
 
 @pytest.mark.parametrize("model", ["sphere:r=0.02", "box:x=0.02,y=0.02,z=0.02", "cylinder:r=0.02,h=0.02"])
 def test_the_full_width_has_planes_around_what_is_swept_as_a_polyhedron_alone(model):
-    (three,) = plans(chain([CLOSING]))
-    plan = make_hand_plan([three], [0], [0], True, False)
+    hand = chain([CLOSING])
     curved = model.startswith("cylinder")
     packed = pack_object(GraspObject.load(model))
-    items = items_around(plan, packed)
+    plan, alone = planned(hand), planned(hand, full_width=False)
+    items, single = items_around(plan, packed), items_around(alone, packed)
     assert (items.high - items.low).tolist() == [1, 1, 1, 3 if curved else 0]
-    assert planes_tell(items, plan.whole) == curved
-    alone = make_hand_plan([three], [0], [0], False, False)
-    single = items_around(alone, packed)
-    assert planes_tell(single, alone.whole)
     assert single.high.tolist() == [1, 2, 3]
-    assert items_around(plan, None).high.tolist() == [1, 2, 3, 0]
+    assert planes_tell(plan, items) == curved
+    assert planes_tell(alone, single)
+    assert not planes_tell(plan.planes, items_around(plan.planes, packed))
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

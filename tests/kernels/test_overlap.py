@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from clench.kernels.layout import RoundArrays, no_rounds
-from clench.kernels.overlap import find_overlaps
+from kernels.plain_closing import find_overlaps
 from oracle.adapter import EMPTY_TREE, pack_curve, pack_finger
 from oracle.cases import make_case
 from oracle.distances import inside_curve, place, signed_gap

@@ -12,7 +12,7 @@ from clench.base.pose import Pose
 from clench.kernels.exact import PRESSED, find_link_overlap
 from clench.models.hand.hand import JointRole
 from clench.models.shapes import Shape, ShapeKind
-from clench.solver.planning import planned
+from clench.solver.planning import plan_hand
 from clench.solver.problem import make_problem
 
 BOX = Shape(ShapeKind.BOX, (0.01, 0.008, 0.005))
@@ -29,7 +29,7 @@ def overlap(one, other, R, offset):
     poses = np.tile(np.eye(4)[:3], (3, 1, 1))
     poses[1, :, :3], poses[1, :, 3] = R, offset
     poses[2, :, 3] = [1.0, 0.0, 0.0]
-    exact = planned(problem).exact
+    exact = plan_hand(problem).exact
     far = np.column_stack([np.eye(3), [5.0, 0.0, 0.0]])
     return (
         find_link_overlap(exact._replace(checked=np.array([[0, 1, 1], [1, 0, 0], [1, 0, 0]])), poses, far, 1e-6)[0] >= 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.closing import close_items
+from clench.kernels.bodies import no_body
 from clench.kernels.exact import planes_only
 from clench.kernels.family_section import make_sections
 from clench.kernels.layout import (
@@ -17,7 +17,9 @@ from clench.kernels.layout import (
     ItemArrays,
     no_rounds,
 )
+from clench.kernels.solve_layout import ObjectArrays
 from clench.kernels.tree import build_tree
+from kernels.plain_closing import close_items
 from oracle.adapter import empty_answer, pack_curve, pack_finger, solve_planar
 from oracle.cases import cases
 from oracle.distances import place, signed_gap
@@ -148,8 +150,8 @@ def test_a_later_family_touches_as_the_same_joints_do_in_the_first():
         whole = np.array([0], dtype=np.int64)
         items = ItemArrays(whole, whole, whole + 1, np.full((1, joints), np.inf))
         answer, exact = empty_answer(hand, 1, finger.groups + 1), planes_only(1, 1)
-        tree = build_tree(*walls(curve, finger.length))
-        close_items(hand, exact, tree, no_rounds(), True, T_palm_object, shared, own, items, 1, False, answer)
+        obj = ObjectArrays(build_tree(*walls(curve, finger.length)), no_rounds(), True, no_body())
+        close_items(hand, exact, obj, T_palm_object, (shared, own), items, answer)
         plain = solve_planar(finger, curve)[1]
         assert answer.overflow[0] == 0
         assert answer.turn[0, 0] == turn

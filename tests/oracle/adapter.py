@@ -6,7 +6,7 @@ import numpy.typing as npt
 from clench.grasp.outlines import RoundedOutline
 from clench.grasp.packing import enclosing
 from clench.kernels import family_section
-from clench.kernels.closing import close_items
+from clench.kernels.bodies import no_body
 from clench.kernels.exact import planes_only
 from clench.kernels.family_section import make_sections
 from clench.kernels.layout import (
@@ -19,8 +19,10 @@ from clench.kernels.layout import (
     SectionArrays,
     no_rounds,
 )
+from clench.kernels.solve_layout import ObjectArrays
 from clench.kernels.tree import build_tree
 from kernels.kernel_entries import entry
+from kernels.plain_closing import close_items
 
 from .compiled import Floats, Ints
 from .planar import StageAnswer
@@ -144,10 +146,10 @@ def solve_planar(
     sections = pack_curve(curve) if sections is None else sections
     items = ItemArrays(_ints([0]), _ints([0]), _ints([1]), np.full((1, len(finger.rates)), np.inf))
     answer = empty_answer(hand, 1, finger.groups)
-    closed = not curve.two_sided
+    obj = ObjectArrays(EMPTY_TREE, no_rounds(), not curve.two_sided, no_body())
     T = np.eye(4)[:3].copy()
     own = make_sections(1, 1, 0)  # for later families, of which there are none
-    close_items(hand, planes_only(1, 1), EMPTY_TREE, no_rounds(), closed, T, sections, own, items, 1, together, answer)
+    close_items(hand, planes_only(1, 1), obj, T, (sections, own), items, answer, together=together)
     stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
     stages = tuple(
         StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)

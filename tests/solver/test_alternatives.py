@@ -12,9 +12,10 @@ import pytest
 import clench
 from clench.base.errors import CommandError
 from clench.base.pose import Pose
-from clench.grasp import criterion_registry
-from clench.solver import alternatives, packing, single
-from clench.solver.planning import planned
+from clench.grasp import criterion_registry, packed_problem
+from clench.grasp.packed_problem import pack_problem
+from clench.solver import alternatives, single
+from clench.solver.planning import plan_hand
 from clench.solver.problem import make_problem
 
 HANDS = {name: clench.Hand.load(name) for name in ("robonaut2", "patent15")}
@@ -28,9 +29,14 @@ ASKED: dict[str, dict[str, Any]] = {
 
 
 def in_full(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let solves close all sets, choose among them, and say everything at once."""
-    monkeypatch.setattr(single, "solve_directly", lambda *given: None)
-    monkeypatch.setattr(single, "decided", lambda problem, calibration: None)
+    """Let solves close all sets, and choose among them in Python."""
+
+    def all_sets(problem: Any, calibration: Any) -> alternatives.Candidates:
+        tip_only = problem.command.order == clench.ClosingOrder.FINGERTIP
+        packed = pack_problem(plan_hand(problem), problem.packed, (), tip_only)
+        return alternatives.Candidates(packed, by_kernel=False)
+
+    monkeypatch.setattr(single, "candidates_of", all_sets)
 
 
 def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.GraspCommand]) -> list[dict[str, Any]]:
@@ -69,31 +75,36 @@ def test_fingers_that_the_others_made_close_again_are_said_to_be(monkeypatch: py
 @pytest.mark.parametrize(
     ("asked", "at_once", "when_read"),
     [
-        ({}, [], ["full width", "planes"]),
-        ({"criteria": "steady"}, [], ["full width", "planes"]),
-        ({"full_width": False}, [], []),
-        ({"check_sets": True}, ["all"], []),
-        ({"open_variants": (0.0, 0.2)}, ["all"], []),
-        ({"rounds": 2}, ["full width"], ["planes"]),
-        ({"criteria": {"own": 1.0}}, ["all"], []),
+        ({}, "full width", ["planes"]),
+        ({"criteria": "steady"}, "full width", ["planes"]),
+        ({"full_width": False}, "all", []),
+        ({"check_sets": True}, "all", []),
+        ({"open_variants": (0.0, 0.2)}, "all", []),
+        ({"rounds": 2}, "full width", ["planes"]),
+        ({"criteria": {"own": 1.0}}, "all", []),
     ],
     ids=str,
 )
 def test_only_what_may_be_chosen_is_closed(
-    asked: dict[str, Any], at_once: list[str], when_read: list[str], monkeypatch: pytest.MonkeyPatch
+    asked: dict[str, Any], at_once: str, when_read: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     register(monkeypatch, "own", lambda: 1.0)
     hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
     command = commands(hand, obj, planes=2, **asked)[0]
-    items = []
-    close = alternatives.close_hand
+    late: list[int] = []
+    close = alternatives.close_items
 
-    def counted(plan: Any, *rest: Any) -> Any:
-        items.append(len(plan.items.entry))
-        return close(plan, *rest)
+    def counted(problem: Any, *rest: Any) -> Any:
+        late.append(len(problem.plan.items.entry))
+        return close(problem, *rest)
 
-    monkeypatch.setattr(alternatives, "close_hand", counted)
-    every, fingers = len(planned(make_problem(hand, obj, command)).plan.items.entry), len(hand.fingers)
+    monkeypatch.setattr(alternatives, "close_items", counted)
+    made: list[int] = []
+    first = single.candidates_of
+    monkeypatch.setattr(
+        single, "candidates_of", lambda *given: made.append(len((c := first(*given)).plan.items.entry)) or c
+    )
+    every, fingers = len(plan_hand(make_problem(hand, obj, command)).items.entry), len(hand.fingers)
     numbers = {"all": every, "full width": fingers, "planes": every - fingers}
     solution = clench.solve(hand, obj, command)
     assert solution.contacts
@@ -101,10 +112,10 @@ def test_only_what_may_be_chosen_is_closed(
         best = finger.best
         assert best is not None
         assert all(solution.joint_angles[name] == angle for name, angle in best.joint_angles.items())
-    assert items == [numbers[what] for what in at_once]
+    assert (made, late) == ([numbers[at_once]], [])
     assert solution.choice is not None
     assert len(solution.choice["fingers"]) == fingers
-    assert items == [numbers[what] for what in (*at_once, *when_read)]
+    assert late == [numbers[what] for what in when_read]
 
 
 def test_threads_that_read_at_once_get_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,8 +177,8 @@ def test_changes_of_what_was_given_do_not_reach_what_is_read_later(full_width: b
 def test_problems_are_packed_once_whatever_their_criteria_are(monkeypatch: pytest.MonkeyPatch) -> None:
     hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
     pose, made = commands(hand, obj)[0].hand_pose, []
-    pack = packing.pack_problem
-    monkeypatch.setattr(packing, "pack_problem", lambda *given: made.append(1) or pack(*given))
+    pack = packed_problem._pack
+    monkeypatch.setattr(packed_problem, "_pack", lambda *given: made.append(1) or pack(*given))
     joint = hand.joints[hand.fingers[0].joints[-1]].name
     several = [{joint: 0.01 * k} for k in range(1, 13)]
     for full_width, criteria in ((True, {"limit_distance": 1.0}), (False, {"limit_distance": 2.0})):

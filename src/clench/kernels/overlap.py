@@ -6,8 +6,8 @@ import math
 
 from clench.base.tolerances import TOUCH_FRACTION
 
-from .advance import make_work, place_joints, put_outline
-from .compiling import allocating_kernel, inner_kernel, kernel
+from .advance import place_joints, put_outline
+from .compiling import inner_kernel, kernel
 from .distance import Point, is_inside
 from .family_pose import back, compose_inverse
 from .layout import RUN, Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
@@ -200,18 +200,3 @@ def closer_than(outline: Outline, sections: SectionArrays, row: int, margin: flo
         if d <= margin:
             return True
     return False
-
-
-@allocating_kernel
-def find_overlaps(
-    hand: HandArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    sections: SectionArrays,
-    overlaps: Ints,
-) -> None:
-    """Do what `look_for_overlaps` does, with scratch space of its own."""
-    work = make_work(hand.chain.rate.shape[0], hand.outlines)
-    look_for_overlaps(hand, tree, rounds, closed, T_palm_object, sections, overlaps, work)

@@ -130,7 +130,6 @@ class BatchSolver:
             "joint_angles": solved.angles,
             "finger_codes": np.concatenate([solved.fingers, idle], axis=1).astype(np.int8),
             "planes": np.concatenate([chosen, np.full_like(idle, -1)], axis=1).astype(np.int16),
-            "one_by_one": np.zeros(len(hand_rows), dtype=np.bool_),
             "preshape_codes": np.zeros(len(hand_rows), dtype=np.int16),
         }
 
@@ -174,7 +173,6 @@ class BatchSolver:
             finger_codes=np.array(codes, dtype=np.int8).reshape(shape),
             planes=np.array(planes, dtype=np.int16).reshape(shape),
             contacts=self._contacts(solutions),
-            one_by_one=np.ones(len(solutions), dtype=np.bool_),
             preshape_codes=np.zeros(len(solutions), dtype=np.int16),
         )
 

@@ -36,7 +36,7 @@ SCHEMA: Final = "clench.batch/1"
 #: Columns with one row per pose.
 PER_POSE: Final = (
     *("hand_poses", "object_poses", "status_codes", "certified", "joint_angles", "finger_codes", "planes"),
-    *("one_by_one", "preshape_codes"),
+    "preshape_codes",
 )
 
 
@@ -119,7 +119,7 @@ class GraspBatch(LateFields):
         joint_angles: of every joint [rad], shape (N, J).
         finger_codes: indices into `FINGER_STATUSES`, shape (N, F); `finger_status` has their names.
         planes: index of the chosen plane of each finger, -1 for the full width, shape (N, F).
-        contacts: see `BatchContacts`. one_by_one: solved by `clench.solve`, as no kernel of a batch covers it, (N,).
+        contacts: see `BatchContacts`.
         preshape_codes: index of the preshape that clench chose, shape (N,); `preshape` has their names.
     """
 
@@ -136,7 +136,6 @@ class GraspBatch(LateFields):
     finger_codes: NDArray[np.int8]
     planes: NDArray[np.int16]
     contacts: BatchContacts
-    one_by_one: NDArray[np.bool_]
     preshape_codes: NDArray[np.int16]
 
     def __repr__(self) -> str:

@@ -62,7 +62,6 @@ def bench_batch(
         batch, first = timed(lambda command=command: clench.solve_batch(hand, obj, poses, command, threads=1))  # type: ignore[misc]
         report.values[f"warmup_{name}_s"] = first
         report.errors += [f"{name}: {error}" for error in wrong_answers(batch, _one_by_one(hand, obj, command, poses))]
-        report.values[f"{name}_one_by_one"] = int(batch.one_by_one.sum())
         report.values |= {f"{name}_status_{key}": number for key, number in batch.counts().items()}
     report.values["answers_right"] = not report.errors
     if not report.errors:

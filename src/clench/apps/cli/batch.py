@@ -116,7 +116,6 @@ def batch(
         "poses": len(answers),
         "status": answers.counts(),
         "certified": int(answers.certified.sum()),
-        "one_by_one": int(answers.one_by_one.sum()),
         "seconds": seconds,
         "file": None if out is None else str(out),
     }

@@ -221,8 +221,6 @@ def print_batch(document: Mapping[str, Any]) -> None:
     console.print(table)
     rate = f", {count / seconds:.0f} a second" if count and seconds > 0.0 else ""
     console.print(f"solved in {seconds:.2f} s{rate}")
-    if document["one_by_one"]:
-        console.print(f"{document['one_by_one']} of them one by one: the kernels of a batch do not cover this command")
 
 
 def print_weights(weights: Mapping[str, float], sentence: str) -> None:
