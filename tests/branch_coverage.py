@@ -23,7 +23,7 @@ BRIEF = (
     "grasp/test_boxes.py",
     "grasp/test_containment.py",
     "grasp/test_depths.py",
-    "apps/test_bench_peers.py",
+    "benchmarks/test_bench_peers.py",
 )
 WHOLE = (
     *("solver/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),

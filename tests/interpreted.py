@@ -16,7 +16,7 @@ import pytest
 
 from clench.kernels import compiling
 
-OWN = tuple(str(Path(__file__).resolve().parents[1] / part) for part in ("src", "tests"))
+OWN = tuple(str(Path(__file__).resolve().parents[1] / part) for part in ("src", "benchmarks", "tests"))
 #: When it is looked again whether a test that takes too long can be ended [s].
 LATER = 0.01
 

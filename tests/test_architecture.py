@@ -18,13 +18,18 @@ import clench
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
+BENCHMARKS = ROOT / "benchmarks"
 LAYERS = ["base", "kernels", "models", "grasp", "solver", "execution", "planner", "dataset", "apps"]
 HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
 HEAVY |= {"pyarrow", "h5py", "ray", "torch"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = sorted(PACKAGE.rglob("*.py"))
+#: The package and the benchmarks.
+SOURCES = [*FILES, *sorted(BENCHMARKS.rglob("*.py"))]
+KERNEL_FILES = [path for path in SOURCES if "kernels" in path.relative_to(ROOT).parent.parts]
 MAX_FILE_LINES = 400
 MAX_BODY_LINES = 60
+MAX_FOLDER_FILES = 15
 
 
 def shown(path: Path) -> str:
@@ -46,7 +51,8 @@ def findings(check: Callable[[str, Path], list[str]], paths: Iterable[Path] = FI
 
 
 def module_name(path: Path) -> str:
-    parts = list(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+    root = PACKAGE.parent if path.is_relative_to(PACKAGE) else ROOT
+    parts = list(path.relative_to(root).with_suffix("").parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
@@ -103,8 +109,7 @@ def module_level_imports(tree: ast.Module) -> Iterator[tuple[int, str]]:
 
 
 def heavy_imports(source: str, path: Path) -> list[str]:
-    parts = module_name(path).split(".")
-    in_kernels = parts[1:2] == ["kernels"]
+    in_kernels = "kernels" in path.relative_to(ROOT).parent.parts
     allowed = {"numba"} if in_kernels else set()
     wrong = []
     for line, module in module_level_imports(ast.parse(source)):
@@ -140,19 +145,41 @@ def test_imports_point_down() -> None:
 
 
 def test_heavy_packages_are_imported_where_used() -> None:
-    expect_none(findings(heavy_imports))
+    expect_none(findings(heavy_imports, SOURCES))
 
 
 def test_files_are_short() -> None:
-    expect_none(findings(long_files))
+    expect_none(findings(long_files, SOURCES))
 
 
 def test_function_bodies_are_short() -> None:
-    expect_none(findings(long_bodies))
+    expect_none(findings(long_bodies, SOURCES))
 
 
 def test_names_say_something() -> None:
-    expect_none(findings(vague_names))
+    expect_none(findings(vague_names, SOURCES))
+
+
+def imports_of_benchmarks(source: str, path: Path) -> list[str]:
+    found = imported_modules(ast.parse(source), path)
+    return [f"{shown(path)}:{line} imports {m}" for line, m, _ in found if m.split(".")[0] == BENCHMARKS.name]
+
+
+def test_the_package_does_not_import_the_benchmarks() -> None:
+    expect_none(findings(imports_of_benchmarks))
+    assert imports_of_benchmarks("from benchmarks.speed import solving", FILES[0])
+
+
+def test_benchmarks_have_names_of_their_own_in_small_folders() -> None:
+    everything = [*SOURCES, *(ROOT / "tests").rglob("*.py"), *(ROOT / "examples").rglob("*.py")]
+    count = Counter(path.name for path in everything)
+    mine = [path for path in SOURCES if path.is_relative_to(BENCHMARKS)]
+    assert len(mine) > 20
+    expect_none(
+        f"{shown(path)} has a name twice" for path in mine if path.name != "__init__.py" and count[path.name] > 1
+    )
+    files = Counter(path.parent for path in mine)
+    expect_none(f"{shown(folder)} has {n} files" for folder, n in files.items() if n > MAX_FOLDER_FILES)
 
 
 def test_every_folder_is_a_layer() -> None:
@@ -223,7 +250,7 @@ def kernels(*decorators: str) -> dict[str, Kernel]:
     """Return file and definition of the kernels with one of some decorators, by name."""
     return {
         node.name: (path, node)
-        for path in sorted((PACKAGE / "kernels").glob("*.py"))
+        for path in KERNEL_FILES
         for node in ast.parse(path.read_text(encoding="utf-8")).body
         if isinstance(node, ast.FunctionDef) and {ast.unparse(d) for d in node.decorator_list} & set(decorators)
     }
@@ -278,11 +305,11 @@ def test_python_never_imports_a_kernel_without_an_entry() -> None:
     # A call of such a kernel from Python ends the process without a message.
     inner = set(kernels("inner_kernel", "inner_allocating_kernel"))
     assert "close_group" in inner
-    callers = [p for p in PACKAGE.rglob("*.py") if p.parent.name != "kernels"]
+    callers = [path for path in SOURCES if path not in KERNEL_FILES]
     wrong = []
     for path in [*callers, *Path(__file__).parent.rglob("*.py")]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clench.kernels"):
+            if isinstance(node, ast.ImportFrom) and "kernels" in (node.module or "").split("."):
                 names = sorted(inner & {alias.name for alias in node.names})
                 wrong += [f"{shown(path)}:{node.lineno} imports {name}" for name in names]
     expect_none(wrong)
@@ -305,9 +332,8 @@ def makers_of_arrays(source: str) -> list[str]:
 
 
 def test_kernels_that_allocate_are_marked() -> None:
-    paths = (PACKAGE / "kernels").glob("*.py")
     expect_none(
-        findings(lambda source, path: [f"{shown(path)}: {n} allocates" for n in makers_of_arrays(source)], paths)
+        findings(lambda source, path: [f"{shown(path)}: {n} allocates" for n in makers_of_arrays(source)], KERNEL_FILES)
     )
 
 

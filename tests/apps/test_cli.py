@@ -487,9 +487,7 @@ def test_object(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPa
 
 def test_bench_is_handed_its_own_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[list[str]] = []
-    module = SimpleNamespace(main=lambda arguments: seen.append(arguments) or 3)
-    monkeypatch.setitem(sys.modules, "clench.apps.bench", SimpleNamespace(main=module))
-    monkeypatch.setitem(sys.modules, "clench.apps.bench.main", module)
+    monkeypatch.setattr("benchmarks.bench_commands.main", lambda arguments: seen.append(arguments) or 3)
     assert main(["bench", "solve", "--poses", "3", "--json"]) == 3
     assert seen == [["solve", "--poses", "3", "--json"]]
 

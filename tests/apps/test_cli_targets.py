@@ -65,7 +65,9 @@ def test_a_bad_target_is_told_before_anything_is_done(call, sentence, tmp_path, 
     monkeypatch.setattr(
         "clench.solver.examples.read_examples", lambda *args: pytest.fail("the examples were read first")
     )
-    monkeypatch.setattr("clench.apps.bench.steadiness.bench_steadiness", lambda *args: pytest.fail("it was run first"))
+    monkeypatch.setattr(
+        "benchmarks.speed.epsilon_timing.bench_steadiness", lambda *args: pytest.fail("it was run first")
+    )
     before = sorted(tmp_path.rglob("*"))
     assert main(call) == 2
     told = capsys.readouterr()

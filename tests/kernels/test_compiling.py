@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.peers.kernels import stepped_closing
 from clench.kernels import compiling, warming
 
 KERNELS = Path(compiling.__file__).parent
@@ -63,16 +64,45 @@ def test_a_change_of_the_decorators_or_of_the_numbers_changes_every_stamp(copied
     assert all(after[module] != before[module] for module in before)
 
 
-def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expects():
-    outside = set()
-    for path in sorted(KERNELS.glob("*.py")):
+@pytest.mark.parametrize("statement", ["from clench.kernels.called import STEPS", "from .beside import STEPS"])
+def test_a_kernel_of_another_folder_is_kept_by_the_kernels_that_it_imports(copied, statement):
+    folder = Path(copied.__file__).parent / "elsewhere"
+    folder.mkdir()
+    folder.joinpath("beside.py").write_text("from ..called import STEPS\n")
+    outside = folder / "outside.py"
+    outside.write_text(f"{statement}\n")
+    before = copied.source_stamp(outside)
+    Path(copied.__file__).with_name("other.py").write_text("STEPS = 9\n")
+    stamps(copied)
+    assert copied.source_stamp(outside) == before
+    Path(copied.__file__).with_name("called.py").write_text("STEPS = 9\n")
+    stamps(copied)
+    assert copied.source_stamp(outside) != before
+
+
+def imported_files(path: Path) -> set[Path]:
+    """Return the files with kernels that a file imports, as Python does."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            found.add(path.parents[node.level - 1].joinpath(*node.module.split(".")).with_suffix(".py"))
+        elif isinstance(node, ast.ImportFrom) and node.module.startswith("clench.kernels"):
+            found.add(KERNELS.joinpath(*node.module.split(".")[2:]).with_suffix(".py"))
+    return found
+
+
+@pytest.mark.parametrize("folder", [KERNELS, Path(stepped_closing.__file__).parent])
+def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expects(folder):
+    outside, files = set(), sorted(folder.rglob("*.py"))
+    assert len(files) > 2
+    for path in files:
+        assert imported_files(path) == set(compiling._read(path)[1]), path
+        assert all(file.is_file() for file in imported_files(path)), path
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 outside |= {alias.name for alias in node.names if alias.name.startswith("clench")}
-            elif isinstance(node, ast.ImportFrom) and node.level:
-                assert node.level == 1, path
-                assert node.module in compiling._read(path)[1], path
-            elif isinstance(node, ast.ImportFrom) and node.module.startswith("clench"):
+            elif isinstance(node, ast.ImportFrom) and not node.level and node.module.startswith("clench"):
                 outside.add(node.module)
     # Only numbers of `tolerances` are compiled in; `memory` is called by functions that Python runs.
-    assert outside == {"clench.base", "clench.base.tolerances", "clench.base.memory"}
+    allowed = {"clench.base", "clench.base.tolerances", "clench.base.memory"}
+    assert {module for module in outside if not module.startswith("clench.kernels.")} <= allowed

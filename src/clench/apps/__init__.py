@@ -1,1 +1,1 @@
-"""What people touch: command line, figures, benchmarks. Nothing imports these."""
+"""What people touch: command line and figures. Nothing imports these."""

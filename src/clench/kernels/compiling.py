@@ -18,8 +18,8 @@ from .kernel_cache import forgive_unreadable, index_of
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
-#: How modules of kernels import each other; a test holds that there is no other way.
-_IMPORTED: Final = re.compile(r"^\s*from \.(\w+) import ", re.MULTILINE)
+#: How modules import kernels: beside them, from a folder above, or from this package. A test allows no other way.
+_IMPORTED: Final = re.compile(r"^\s*from (\.+|clench\.kernels\.)(\w[\w.]*) import ", re.MULTILINE)
 
 
 def kernel(function: Kernel) -> Kernel:
@@ -58,22 +58,29 @@ def source_stamp(module: Path) -> bytes:
     over others, and these decorators.
 
     Args:
-        module: file of the module, in the folder of the kernels.
+        module: file of the module, in any folder.
     """
     found, waiting = set[Path](), [module, Path(__file__), Path(tolerances.__file__)]
     while waiting:
         path = waiting.pop()
         if path not in found:
             found.add(path)
-            waiting += [path.with_name(f"{name}.py") for name in _read(path)[1]]
+            waiting += _read(path)[1]
     return hashlib.sha256(b"".join(_read(path)[0] for path in sorted(found))).digest()
 
 
 @cache
-def _read(path: Path) -> tuple[bytes, tuple[str, ...]]:
-    """Return the digest of a file, and the modules of its folder that it imports."""
+def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """Return the digest of a file, and the files with kernels that it imports."""
     content = path.read_bytes()
-    return hashlib.sha256(content).digest(), tuple(_IMPORTED.findall(content.decode()))
+    files = (_file(path, start, name) for start, name in _IMPORTED.findall(content.decode()))
+    return hashlib.sha256(content).digest(), tuple(files)
+
+
+def _file(path: Path, start: str, name: str) -> Path:
+    """Return the file of a module that a file imports by `from <start><name> import`."""
+    folder = path.parents[len(start) - 1] if start.startswith(".") else Path(__file__).parent
+    return folder.joinpath(*name.split(".")).with_suffix(".py")
 
 
 def is_kept(function: Any) -> bool:

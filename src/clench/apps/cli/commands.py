@@ -311,14 +311,14 @@ def record(
 
 
 def bench(*arguments: str) -> int:
-    """Run a benchmark that checks its own answers, e.g. `clench bench solve`.
+    """Run a benchmark of a checkout, e.g. `clench bench solve`; it checks its own answers.
 
     Args:
         arguments: name of the benchmark and its options.
     """
-    from clench.apps.bench.main import main
+    from .checkout import load_benchmarks
 
-    return int(main(list(arguments)))
+    return int(load_benchmarks().main(list(arguments)))
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

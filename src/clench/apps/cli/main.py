@@ -78,8 +78,8 @@ def _run(arguments: list[str]) -> int:
         return print_completion("clench", COMMANDS, arguments)
     if name not in COMMANDS:
         raise UnknownNameError("command", name, "clench", COMMANDS)
-    if name == "bench" and not {"-h", "--help"} & set(rest[:1]):
-        return bench(*rest)  # has options of its own
+    if name == "bench":
+        return bench(*rest)  # has commands and help of its own
     return parse_call(f"clench {name}", COMMANDS[name], rest)()
 
 

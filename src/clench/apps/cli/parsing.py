@@ -113,10 +113,10 @@ def _gathered(arguments: Sequence[str]) -> list[str]:
 
 
 def options_style() -> tuple[Any, ...]:
-    """Return how signatures become options: no `--no-x` for a flag, and no text that stands for None."""
+    """Return how signatures become options: no `--no-x` for a flag, no text for None, no group before a name."""
     import tyro
 
-    return tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone
+    return tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone, tyro.conf.OmitArgPrefixes
 
 
 def _sentence(box: str) -> str:

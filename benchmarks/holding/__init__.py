@@ -1,0 +1,1 @@
+"""Which share of planned grasps holds the object in simulation."""

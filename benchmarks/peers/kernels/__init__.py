@@ -1,0 +1,1 @@
+"""Kernels of the steppers. Only these benchmarks call them."""
