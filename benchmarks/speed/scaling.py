@@ -27,7 +27,7 @@ from .many_poses import stream_memory
 from .refined import base_mesh, refinements
 from .scaling_picture import draw_scaling, scaling_table
 from .solve_memory import solve_memory
-from .solving import close_in_parts, listening
+from .solving import stage_times
 
 PLANES: Final = (1, 2, 3, 5, 9, 17, 33)
 BATCHES: Final = (1, 4, 16, 64, 256, 1024)
@@ -232,16 +232,10 @@ class _Bench:
             for row, command in zip(rows, commands, strict=True):
                 flat = replace(command, full_width=False)
                 whole, planar = (timed(partial(clench.solve, self.hand, obj, c))[1] for c in (command, flat))
-                closing, cutting = (self._kernel(obj, c, part) for c, part in ((command, "fingers"), (flat, "cut")))
-                row.append({"whole": whole, "planar": planar, "fingers": closing, "cut": cutting})
+                closing, planes = (stage_times(self.hand, obj, c)["close"] for c in (command, flat))
+                row.append({"whole": whole, "planar": planar, "fingers": closing, "on_planes": planes})
         quickest = [{part: min(one[part] for one in row) for part in row[0]} for row in rows]
         return {part: float(np.median([one[part] for one in quickest])) for part in quickest[0]}
-
-    def _kernel(self, obj: GraspObject, command: GraspCommand, part: str) -> float:
-        """Return what a kernel takes in one solve [s]."""
-        with listening() as spent:
-            close_in_parts(self.hand, obj, command)
-        return sum(spent[part])
 
 
 def _command(pose: Pose, fingers: tuple[str, ...]) -> GraspCommand:

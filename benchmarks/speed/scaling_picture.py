@@ -24,7 +24,7 @@ _PARTS: Final = {
     "whole": ("one solve, certified", INK),
     "planar": ("one solve, planes only", CONTACT),
     "fingers": ("kernel: closing over the full width", CHOSEN),
-    "cut": ("kernel: cutting by the planes", JOINT_COLORS[0]),
+    "on_planes": ("kernel: closing on the planes", JOINT_COLORS[0]),
     "prepare": ("packing the object, once", FAINT),
     "certified": ("certified, per pose", CHOSEN),
     "planes": ("planes only, per pose", CONTACT),

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 import clench
 from clench.grasp.calibration import calibration_of
+from clench.grasp.solving import empty_answers, run_stages
+from clench.kernels.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 from clench.models.tessellation import shape_mesh
-from clench.solver.alternatives import close_sets, decided
-from clench.solver.planning import planned
+from clench.solver.alternatives import candidates_of
 from clench.solver.problem import make_problem
 from clench.solver.solution import GraspSolution
 
@@ -29,12 +29,6 @@ from .answer_checks import Checked, Surface, check_answer
 
 #: Wrong answers told before the rest is only counted.
 _TOLD = 5
-#: The kernels that close sets part by part: name of the part, module, function.
-_KERNELS = (
-    ("cut", "clench.kernels.family_section", "cut_first_families"),
-    ("overlap", "clench.kernels.overlap", "find_overlaps"),
-    ("fingers", "clench.kernels.closing", "close_items"),
-)
 
 
 def bench_solve(case: Case, asked: GraspCommand, runs: Runs) -> BenchReport:
@@ -67,7 +61,7 @@ def bench_solve(case: Case, asked: GraspCommand, runs: Runs) -> BenchReport:
         report.values[f"{key}_s"] = seconds
     _time_preparation(report, hand, obj, commands[0])
     _time_solves(report, hand, obj, commands, runs.passes)
-    _time_kernels(report, hand, obj, commands, runs.passes)
+    _time_stages(report, hand, obj, commands, runs.passes)
     return report
 
 
@@ -171,46 +165,25 @@ def _time_solves(
             report.values[f"stage_{stage}_median_ms"] = float(np.median(taken)) * 1e3
 
 
-def _time_kernels(
+def _time_stages(
     report: BenchReport, hand: Hand, obj: GraspObject, commands: Sequence[GraspCommand], passes: int
 ) -> None:
-    for kind, full_width in (("close", True), ("planes", False)):
-        with listening() as spent:
-            for command in [replace(command, full_width=full_width) for _ in range(passes) for command in commands]:
-                close_in_parts(hand, obj, command)
-        for part, times in spent.items():
-            if times:
-                report.distribution(f"{kind}_{part}", times)
+    for kind, full_width in (("width", True), ("planes", False)):
+        spent = defaultdict[str, list[float]](list)
+        for command in [replace(command, full_width=full_width) for _ in range(passes) for command in commands]:
+            for stage, seconds in stage_times(hand, obj, command).items():
+                spent[stage].append(seconds)
+        for stage, times in spent.items():
+            report.distribution(f"{kind}_{stage}", times)
 
 
-def close_in_parts(hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
-    """Close the sets that a solve closes, kernel by kernel; the solve itself does it, and more, in one."""
+def stage_times(hand: Hand, obj: GraspObject, command: GraspCommand) -> dict[str, float]:
+    """Run the kernels of a solve stage by stage, where the solve itself runs them in one call; return the times [s].
+
+    The kernels choose here as they do in a solve by their criteria, so the command may have no others.
+    """
     problem = make_problem(hand, obj, command)
-    made = decided(problem, calibration_of(command.criteria)) or planned(problem)
-    close_sets(problem, made, lambda stage: None)
-
-
-@contextmanager
-def listening() -> Iterator[dict[str, list[float]]]:
-    """Put a stop watch around the kernels that `close_in_parts` calls; the lists fill while the context lasts."""
-    import importlib
-
-    spent: dict[str, list[float]] = {part: [] for part, _, _ in _KERNELS}
-
-    def watched(kernel: Callable[..., Any], times: list[float]) -> Callable[..., Any]:
-        def call(*arguments: Any) -> Any:
-            result, seconds = timed(lambda: kernel(*arguments))
-            times.append(seconds)
-            return result
-
-        return call
-
-    places = [(part, importlib.import_module(module), name) for part, module, name in _KERNELS]
-    kept = [(module, name, getattr(module, name)) for _, module, name in places]
-    try:
-        for part, module, name in places:
-            setattr(module, name, watched(getattr(module, name), spent[part]))
-        yield spent
-    finally:
-        for module, name, kernel in kept:
-            setattr(module, name, kernel)
+    packed = candidates_of(problem, calibration_of(command.criteria)).problem
+    T, answers = problem.T_palm_object[None, :3], empty_answers(packed, 1)
+    stages = {"close": CLOSE | BLOCK, "choose": CHOOSE, "finish": FINISH}
+    return {name: timed(partial(run_stages, packed, T, answers, stage))[1] for name, stage in stages.items()}

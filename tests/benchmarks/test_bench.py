@@ -15,8 +15,11 @@ from benchmarks.bench_report import BenchReport, describe_place
 from benchmarks.speed import choosing, solving
 from benchmarks.speed.answer_checks import Checked, Surface, check_answer, triangle_distances
 from clench.base.errors import CommandError, UnknownNameError
+from clench.grasp.calibration import calibration_of
+from clench.grasp.solving import empty_answers, run_stages, solve_packed
+from clench.kernels.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
-from clench.solver.alternatives import finger_sets
+from clench.solver.alternatives import candidates_of, finger_sets
 from clench.solver.problem import make_problem, make_setting
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
@@ -127,13 +130,22 @@ def test_distances_from_triangles() -> None:
         assert triangle_distances(triangles, np.array(point)) == pytest.approx(np.array(expected), abs=1e-15)
 
 
-def test_the_stop_watches_are_taken_off() -> None:
-    import clench.kernels.closing as closing
-
-    kernel = closing.close_items
-    with solving.listening():
-        assert closing.close_items is not kernel
-    assert closing.close_items is kernel
+@pytest.mark.parametrize("full_width", [True, False])
+def test_stages_one_after_another_give_the_answer_of_one_call(full_width: bool) -> None:
+    hand, ball = clench.Hand.load("patent15"), clench.GraspObject.load("ball")
+    pose = clench.approach_poses(hand, ball, 1, 0)[0]
+    command = clench.GraspCommand(hand_pose=pose, preshape="open", planes=2, full_width=full_width)
+    times = solving.stage_times(hand, ball, command)
+    assert list(times) == ["close", "choose", "finish"]
+    problem = make_problem(hand, ball, command)
+    packed = candidates_of(problem, calibration_of(None)).problem
+    apart, T = empty_answers(packed, 1), problem.T_palm_object[None, :3]
+    for stage in (CLOSE, BLOCK, CHOOSE, FINISH):
+        run_stages(packed, T, apart, stage)
+    at_once = solve_packed(packed, T).solved
+    for one, other in zip(apart.solved, at_once, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert at_once.contacts.any()
 
 
 def test_distribution_is_in_milliseconds() -> None:

@@ -64,13 +64,13 @@ def solve_packed(
     def run(span: tuple[int, int]) -> None:
         some, T = answers.at(slice(*span)), T_palm_object[slice(*span)]
         if choose is None:
-            _run_stages(problem, T, some, first | CHOOSE | FINISH)
+            run_stages(problem, T, some, first | CHOOSE | FINISH)
             return
-        _run_stages(problem, T, some, first)
+        run_stages(problem, T, some, first)
         for n in range(span[1] - span[0]):
             items, nested = choose(span[0] + n, some.at(slice(n, n + 1)))
             some.solved.chosen[n], some.closed.nested[n] = items, nested
-        _run_stages(problem, T, some, FINISH)
+        run_stages(problem, T, some, FINISH)
 
     share_out(run, pairwise(ends), threads)
     return answers
@@ -81,11 +81,11 @@ def close_items(problem: PackedProblem, T_palm_object: FloatArray) -> Closed:
     from clench.kernels.solve_layout import BLOCK, CLOSE
 
     answers = empty_answers(problem, 1)
-    _run_stages(problem, T_palm_object[None], answers, CLOSE | BLOCK)
+    run_stages(problem, T_palm_object[None], answers, CLOSE | BLOCK)
     return answers.closed
 
 
-def _run_stages(problem: PackedProblem, T_palm_object: FloatArray, answers: Answers, stages: int) -> None:
+def run_stages(problem: PackedProblem, T_palm_object: FloatArray, answers: Answers, stages: int) -> None:
     """Run stages for a range of poses, with arenas that grow until they are large enough."""
     from clench.kernels.solve_poses import solve_poses
 
