@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ _PLAIN: Final = frozenset({str, int, bool, type(None), ClosingOrder, CollisionSo
 _FLOATS: Final = frozenset({float, np.float64})
 
 
-@dataclass(frozen=True, eq=False)
-class CheckedCommand:
+class CheckedCommand(NamedTuple):
     """A command that was checked against its hand.
 
     Args:
@@ -35,18 +34,13 @@ class CheckedCommand:
         start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
     """
 
-    hand: Hand
     command: GraspCommand
     start: FloatArray
     source: CollisionSource
 
-    @property
-    def together(self) -> bool:
-        """Whether all joints close at once."""
-        return self.command.order != ClosingOrder.PROXIMAL_FIRST
 
-
-_kept: OrderedDict[tuple[object, ...], CheckedCommand] = OrderedDict()
+#: With the hands, so that the identity of each stays its own.
+_kept: OrderedDict[tuple[object, ...], tuple[Hand, CheckedCommand]] = OrderedDict()
 
 
 def checked(hand: Hand, command: GraspCommand) -> CheckedCommand:
@@ -60,8 +54,9 @@ def checked(hand: Hand, command: GraspCommand) -> CheckedCommand:
         key = (id(hand), type(command), *content)
     except (TypeError, RecursionError):
         return _check(hand, command)
-    found = _kept.pop(key, None) or _check(hand, command)
-    _kept[key] = found
+    kept = _kept.pop(key, None)
+    found = _check(hand, command) if kept is None else kept[1]
+    _kept[key] = hand, found
     while len(_kept) > _KEPT:
         _kept.popitem(last=False)
     return found
@@ -75,7 +70,7 @@ def _check(hand: Hand, command: GraspCommand) -> CheckedCommand:
 
         own = replace(own, preshape=preshape_angles(hand, own.preshape))
     source = CollisionSource(own.collision_source or hand.default_source)
-    return CheckedCommand(hand, own, open_posture(hand, own), source)
+    return CheckedCommand(own, open_posture(hand, own), source)
 
 
 def _content(value: Any) -> object:

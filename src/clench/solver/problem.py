@@ -19,7 +19,7 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
 
-from .checked import CheckedCommand, checked
+from .checked import checked
 
 #: More rounds than any finger needs that comes to rest.
 UNTIL_REST = 1000
@@ -27,34 +27,22 @@ UNTIL_REST = 1000
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One problem to solve: hand, object and command, checked and at their poses.
+    """One problem to solve: hand, object and command, checked and at their poses; J joints.
 
     Args:
-        checked: the command, wherever hand and object are. command: the same at the poses asked for.
+        hand, obj: what closes around what. command: a copy of the command.
+        start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
         T_world_palm, T_world_object: poses. packed: the object.
     """
 
-    checked: CheckedCommand
+    hand: Hand
     obj: GraspObject
     command: GraspCommand
+    start: FloatArray
+    source: CollisionSource
     T_world_palm: Pose
     T_world_object: Pose
     packed: PackedObject
-
-    @property
-    def hand(self) -> Hand:
-        """The hand."""
-        return self.checked.hand
-
-    @property
-    def start(self) -> FloatArray:
-        """Posture before closing, shape (J,) [rad]."""
-        return self.checked.start
-
-    @property
-    def source(self) -> CollisionSource:
-        """Geometry of the hand."""
-        return self.checked.source
 
     @property
     def rounds(self) -> int:
@@ -64,7 +52,7 @@ class Problem:
     @property
     def together(self) -> bool:
         """Whether all joints close at once."""
-        return self.checked.together
+        return self.command.order != ClosingOrder.PROXIMAL_FIRST
 
     @cached_property
     def T_palm_object(self) -> FloatArray:
@@ -84,14 +72,14 @@ class Problem:
 
 def make_problem(hand: Hand, obj: GraspObject, command: GraspCommand) -> Problem:
     """Check the three inputs and bring them together."""
-    asked = checked(hand, command)
+    own, start, source = checked(hand, command)
     if not any(body.role is BodyRole.GRASPABLE for body in obj.bodies):
         raise ObjectError(f"{obj.name}: no body to grasp; every body is an obstacle.")
     T_world_object = command.object_pose if command.object_pose is not None else obj.pose
-    T_world_palm = palm_pose(hand, command, asked.start)
+    T_world_palm = palm_pose(hand, command, start)
     warn_of_size(hand, obj)
-    own = asked.command.at(command.hand_pose, command.object_pose)
-    return Problem(asked, obj, own, T_world_palm, T_world_object, pack_object(obj))
+    own = own.at(command.hand_pose, command.object_pose)
+    return Problem(hand, obj, own, start, source, T_world_palm, T_world_object, pack_object(obj))
 
 
 def check_calibration(hand: Hand, calibration: Calibration) -> None:
