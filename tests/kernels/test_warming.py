@@ -8,7 +8,7 @@ import pytest
 import clench
 from clench.apps.cli.demo import MUG_POSE
 from clench.base.pose import Pose
-from clench.kernels import family_section, frames, link_meshes, solve_poses, touches, warming
+from clench.kernels import frames, link_meshes, solve_poses, touches, warming
 from clench.kernels.compiling import index_of
 
 
@@ -22,7 +22,7 @@ def test_what_is_compiled_is_what_a_solve_calls():
     clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE, preshape="open")).to_dict()
     values = warming.sample_values()
     called = (
-        *(solve_poses.solve_poses, family_section.cut_first_families, frames.relate_poses, frames.place_links),
+        *(solve_poses.solve_poses, frames.relate_poses, frames.place_links),
         *(link_meshes.measure_depths, link_meshes.find_contained, touches.read_touches),
     )
     for kernel in called:

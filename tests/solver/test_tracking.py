@@ -96,8 +96,8 @@ def worth(candidate: clench.Candidate) -> float:
 @pytest.mark.parametrize(
     ("asked", "sentence"),
     [
-        ({"order": clench.ClosingOrder.TOGETHER}, "expected a command with one open posture per finger"),
-        ({"yaw_grid": (0.0, 0.1), "open_variants": (0.1,)}, "expected a command with one open posture per finger"),
+        ({"orders": ("proximal-first", "together")}, "expected a command with one closing order"),
+        ({"yaw_grid": (0.0, 0.1), "open_variants": (0.1,)}, "and one open posture per finger"),
         ({"criteria": "steady", "full_width": False}, "criteria that are range_of_motion"),
     ],
 )
@@ -112,3 +112,13 @@ def test_bad_numbers() -> None:
         clench.Tracker(HAND, BALL, command, margin=-1)
     with pytest.raises(CommandError, match=r"object_pose: expected a clench\.Pose, got list"):
         clench.Tracker(HAND, BALL, command).update(object_pose=[0, 0, 0])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("asked", [{"order": clench.ClosingOrder.TOGETHER}, {"rounds": 2}], ids=str)
+def test_other_orders_are_tracked_with_the_bits_of_a_solve(asked: dict[str, object]) -> None:
+    command = clench.GraspCommand(hand_pose=START, planes=1, **{"preshape": "open", **asked})  # type: ignore[arg-type]
+    answer = clench.Tracker(HAND, BALL, command).update()
+    solution = clench.solve(HAND, BALL, command)
+    assert answer.joint_angles[0].tolist() == list(solution.joint_angles.values())
+    assert answer.status[0] == solution.status
+    assert len(answer.contacts) == len(solution.contacts) > 0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from .surface import object_surface
 
 if TYPE_CHECKING:
     from clench.kernels.layout import ClosingArrays
+    from clench.kernels.meeting_layout import Meetings
+
+#: The kind of a touch of two links' surfaces that lie on no plane.
+_FACE: Final = 5
 
 
 class Touch(NamedTuple):
@@ -171,6 +175,38 @@ def read_candidates(
             )
         )
     return candidates
+
+
+def held_touches(plan: HandPlan, met: Meetings) -> dict[int, list[Touch]]:
+    """Return the touches of fingers that hold each other, by finger; those of a finger that rests are left out.
+
+    Args:
+        plan: of the hand. met: where fingers that close at once met, at one pose.
+    """
+    held: dict[int, list[Touch]] = {}
+    for number, value in zip(met.number[: met.size[0]].tolist(), met.value[: met.size[0]], strict=True):
+        for (finger, link, joint), other, sign in ((number[:3], number[4], 1.0), (number[3:], number[1], -1.0)):
+            if joint >= 0:
+                touch = _held(value, link, other, int(plan.frames.chain_joint[joint]), sign)
+                held.setdefault(finger, []).append(touch)
+    return held
+
+
+def _held(value: FloatArray, link: int, met: int, joint: int, sign: float) -> Touch:
+    return Touch(
+        link=link,
+        joint=joint,
+        body=-1 - met,
+        graspable=False,
+        plane=None,
+        offset=0.0,
+        kind=_FACE,
+        position=value[:3],
+        normal=sign * value[3:6],
+        gap=float(value[6]),
+        curve_angle=0.0,
+        link_angle=None,
+    )
 
 
 def _read_items(

@@ -19,6 +19,7 @@ from clench.models.hand.hand import Finger
 from .blocking import link_masks
 from .containment import link_within_link
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
+from .finger_links import pack_finger_links
 from .hand_plan import HandPlan
 from .scene import PackedObject
 from .surface import object_surface, round_arrays
@@ -166,6 +167,7 @@ def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) ->
         across=bodies.across,
         apart=np.asarray(bodies.across - bodies.within),
         command=_pack_command(plan, terms, tip_only, planes_tell(plan, items)),
+        fingers=pack_finger_links(plan),
     )
 
 

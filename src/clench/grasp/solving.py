@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,11 @@ from .threads import share_out
 
 if TYPE_CHECKING:
     from clench.kernels.layout import ClosingArrays
+    from clench.kernels.meeting_layout import Meetings
     from clench.kernels.solve_layout import Closed, Solved
+
+
+Arrays = TypeVar("Arrays")
 
 
 class Answers(NamedTuple):
@@ -127,6 +131,8 @@ def empty_answers(problem: PackedProblem, count: int) -> Answers:
         nested=np.full(count, int(arrays.command.nested), dtype=np.int64),
         final=_closing_arrays(problem, (count, fingers)),
         anew=_whole((count, fingers)),
+        overlapping=_whole((count, fingers)),
+        met=_meetings(problem, count),
         overflow=_whole((count,)),
     )
     solved = Solved(
@@ -159,6 +165,14 @@ def _closing_arrays(problem: PackedProblem, shape: tuple[int, int]) -> ClosingAr
     )
 
 
+def _meetings(problem: PackedProblem, count: int) -> Meetings:
+    """Return room for all meetings of links: two links meet once at most."""
+    from clench.kernels.meeting_layout import Meetings
+
+    most = len(problem.arrays.fingers.link) ** 2 // 2
+    return Meetings(_whole((count, 1)), _whole((count, most, 6)), np.zeros((count, most, 8)))
+
+
 def _whole(shape: tuple[int, ...]) -> NDArray[np.int64]:
     return np.zeros(shape, dtype=np.int64)
 
@@ -169,7 +183,7 @@ def _rows(arrays: Any, part: slice | int) -> Any:
     return type(arrays)(*columns)
 
 
-def row_of(arrays: ClosingArrays, n: int) -> ClosingArrays:
-    """Return the answers of all items at one pose."""
-    row: ClosingArrays = _rows(arrays, n)
+def row_of(arrays: Arrays, n: int) -> Arrays:
+    """Return the arrays of one pose, of arrays with the poses first."""
+    row: Arrays = _rows(arrays, n)
     return row

@@ -119,7 +119,7 @@ def needs_planes(items: ItemArrays) -> bool:
     return bool(planes > 0)
 
 
-@kernel
+@inner_kernel
 def cut_first_families(
     hand: HandArrays,
     tree: MeshTree,

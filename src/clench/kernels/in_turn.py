@@ -6,7 +6,6 @@ from .bundles import among, clear_answer, with_lengths
 from .closing import close_item
 from .compiling import inner_allocating_kernel, inner_kernel
 from .exact import ExactArrays
-from .family_section import cut_first_families, needs_planes
 from .frames import put_links
 from .layout import SUNK, ClosingArrays, Floats, HandArrays, Ints
 from .picking import put_item_angles, take_joints
@@ -21,7 +20,6 @@ def close_in_turn(
     final: ClosingArrays,
     blocked: Ints,
     anew: Ints,
-    fresh: bool,
 ) -> int:
     """Close fingers anew that meet another one, each with the earlier ones where they are by then.
 
@@ -29,17 +27,13 @@ def close_in_turn(
     object before they move, stay as they are.
 
     Args:
-        final: answers of the picked items, which are overwritten. blocked: see `Closed`. anew: written, (F,).
-        fresh: the arenas hold the sections of another pose.
+        final: answers of the picked items, which are overwritten. blocked: see `Closed`. anew: written where a finger
+            closes anew, (F,).
 
     Returns:
         the capacity of the arenas that is wanted, or 0.
     """
     hand, target, nothing, command = problem.hand, problem.target, problem.nothing, problem.command
-    for f in range(anew.shape[0]):
-        anew[f] = 0
-    if command.alone or command.together:
-        return 0
     first = 0
     while True:
         place_fingers(problem, space, final)
@@ -50,11 +44,6 @@ def close_in_turn(
         if f < 0:
             return 0
         shared = space.arena.shared
-        if fresh and needs_planes(space.picked):
-            overflow = cut_first_families(hand, target.tree, target.rounds, T_palm_object, shared, space.work.pose)
-            if overflow > 0:
-                return int(overflow)
-            fresh = False
         everything = among(problem.exact, space.swept, target.bodies, space.placed, problem.across)
         clear_answer(final, f)
         close_item(

@@ -13,6 +13,7 @@ from .exact import ExactArrays
 from .frames import FrameArrays
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays, Work
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh
+from .meeting_layout import FingerLinks, Meetings, MeetingWork
 from .sweeping import SweepWork
 from .touches import SurfaceArrays, TouchArrays
 from .tree import MeshTree
@@ -82,6 +83,7 @@ class ProblemArrays(NamedTuple):
         surface, mesh: the object, as contacts are read and depths measured. meshes: of the links.
         across: whether a moving link (row) may not overlap a resting one, of any finger, (L, L). apart: the same for
             links of different fingers alone, (L, L). command: see `CommandArrays`.
+        fingers: the links of fingers that close at once; empty where they close one after another.
     """
 
     hand: HandArrays
@@ -96,6 +98,7 @@ class ProblemArrays(NamedTuple):
     across: Ints
     apart: Ints
     command: CommandArrays
+    fingers: FingerLinks
 
 
 class Arena(NamedTuple):
@@ -119,7 +122,7 @@ class Workspace(NamedTuple):
         picked: the items that the fingers take, (F,). swept: whether each is swept exactly, (F,).
         placed: `T_palm_link` when each entry begins to close, (E, L, 3, 4). length: travel of all groups, (G,).
         q, angles: of all joints, (J,). poses: (L + 2, 3, 4).
-        touches: see `TouchArrays`.
+        touches: see `TouchArrays`. rows: fingers that are swept exactly, (F,). meeting: of fingers that close at once.
     """
 
     arena: Arena
@@ -135,6 +138,8 @@ class Workspace(NamedTuple):
     angles: Floats
     poses: Floats
     touches: TouchArrays
+    rows: Ints
+    meeting: MeetingWork
 
 
 class Closed(NamedTuple):
@@ -148,6 +153,8 @@ class Closed(NamedTuple):
         nested: whether links lie inside each other at the start of the chosen items, (N,).
         final: answers of the chosen items, each with the other fingers in its way, (N, F).
         anew: whether a finger closed again, as another one was in its way, (N, F).
+        overlapping: whether a finger that closes at once with the others overlaps one of them at the start, (N, F).
+        met: where fingers that close at once held each other, with the poses first.
         overflow: 0 for a pose that is solved; else the capacity wanted, or anything before the first try, (N,).
     """
 
@@ -157,6 +164,8 @@ class Closed(NamedTuple):
     nested: Ints
     final: ClosingArrays
     anew: Ints
+    overlapping: Ints
+    met: Meetings
     overflow: Ints
 
 

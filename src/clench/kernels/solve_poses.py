@@ -7,12 +7,13 @@ import numpy as np
 from .advance import make_work
 from .bundles import answer_at
 from .choosing import choose_sets
+from .close_with_others import close_with_others
 from .compiling import allocating_kernel, inner_allocating_kernel
 from .free_closing import close_free, find_blocked
 from .handing import whole
-from .in_turn import close_in_turn
 from .layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays, Floats, ItemArrays
 from .link_meshes import make_depth_work
+from .meeting_layout import make_meeting_work
 from .picking import pick_items
 from .solve_layout import BLOCK, CHOOSE, CLOSE, FINISH, Arena, Closed, ProblemArrays, Solved, Workspace
 from .sweeping import make_sweep_work
@@ -48,9 +49,9 @@ def solve_poses(
         if stages & FINISH and overflow == 0:
             final = answer_at(found.final, n)
             pick_items(problem, free, solved.chosen[n], space, final)
-            overflow = close_in_turn(problem, T, space, final, found.blocked[n], found.anew[n], stages & CLOSE == 0)
+            overflow = close_with_others(problem, T, space, final, found, n, stages & CLOSE == 0)
             if overflow == 0:
-                judge_pose(problem, T, space, final, found.blocked[n], found.nested[n] != 0, solved, n)
+                judge_pose(problem, T, space, final, found, solved, n)
         found.overflow[n] = overflow
 
 
@@ -77,6 +78,8 @@ def make_workspace(problem: ProblemArrays, arena: Arena, found: Closed, solved: 
         command.start.copy(),
         np.empty((links + 2, 3, 4)),
         TouchArrays(numbers, np.empty((max(items, fingers), contacts, TOUCH_FLOATS))),
+        one.copy(),
+        make_meeting_work(problem.fingers, fingers, joints),
     )
 
 

@@ -11,8 +11,9 @@ from .exact import find_link_overlap
 from .frames import put_links, tie
 from .layout import SUNK, ClosingArrays, Floats, Ints
 from .link_meshes import find_contained
+from .meeting_layout import Meetings
 from .picking import put_item_angles, take_joints
-from .solve_layout import ProblemArrays, Solved, Workspace
+from .solve_layout import Closed, ProblemArrays, Solved, Workspace
 from .start_overlap import any_deep
 from .touches import TOUCH_FLOATS, TOUCH_INTEGERS, TOUCH_LINK, TOUCH_NORMAL, TouchArrays
 
@@ -29,24 +30,24 @@ def judge_pose(
     T_palm_object: Floats,
     space: Workspace,
     final: ClosingArrays,
-    blocked: Ints,
-    nested: bool,
+    found: Closed,
     solved: Solved,
     n: int,
 ) -> None:
     """Read the contacts of the picked items, and write posture, statuses and certificate of pose `n`.
 
     Args:
-        final: answers of the picked items. blocked, nested: see `Closed`.
+        final: answers of the picked items. found: how the fingers closed. solved: written.
     """
-    command, fingers = problem.command, final.contacts.shape[0]
-    write_fingers(problem, T_palm_object, space, final, blocked, solved, n)
-    touching, stuck = 0, 0
+    command, fingers, blocked = problem.command, final.contacts.shape[0], found.blocked[n]
+    write_fingers(problem, T_palm_object, space, final, found, solved, n)
+    touching, stuck, apart = 0, 0, True
     for f in range(fingers):
         touching += 1 if solved.fingers[n, f] == TOUCH else 0
         stuck += 1 if blocked[space.picked.entry[f]] else 0
+        apart = apart and found.overlapping[n, f] == 0
     free = not any_deep(problem.meshes, command.fixed, command.start_pose, problem.mesh, T_palm_object, space.depth)
-    certified = free and stuck == 0 and not nested
+    certified = free and stuck == 0 and apart and found.nested[n] == 0
     certified = certified and is_certified(problem, T_palm_object, space, final, solved.angles[n])
     solved.certified[n] = 1 if certified else 0
     if not free or stuck == fingers + command.idle:
@@ -65,7 +66,7 @@ def write_fingers(
     T_palm_object: Floats,
     space: Workspace,
     final: ClosingArrays,
-    blocked: Ints,
+    found: Closed,
     solved: Solved,
     n: int,
 ) -> None:
@@ -76,8 +77,8 @@ def write_fingers(
     for f in range(final.contacts.shape[0]):
         entry, contacts = space.picked.entry[f], final.contacts[f]
         links = read_item(problem, space.picked, T_palm_object, final, f, touches)
-        stuck = blocked[entry] != 0 or final.overlap[f] <= SUNK
-        first = touches.number[f, 0, TOUCH_LINK] if contacts > 0 else -1
+        stuck = found.blocked[n, entry] != 0 or final.overlap[f] <= SUNK
+        first = touches.number[f, 0, TOUCH_LINK] if contacts > 0 else held_link(found.met, n, f)
         solved.fingers[n, f] = finger_status(problem, entry, stuck, links, first)
         solved.contacts[n, f] = contacts
         for m in range(contacts):
@@ -88,6 +89,16 @@ def write_fingers(
         put_item_angles(problem, entry, final.travel[f], final.turn[f], space.angles)
         take_joints(problem.command, entry, space.angles, angles)
     tie(problem.frames, angles)
+
+
+@inner_kernel
+def held_link(met: Meetings, n: int, f: int) -> int:
+    """Return the link of a finger that another finger holds first, or -1."""
+    for k in range(met.size[n, 0]):
+        for at in range(0, 6, 3):
+            if met.number[n, k, at] == f and met.number[n, k, at + 2] >= 0:
+                return int(met.number[n, k, at + 1])
+    return -1
 
 
 @inner_kernel

@@ -36,6 +36,7 @@ from .layout import (
     Work,
 )
 from .link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, measure_depths
+from .meeting_layout import FingerLinks, Meetings, MeetingWork
 from .nearness import smallest_gap
 from .settling import settle_pair
 from .solve_layout import Arena, Closed, CommandArrays, ObjectArrays, ProblemArrays, Solved, Workspace
@@ -157,14 +158,19 @@ def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
     parts: list[Any] = [values[name] for name in ("hand", "exact", "items")]
     parts += [target, target, *(values[name] for name in ("frames", "surface", "mesh", "meshes")), *_arrays("i2 i2")]
     answers = ClosingArrays(*_arrays("f3 f3 i2 i4 f4 f5 i2 i2 i2"))
-    parts.append(command := CommandArrays(*counts))
-    arena, closed = Arena(*[values["sections"]] * 4), [answers, *_arrays("i2 i2 i1"), answers, *_arrays("i2 i1")]
+    command, fingers = CommandArrays(*counts), FingerLinks(*_arrays("i1 i1 i1 f2 f1 i2"))
+    parts += [command, fingers]
+    arena, closed = Arena(*[values["sections"]] * 4), [answers, *_arrays("i2 i2 i1"), answers, *_arrays("i2 i2")]
+    closed += [Meetings(*_arrays("i2 i3 f3")), *_arrays("i1")]
     written: list[Any] = [values["work"], values["sweep"], DepthWork(*_arrays("f1 s1 f3 f2 s2")), values["answer"]]
-    written += [values["items"], *_arrays("i1 f4 f1 f1 f1 f3"), values["touches"]]
+    written += [values["items"], *_arrays("i1 f4 f1 f1 f1 f3"), values["touches"], *_arrays("i1")]
+    written.append(meeting := MeetingWork(*_arrays("f2 f1 f1 f1 f1 f1 f2 i2 f1 f2 f1 f3 f1")))
     return {
         "obj": target,
         "problem": kept(ProblemArrays(*parts)),
         "command": command,
+        "fingers": fingers,
+        "room": meeting,
         "arena": kept(arena),
         "space": Workspace(arena, *written),
         "found": Closed(*closed),

@@ -8,7 +8,7 @@ from functools import partial
 
 from clench.base.deferring import DeferredMapping, once
 from clench.grasp.calibration import Calibration, calibration_of
-from clench.grasp.candidates import FingerCandidate, read_candidates
+from clench.grasp.candidates import FingerCandidate, held_touches, read_candidates
 from clench.grasp.criterion_registry import score_sets
 from clench.grasp.solving import Answers, row_of, solve_packed
 from clench.models.command import GraspCommand
@@ -130,13 +130,18 @@ class PoseSolver:
         return lambda: group_by_finger(plan, free)
 
     def _closed_again(self, answers: Answers, best: list[FingerCandidate]) -> list[int]:
-        """Put the sets that closed again in the place of the chosen ones; return the numbers of their fingers."""
+        """Put the sets that the other fingers changed in the place of the chosen ones; return their fingers."""
         problem, closed = self._problem, answers.closed
         picked = self._candidates.plan.only(answers.solved.chosen[0].tolist())
-        changed = closed.anew[0].nonzero()[0].tolist()
-        if changed:
+        anew, overlapping = closed.anew[0] != 0, closed.overlapping[0] != 0
+        if anew.any():
             nowhere = [None] * len(picked.plans)
             sets = read_candidates(picked, problem.packed, row_of(closed.final, 0), problem.T_palm_object, nowhere)
-            for k in changed:
+            for k in anew.nonzero()[0].tolist():
                 best[k] = replace(sets[k], item=best[k].item, clear=best[k].clear)
-        return list(changed)
+        held = held_touches(picked, row_of(closed.met, 0))
+        for k in sorted({*held, *overlapping.nonzero()[0].tolist()}):
+            touches = (*best[k].touches, *held.get(k, ()))
+            best[k] = replace(best[k], exact=best[k].exact and not overlapping[k], touches=touches)
+            anew[k] = True
+        return [int(k) for k in anew.nonzero()[0]]
