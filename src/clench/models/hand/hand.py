@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from .tendons import TendonMap
 
 if TYPE_CHECKING:
     from .overlaps import Overlaps, Pairs
+
+Value = TypeVar("Value")
 
 #: Speed of joints whose model gives no limit [rad/s].
 DEFAULT_SPEED: Final = 2.0
@@ -296,24 +298,32 @@ class Hand:
         return self._with_overlapping(source, found.always | at_start)
 
     def _overlaps(self, source: CollisionSource) -> Overlaps:
-        if source not in self._found_overlaps:
-            from .overlaps import NO_OVERLAPS, find_overlaps
+        from .overlaps import NO_OVERLAPS, find_overlaps
 
-            if not self.overlaps_allowed:
-                return NO_OVERLAPS
-            self._found_overlaps[source] = find_overlaps(self, CollisionSource(source))
-        return self._found_overlaps[source]
+        if not self.overlaps_allowed:
+            return NO_OVERLAPS
+        return self.kept(("overlaps", source), lambda: find_overlaps(self, CollisionSource(source)))
 
     def _with_overlapping(self, source: CollisionSource, pairs: Pairs) -> tuple[tuple[int, int], ...]:
-        return self._allowed_pairs.setdefault((source, pairs), tuple(sorted({*self.allowed_pairs, *pairs})))
+        return self.kept(("pairs", source, pairs), lambda: tuple(sorted({*self.allowed_pairs, *pairs})))
+
+    def kept(self, key: tuple[Hashable, ...], make: Callable[[], Value]) -> Value:
+        """Return what was made of the hand under a key, and make it the first time.
+
+        It lives as long as the hand. Copies of the hand start with nothing.
+        """
+        if key not in self._kept:
+            self._kept[key] = make()
+        found: Value = self._kept[key]
+        return found
 
     @cached_property
-    def _found_overlaps(self) -> dict[CollisionSource, Overlaps]:
+    def _kept(self) -> dict[tuple[Hashable, ...], Any]:
         return {}
 
-    @cached_property
-    def _allowed_pairs(self) -> dict[tuple[CollisionSource, Pairs], tuple[tuple[int, int], ...]]:
-        return {}
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone, for copies and pickles."""
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
     def joint_index(self, name: str) -> int:
         """Return the index of a joint.
