@@ -118,6 +118,7 @@ def solve(
     from clench.solver.pareto import hand_front
 
     from .choice_tables import print_choice
+    from .kernel_loading import load_kernels
     from .preshape_tables import print_posture_choice
     from .printing import print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
@@ -139,6 +140,7 @@ def solve(
             return _no_grasp(plan, json)
         given, planned = replace(plan[0].command, seed=seed), plan[0]
     the_command = in_orders(replace(given, **asked), order or ())
+    load_kernels(the_command)
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
