@@ -1,8 +1,16 @@
-"""Load kernels ahead of a solve, so that its time is that of computing."""
+"""Compile and load kernels ahead of a solve, so that its time is that of computing."""
 
 from __future__ import annotations
 
 from clench.models.command import ClosingOrder, GraspCommand
+
+
+def compile_kernels() -> None:
+    """Compile what any solve calls, where it is not on disk, and say so."""
+    from clench.kernels.warming import announce, warm_up
+
+    announce()
+    warm_up()
 
 
 def load_kernels(command: GraspCommand) -> None:

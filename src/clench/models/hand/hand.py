@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, UnknownNameError
+from clench.base.keeping import Keeper
 from clench.base.pose import FloatArray
 from clench.base.short_repr import described, short_repr
 from clench.models.shapes import CollisionSource, Shape
@@ -23,8 +24,6 @@ from .tendons import TendonMap
 
 if TYPE_CHECKING:
     from .overlaps import Overlaps, Pairs
-
-Value = TypeVar("Value")
 
 #: Speed of joints whose model gives no limit [rad/s].
 DEFAULT_SPEED: Final = 2.0
@@ -160,7 +159,7 @@ class Finger:
 
 
 @dataclass(frozen=True)
-class Hand:
+class Hand(Keeper):
     """A robot hand, as read from a model file: links, joints, couplings, and the fingers found in them.
 
     Links are sorted so that parents come first. Palm-frame quantities are at the reference posture.
@@ -306,24 +305,6 @@ class Hand:
 
     def _with_overlapping(self, source: CollisionSource, pairs: Pairs) -> tuple[tuple[int, int], ...]:
         return self.kept(("pairs", source, pairs), lambda: tuple(sorted({*self.allowed_pairs, *pairs})))
-
-    def kept(self, key: tuple[Hashable, ...], make: Callable[[], Value]) -> Value:
-        """Return what was made of the hand under a key, and make it the first time.
-
-        It lives as long as the hand. Copies of the hand start with nothing.
-        """
-        if key not in self._kept:
-            self._kept[key] = make()
-        found: Value = self._kept[key]
-        return found
-
-    @cached_property
-    def _kept(self) -> dict[tuple[Hashable, ...], Any]:
-        return {}
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields alone, for copies and pickles."""
-        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
     def joint_index(self, name: str) -> int:
         """Return the index of a joint.

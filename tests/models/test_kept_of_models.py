@@ -1,4 +1,4 @@
-"""What is made of a hand once: it lives as long as the hand, and copies of the hand start without it."""
+"""What is made of a hand or an object once: it lives as long as they do, and copies start without it."""
 
 import copy
 import dataclasses
@@ -7,10 +7,11 @@ import pickle
 import weakref
 
 import pytest
+from small_hand import small_hand
 
 import clench
 from clench.models.hand.link_mesh import link_meshes
-from models.small_hand import small_hand
+from clench.models.objects.mass import mass_properties
 
 
 class Made:
@@ -49,3 +50,17 @@ def test_pickles_of_a_hand_do_not_grow_with_what_was_made_of_it():
     assert link_meshes(hand) is link_meshes(hand)
     assert hand.allowed_pairs_for(hand.default_source) is hand.allowed_pairs_for(hand.default_source)
     assert len(pickle.dumps(hand)) == len(before)
+
+
+def test_an_object_at_other_poses_has_the_same_mass_properties_until_its_bodies_go():
+    mug = clench.GraspObject.load("mug")
+    found = mass_properties(mug)
+    moved = mug.posed(clench.Pose([1.0, 0.0, 0.0])).with_body(clench.GraspObject.load("ball").bodies[0])
+    assert mass_properties(mug.posed(clench.Pose([1.0, 0.0, 0.0]))) is found
+    assert mass_properties(moved) is not found
+    assert mass_properties(mug) is found
+    assert len(pickle.dumps(mug)) == len(pickle.dumps(clench.GraspObject.load("mug")))
+    kept = weakref.ref(found)
+    del mug, moved, found
+    gc.collect()
+    assert kept() is None
