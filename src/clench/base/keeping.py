@@ -5,9 +5,9 @@ from __future__ import annotations
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from functools import wraps
+from functools import cached_property, wraps
 from threading import Lock
-from typing import Generic, ParamSpec, TypeVar
+from typing import Any, ClassVar, Generic, ParamSpec, TypeVar
 
 Found = TypeVar("Found")
 Argument = TypeVar("Argument")
@@ -70,6 +70,31 @@ def kept_while_alive(function: Callable[[Argument], Found]) -> Callable[[Argumen
         return found
 
     return look_up
+
+
+class Keeper:
+    """A frozen dataclass that holds what was made of it, for as long as it lives; copies and pickles start without."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def kept(self, key: tuple[Hashable, ...], make: Callable[[], Found]) -> Found:
+        """Return what was made under a key, and make it the first time.
+
+        Args:
+            key: says what it is, and what else it depends on. make: returns it.
+        """
+        if key not in self._kept:
+            self._kept[key] = make()
+        found: Found = self._kept[key]
+        return found
+
+    @cached_property
+    def _kept(self) -> dict[tuple[Hashable, ...], Any]:
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields alone."""
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
 
 class KeptBySize(Generic[Found]):

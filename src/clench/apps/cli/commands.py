@@ -112,12 +112,12 @@ def solve(
 
     import clench
     from clench.grasp.sizes import warn_of_size
-    from clench.kernels.warming import announce, warm_up
     from clench.models.objects.loading import size_warnings
     from clench.solver.orders import settled
     from clench.solver.pareto import hand_front
 
     from .choice_tables import print_choice
+    from .kernel_loading import compile_kernels, load_kernels
     from .preshape_tables import print_posture_choice
     from .printing import print_forces, print_pose_error, print_solution
     from .results import exit_code, print_json, write_results
@@ -131,14 +131,14 @@ def solve(
     given, planned = None if command is None else read_command(command, the_hand), None
     the_object = with_scene(the_object, None if given is None else given.object_pose, table, obstacle)
     asked: dict[str, Any] = {k: v for k, v in (("planes", planes), ("criteria", criteria)) if v is not None}
-    announce()
-    warm_up()
+    compile_kernels()
     if given is None:
         plan = clench.plan_grasps(the_hand, the_object, 1, mass=carried, friction=gripped, seed=seed, path=False)
         if not len(plan):
             return _no_grasp(plan, json)
         given, planned = replace(plan[0].command, seed=seed), plan[0]
     the_command = in_orders(replace(given, **asked), order or ())
+    load_kernels(the_command)
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))

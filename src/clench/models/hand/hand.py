@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.base.errors import CommandError, UnknownNameError
+from clench.base.keeping import Keeper
 from clench.base.pose import FloatArray
 from clench.base.short_repr import described, short_repr
 from clench.models.shapes import CollisionSource, Shape
@@ -158,7 +159,7 @@ class Finger:
 
 
 @dataclass(frozen=True)
-class Hand:
+class Hand(Keeper):
     """A robot hand, as read from a model file: links, joints, couplings, and the fingers found in them.
 
     Links are sorted so that parents come first. Palm-frame quantities are at the reference posture.
@@ -296,24 +297,14 @@ class Hand:
         return self._with_overlapping(source, found.always | at_start)
 
     def _overlaps(self, source: CollisionSource) -> Overlaps:
-        if source not in self._found_overlaps:
-            from .overlaps import NO_OVERLAPS, find_overlaps
+        from .overlaps import NO_OVERLAPS, find_overlaps
 
-            if not self.overlaps_allowed:
-                return NO_OVERLAPS
-            self._found_overlaps[source] = find_overlaps(self, CollisionSource(source))
-        return self._found_overlaps[source]
+        if not self.overlaps_allowed:
+            return NO_OVERLAPS
+        return self.kept(("overlaps", source), lambda: find_overlaps(self, CollisionSource(source)))
 
     def _with_overlapping(self, source: CollisionSource, pairs: Pairs) -> tuple[tuple[int, int], ...]:
-        return self._allowed_pairs.setdefault((source, pairs), tuple(sorted({*self.allowed_pairs, *pairs})))
-
-    @cached_property
-    def _found_overlaps(self) -> dict[CollisionSource, Overlaps]:
-        return {}
-
-    @cached_property
-    def _allowed_pairs(self) -> dict[tuple[CollisionSource, Pairs], tuple[tuple[int, int], ...]]:
-        return {}
+        return self.kept(("pairs", source, pairs), lambda: tuple(sorted({*self.allowed_pairs, *pairs})))
 
     def joint_index(self, name: str) -> int:
         """Return the index of a joint.

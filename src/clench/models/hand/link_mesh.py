@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.keeping import kept_by_identity
 from clench.base.pose import FloatArray, invert
 from clench.models.mesh import TriangleMesh, is_closed
 from clench.models.parts import part_points
@@ -19,8 +18,6 @@ from .hand import Hand
 
 if TYPE_CHECKING:
     from clench.kernels.tree import MeshTree
-
-_KEPT_HANDS: Final = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +42,11 @@ class LinkMesh:
 
 
 def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[LinkMesh, ...]:
-    """Return the meshes of all links of the hand that have a shape; made once per hand and source."""
-    return _meshes(hand, hand.default_source if source is None else CollisionSource(source))
+    """Return the meshes of all links of the hand that have a shape; they are made once and live as long as the hand."""
+    source = hand.default_source if source is None else CollisionSource(source)
+    return hand.kept(("link meshes", source), lambda: _meshes(hand, source))
 
 
-@kept_by_identity(_KEPT_HANDS)
 def _meshes(hand: Hand, source: CollisionSource) -> tuple[LinkMesh, ...]:
     made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
     return tuple(mesh for mesh in made if len(mesh.tree.triangles))

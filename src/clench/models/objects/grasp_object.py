@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from clench.base.argument_types import check_type
 from clench.base.errors import ObjectError
+from clench.base.keeping import Keeper
 from clench.base.pose import Pose
 from clench.base.short_repr import described, short_repr
 from clench.models.mesh import TriangleMesh
@@ -29,7 +30,7 @@ class BodyRole(StrEnum):
 
 
 @dataclass(frozen=True)
-class Body:
+class Body(Keeper):
     """Describe one rigid part of the scene, in the object's frame.
 
     Args:

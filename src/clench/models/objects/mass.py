@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -33,10 +32,11 @@ class MassProperties:
 
 def mass_properties(obj: GraspObject) -> MassProperties:
     """Return centre of mass, volume and length scale of an object of uniform density."""
-    return _of_bodies(tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE))
+    first, *others = bodies = tuple(body for body in obj.bodies if body.role is BodyRole.GRASPABLE)
+    # Objects at other poses have the same bodies.
+    return first.kept(("mass", *others), lambda: _of_bodies(bodies))
 
 
-@lru_cache(maxsize=8)
 def _of_bodies(bodies: tuple[Body, ...]) -> MassProperties:
     solids = [_solid(shape, body.closed) for body in bodies for shape in body.shapes]
     volumes = np.array([volume for _, volume, _ in solids])
