@@ -96,7 +96,17 @@ def test_links_lead_to_files(path: Path) -> None:
 
 
 def test_the_table_lists_every_command() -> None:
-    assert set(re.findall(r"^\| `clench (\w+)", README, re.MULTILINE)) == set(COMMANDS)
+    assert set(re.findall(r"^\| `clench (\w+)", page("command-line.md"), re.MULTILINE)) == set(COMMANDS)
+    assert "ten more commands](docs/command-line.md)" in README
+    assert len(COMMANDS) == 3 + 10
+
+
+def test_the_table_of_layers_names_every_folder() -> None:
+    table = README[README.index("| folder |") :].split("\n\n")[0]
+    named = {name for row in table.splitlines()[2:] for name in re.findall(r"`([\w/]+)`", row.split("|")[1])}
+    source = ROOT / "src" / "clench"
+    assert [name for name in sorted(named) if not (source / name).is_dir()] == []
+    assert {path.parent.name for path in source.glob("*/__init__.py")} == {name.split("/")[0] for name in named}
 
 
 def test_the_two_commands_are_there() -> None:
