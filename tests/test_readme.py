@@ -144,7 +144,9 @@ def test_every_key_of_a_solution_is_documented() -> None:
 
 
 def test_every_finding_about_a_hand_is_documented() -> None:
-    assert {code.value for code in FindingCode} == set(re.findall(r"^\| `(\w+)` \|", page("own-hand.md"), re.MULTILINE))
+    assert {code.value for code in FindingCode} == set(
+        re.findall(r"^\| `(\w+)` \|", page("hand-report.md"), re.MULTILINE)
+    )
 
 
 def test_every_cause_of_a_finger_that_does_not_touch_is_documented() -> None:
