@@ -37,9 +37,15 @@ def on_config(config: Any) -> None:
     }
     for section in config.nav:
         for name, entries in section.items():
-            section[name] = [
-                {made[entry][0]: [entry, *made[entry][1]]} if entry in made else entry for entry in entries
-            ]
+            section[name] = [_with_pages(entry, made) for entry in entries]
+
+
+def _with_pages(entry: Any, made: dict[str, tuple[str, list[dict[str, str]]]]) -> Any:
+    """Return an entry of the navigation, with the pages below it if it is the first of pages that are made."""
+    if not isinstance(entry, str) or entry not in made:
+        return entry
+    heading, pages = made[entry]
+    return {heading: [entry, *pages]}
 
 
 def on_files(files: Any, config: Any) -> None:
@@ -63,23 +69,25 @@ def _made_pages() -> Iterator[tuple[str, str]]:
     for source, uri in COPIED.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         yield uri, text if source.endswith(".md") else f"# Licence\n\n```text\n{text}\n```\n"
-    rows = [f"| [{path.name}]({path.stem}.md) | {_title(path)} |" for path in EXAMPLES]
+    rows = [f"| [{_title(path)}]({path.stem}.md) | {_purpose(path)} |" for path in EXAMPLES]
     how = "Every example is a short program. It runs as it stands: `uv run python examples/00_hello.py`."
-    yield (
-        "examples/index.md",
-        "\n".join(["# Examples", "", how, "", "| file | what it shows |", "|---|---|", *rows, ""]),
-    )
+    head = ["# Examples", "", how, "", "| example | what it shows |", "|---|---|"]
+    yield "examples/index.md", "\n".join([*head, *rows, ""])
     for path in EXAMPLES:
-        code = path.read_text(encoding="utf-8")
-        text = code.split('"""', 2)[2].strip()
-        yield f"examples/{path.stem}.md", f"# {_title(path)}\n\n`examples/{path.name}`\n\n```python\n{text}\n```\n"
+        code = path.read_text(encoding="utf-8").split('"""', 2)[2].strip()
+        page = [f"# {_title(path)}", _purpose(path), f"`examples/{path.name}`", f"```python\n{code}\n```", ""]
+        yield f"examples/{path.stem}.md", "\n\n".join(page)
     yield from _api_pages()
 
 
 def _title(example: Path) -> str:
-    """Return the first sentence of an example's docstring, without its dot."""
-    said = example.read_text(encoding="utf-8").split('"""')[1]
-    return " ".join(re.split(r"[.:;](?:\s|$)", said, maxsplit=1)[0].split())
+    """Return the name of an example in words, as in "04 Own hand"."""
+    number, _, words = example.stem.partition("_")
+    return f"{number} {words.replace('_', ' ').capitalize()}"
+
+
+def _purpose(example: Path) -> str:
+    return " ".join(example.read_text(encoding="utf-8").split('"""')[1].split())
 
 
 def _relinked(markdown: str, source: str, uri: str) -> str:
