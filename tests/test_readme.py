@@ -101,12 +101,18 @@ def test_the_table_lists_every_command() -> None:
     assert len(COMMANDS) == 3 + 10
 
 
-def test_the_table_of_layers_names_every_folder() -> None:
+def test_the_table_of_layers_names_every_folder_and_files_that_exist() -> None:
     table = README[README.index("| folder |") :].split("\n\n")[0]
-    named = {name for row in table.splitlines()[2:] for name in re.findall(r"`([\w/]+)`", row.split("|")[1])}
     source = ROOT / "src" / "clench"
-    assert [name for name in sorted(named) if not (source / name).is_dir()] == []
-    assert {path.parent.name for path in source.glob("*/__init__.py")} == {name.split("/")[0] for name in named}
+    named = {}
+    for row in table.splitlines()[2:]:
+        folder, _, files = row.strip("| ").split(" | ")
+        named[folder.strip("`")] = re.findall(r"`(\w+\.py)`", files)
+    assert [
+        f"{folder}/{file}" for folder in named for file in named[folder] if not (source / folder / file).exists()
+    ] == []
+    assert all(named.values())
+    assert {path.parent.name for path in source.glob("*/__init__.py")} == {folder.split("/")[0] for folder in named}
 
 
 def test_the_two_commands_are_there() -> None:
