@@ -1,4 +1,4 @@
-"""The guides by reader: every snippet runs, in order, in one folder; every command has the exit code that it says."""
+"""Guides and pages: every snippet runs, in order, in one folder; every command of a guide has the exit code it says."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from clench.apps.cli.main import main
+from clench.base.pose import Pose
 
 DOCS = Path(__file__).parents[1] / "docs"
 GUIDES = ["make-data.md", "use-a-robot.md", "use-mujoco.md"]
@@ -41,6 +42,23 @@ def test_guide_runs_as_it_stands(name: str, tmp_path: Path, monkeypatch: pytest.
             snippets += 1
     assert commands >= 3
     assert snippets >= 3
+
+
+@pytest.mark.parametrize("name", ["batch.md", "exporting.md", "hold.md", "motions.md", "pose-error.md"])
+def test_the_snippets_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / name).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    assert blocks
+    monkeypatch.chdir(tmp_path)
+    kept: list[Any] = []
+    # What the reader has of their own.
+    names: dict[str, Any] = {"__name__": name, "camera_pose": Pose.identity(), "keep": kept.append}
+    for block in blocks:
+        names["pose_iterator"] = iter(names.get("poses", ()))
+        exec(compile(block, name, "exec"), names)
+    if name == "batch.md":
+        assert sum(len(angles) for angles in kept) == names["batch"].counts()["grasp"] > 0
+    if name == "hold.md":
+        assert names["report"].hold.held
 
 
 def test_the_guide_to_an_own_hand_is_as_short() -> None:
