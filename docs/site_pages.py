@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import os.path
 import posixpath
 import re
 from collections.abc import Callable, Iterator
@@ -102,7 +101,7 @@ def _relinked(markdown: str, source: str, uri: str) -> str:
     def to_page(match: re.Match[str]) -> str:
         target = posixpath.normpath(posixpath.join(posixpath.dirname(source), match[1]))
         made = pages.get(target, target.removeprefix("docs/") if target.startswith("docs/") else None)
-        return match[0] if made is None else os.path.relpath(made, posixpath.dirname(uri) or ".") + match[2]
+        return match[0] if made is None else posixpath.relpath(made, posixpath.dirname(uri) or ".") + match[2]
 
     return LINK.sub(to_page, markdown)
 
