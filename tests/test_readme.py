@@ -96,7 +96,23 @@ def test_links_lead_to_files(path: Path) -> None:
 
 
 def test_the_table_lists_every_command() -> None:
-    assert set(re.findall(r"^\| `clench (\w+)", README, re.MULTILINE)) == set(COMMANDS)
+    assert set(re.findall(r"^\| `clench (\w+)", page("command-line.md"), re.MULTILINE)) == set(COMMANDS)
+    assert "ten more commands](docs/command-line.md)" in README
+    assert len(COMMANDS) == 3 + 10
+
+
+def test_the_table_of_layers_names_every_folder_and_files_that_exist() -> None:
+    table = README[README.index("| folder |") :].split("\n\n")[0]
+    source = ROOT / "src" / "clench"
+    named = {}
+    for row in table.splitlines()[2:]:
+        folder, _, files = row.strip("| ").split(" | ")
+        named[folder.strip("`")] = re.findall(r"`(\w+\.py)`", files)
+    assert [
+        f"{folder}/{file}" for folder in named for file in named[folder] if not (source / folder / file).exists()
+    ] == []
+    assert all(named.values())
+    assert {path.parent.name for path in source.glob("*/__init__.py")} == {folder.split("/")[0] for folder in named}
 
 
 def test_the_two_commands_are_there() -> None:
@@ -134,7 +150,9 @@ def test_every_key_of_a_solution_is_documented() -> None:
 
 
 def test_every_finding_about_a_hand_is_documented() -> None:
-    assert {code.value for code in FindingCode} == set(re.findall(r"^\| `(\w+)` \|", page("own-hand.md"), re.MULTILINE))
+    assert {code.value for code in FindingCode} == set(
+        re.findall(r"^\| `(\w+)` \|", page("hand-report.md"), re.MULTILINE)
+    )
 
 
 def test_every_cause_of_a_finger_that_does_not_touch_is_documented() -> None:

@@ -21,7 +21,7 @@ class Severity(StrEnum):
 
 
 class FindingCode(StrEnum):
-    """Name the kinds of findings; docs/own-hand.md says what to do about each."""
+    """Name the kinds of findings; docs/hand-report.md says what to do about each."""
 
     AXIS_NOT_UNIT = "axis_not_unit"
     """the model gives an axis of another length than 1"""
