@@ -9,8 +9,8 @@ from typing import Final, Literal
 
 from clench.apps.cli.commands import Order, Source
 from clench.apps.cli.parsing import parse_call
-from clench.base.defaults import FRICTION, MASS
-from clench.base.errors import UnknownNameError
+from clench.core.defaults import FRICTION, MASS
+from clench.core.errors import UnknownNameError
 
 from .bench_options import (
     Case,
@@ -86,7 +86,7 @@ def solve(
 
     runs.check()
     at_least(1, planes=planes)
-    source = None if collision_source is None else clench.CollisionSource(collision_source)
+    source = None if collision_source is None else clench.types.CollisionSource(collision_source)
     asked = clench.GraspCommand(
         hand_pose=clench.Pose.identity(),
         preshape="open",
@@ -181,7 +181,7 @@ def choose(*, case: Case = _FREE, runs: Runs = _CHOICES, alternatives: int = 8, 
     Args:
         alternatives: sets per finger.
     """
-    from .speed.choosing import bench_choice
+    from .speed.choice_timing import bench_choice
 
     runs.check()
     at_least(1, alternatives=alternatives)
@@ -238,7 +238,7 @@ def hold(
         table: file for a table (Markdown).
         trials: file for every grasp that was tried, with its reports (JSON).
     """
-    from clench.execution.hold import Hold
+    from clench.execution.simulation.hold import Hold
 
     from .holding.hold_bench import HoldBench, HoldFiles, bench_hold
 
@@ -270,7 +270,7 @@ def confidence(
         friction: of all contacts.
         out: file for the table (JSON), as `src/clench/planner/confidence.json`.
     """
-    from clench.execution.hold import Hold
+    from clench.execution.simulation.hold import Hold
 
     from .holding.confidence_bench import ConfidenceBench, bench_confidence
 
@@ -299,7 +299,7 @@ def displacement(
         distances: of the displacements [m]; the object also turns by 0.6 degrees for every millimetre.
         sigma: what robust grasps are planned for [m].
     """
-    from clench.execution.hold import Hold
+    from clench.execution.simulation.hold import Hold
 
     from .holding.displacement_bench import DisplacementBench, bench_displacement
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import clench
 from clench.apps.cli.results import print_json
-from clench.base.errors import CommandError
-from clench.base.json_files import check_writable
-from clench.base.visible_text import visible
+from clench.core.errors import CommandError
+from clench.core.files.json_files import check_writable
+from clench.core.visible_text import visible
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 

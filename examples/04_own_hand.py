@@ -50,4 +50,4 @@ assert len(hand.couplings) == 1
 post = clench.GraspObject.load("cylinder:r=0.012,h=0.06", pose=clench.Pose([0.08, 0.0, 0.0]))
 solution = clench.solve(hand, post, clench.GraspCommand(hand_pose=clench.Pose.identity()))
 print(f"{solution.status.value}: {solution.reason['text']}")
-assert solution.status is clench.SolutionStatus.GRASP
+assert solution.status is clench.types.SolutionStatus.GRASP

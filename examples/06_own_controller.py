@@ -1,4 +1,4 @@
-"""Move a hand with a controller of your own: a driver of eight members; checks and supervision come with DrivenHand."""
+"""Move a hand with a controller of your own: a driver of eight members. HardwareHand checks and supervises."""
 
 import math
 
@@ -10,19 +10,19 @@ class Servos:
 
     name = "my servos"
     one_target = True  # of a path, command passes on one target alone
-    limits = clench.DriverLimits(velocities={"index_proximal_servo": 90.0})
+    limits = clench.execution.DriverLimits(velocities={"index_proximal_servo": 90.0})
 
     def __init__(self, joints: list[str]) -> None:
         self.joints = tuple(f"{joint}_servo" for joint in joints)
         self.angles = dict.fromkeys(self.joints, 5.0)
 
     def connect(self, timeout: float) -> None:
-        pass  # raise clench.DriverError when nobody answers within the timeout
+        pass  # raise clench.execution.DriverError when nobody answers within the timeout
 
-    def read(self) -> clench.HandState:
-        return clench.HandState(dict(self.angles))  # with ages, when measurements can be old
+    def read(self) -> clench.execution.HandState:
+        return clench.execution.HandState(dict(self.angles))  # with ages, when measurements can be old
 
-    def command(self, path: clench.JointPath) -> None:
+    def command(self, path: clench.execution.JointPath) -> None:
         self.angles.update(path.at(path.period))  # where to be when the next command comes
 
     def stop(self) -> None:
@@ -39,9 +39,11 @@ solution = clench.solve(hand, mug, command)
 
 followers = {coupling.follower for coupling in hand.couplings}
 moved = [joint.name for i, joint in enumerate(hand.joints) if i not in followers]
-degrees = clench.JointMap.from_dict({"unit": "deg", "joints": {name: {"name": f"{name}_servo"} for name in moved}})
+degrees = clench.execution.JointMap.from_dict(
+    {"unit": "deg", "joints": {name: {"name": f"{name}_servo"} for name in moved}}
+)
 servos = Servos(moved)
-report = clench.execute(solution, clench.DrivenHand(hand, servos, joint_map=degrees, obj=mug), speed=0.5)
+report = clench.execute(solution, clench.execution.HardwareHand(hand, servos, joint_map=degrees, obj=mug), speed=0.5)
 
 print(report.reason)
 print(f"{report.duration:.1f} s, {len(report.history.times)} samples")

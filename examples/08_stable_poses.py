@@ -13,4 +13,4 @@ for stable in clench.stable_poses(bottle)[:3]:
     above = [p for p in clench.approach_poses(hand, scene, 40, seed=1) if p.position[2] > stable.center_height]
     solutions = (clench.solve(hand, scene, clench.GraspCommand(hand_pose=pose)) for pose in above)
     found = next((s for s in solutions if s.status == "grasp" and s.is_valid()), None)
-    print("no grasp" if found is None else f"a {clench.grasp_kind(found, hand, scene)} grasp")
+    print("no grasp" if found is None else f"a {clench.mechanics.grasp_kind(found, hand, scene)} grasp")

@@ -23,7 +23,7 @@ assert best.solution.is_valid()
 print(f"{best.trajectory.duration:.2f} s to the touch, then at most {max(best.squeeze.torques.values()):.3f} Nm")
 
 # The free object is closed on, squeezed, and pulled in six directions.
-report = clench.execute(best.solution, clench.SimulatedHand(hand, ball, hold=clench.Hold()))
+report = clench.execute(best.solution, clench.SimulatedHand(hand, ball, hold=clench.execution.Hold()))
 print(report.hold.reason)
 assert report.hold.held
 

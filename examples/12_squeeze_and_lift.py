@@ -21,7 +21,7 @@ for name, torque in squeeze.torques.items():
 assert squeeze.feasible
 
 # The hand closes, squeezes, and lifts the free object by 0.1 m.
-lift = clench.Hold(test="lift", mass=0.2, friction=0.5, planned_mass=mass, planned_friction=friction)
+lift = clench.execution.Hold(test="lift", mass=0.2, friction=0.5, planned_mass=mass, planned_friction=friction)
 report = clench.execute(solution, clench.SimulatedHand(hand, scene, hold=lift))
 print(report.hold.reason)
 assert report.hold.held

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.base.pose import FloatArray, Pose, rotation_about
+from clench.core.pose import FloatArray, Pose, rotation_about
 from clench.models.hand.hand import Coupling, Finger, Hand, Joint, JointRole, Link
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape, ShapeKind

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from clench.kernels.warming import announce, warm_up
+from clench.kernels.runtime.warming import announce, warm_up
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
 

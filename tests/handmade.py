@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.solver.solution import (
     Candidate,
     Contact,

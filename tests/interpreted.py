@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.kernels import compiling
+from clench.kernels.runtime import compiling
 
 OWN = tuple(str(Path(__file__).resolve().parents[1] / part) for part in ("src", "benchmarks", "tests"))
 #: When it is looked again whether a test that takes too long can be ended [s].

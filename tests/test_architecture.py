@@ -19,7 +19,11 @@ import clench
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
 BENCHMARKS = ROOT / "benchmarks"
-LAYERS = ["base", "kernels", "models", "grasp", "solver", "execution", "planner", "dataset", "apps"]
+LAYERS = ["core", "kernels", "models", "mechanics", "closing", "scoring", "solver", "execution", "planner", "dataset"]
+LAYERS += ["apps"]
+#: Files that list public names by the modules that define them: imports in them are for type checkers alone.
+NAMESPACES = {PACKAGE / name for name in ("criteria.py", "errors.py", "formats.py", "types.py")}
+NAMESPACES |= {PACKAGE / name / "__init__.py" for name in ("mechanics", "execution")}
 HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
 HEAVY |= {"pyarrow", "h5py", "ray", "torch"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
@@ -74,7 +78,7 @@ def imported_modules(tree: ast.AST, path: Path) -> Iterator[tuple[int, str, tupl
 def upward_imports(source: str, path: Path) -> list[str]:
     """Name the imports that do not point to the same layer or one below."""
     parts = module_name(path).split(".")
-    if len(parts) < 2:
+    if len(parts) < 2 or path in NAMESPACES:
         return []
     if parts[1] not in LAYERS:
         return [f"{shown(path)} is in no layer"]
@@ -187,7 +191,7 @@ def test_every_folder_is_a_layer() -> None:
     expect_none(f"{shown(p)} is not a layer" for p in sorted(folders) if p.name not in LAYERS)
     modules = set(PACKAGE.glob("*.py"))
     assert PACKAGE / "__init__.py" in modules
-    expect_none(f"{shown(p)} is in no layer" for p in sorted(modules - {PACKAGE / "__init__.py"}))
+    expect_none(f"{shown(p)} is in no layer" for p in sorted(modules - {PACKAGE / "__init__.py"} - NAMESPACES))
 
 
 @pytest.mark.parametrize(
@@ -203,13 +207,13 @@ def test_every_folder_is_a_layer() -> None:
     ],
 )
 def test_the_layer_check_sees_an_upward_import(statement: str) -> None:
-    assert upward_imports(statement, PACKAGE / "grasp" / "x.py") != []
+    assert upward_imports(statement, PACKAGE / "closing" / "x.py") != []
 
 
 @pytest.mark.parametrize(
     "statement",
     [
-        "from clench.base.pose import Pose",
+        "from clench.core.pose import Pose",
         "from ..models.mesh import TriangleMesh",
         "from .planes import x",
         "from clench import __version__",
@@ -217,11 +221,11 @@ def test_the_layer_check_sees_an_upward_import(statement: str) -> None:
     ],
 )
 def test_the_layer_check_lets_downward_imports_pass(statement: str) -> None:
-    assert upward_imports(statement, PACKAGE / "grasp" / "x.py") == []
+    assert upward_imports(statement, PACKAGE / "closing" / "x.py") == []
 
 
 def test_the_other_checks_see_what_they_look_for() -> None:
-    path = PACKAGE / "grasp" / "x.py"
+    path = PACKAGE / "closing" / "x.py"
     assert heavy_imports("import numba", path)
     assert heavy_imports("if True:\n    import mujoco.viewer", path)
     assert heavy_imports("class A:\n    from matplotlib import pyplot", path)

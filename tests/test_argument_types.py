@@ -45,7 +45,7 @@ CALLS: list[tuple[Callable[..., Any], tuple[str, ...], dict[str, Any]]] = [
     (clench.approach_poses, ("hand", "obj"), {"count": 1, "seed": 0}),
     (clench.check_hand, ("hand",), {}),
     (clench.SimulatedHand, ("hand", "obj"), {}),
-    (clench.DrivenHand, ("hand",), {"driver": None}),
+    (clench.HardwareHand, ("hand",), {"driver": None}),
 ]
 WRONG = ["mug", (0.0, 0.0, 0.1), np.zeros(7), {"hand_pose": {"position": [0, 0, 0]}}, 3]
 

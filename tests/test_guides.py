@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from clench.apps.cli.main import main
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 
 DOCS = Path(__file__).parents[1] / "docs"
 GUIDES = ["make-data.md", "use-a-robot.md", "use-mujoco.md"]

@@ -88,7 +88,7 @@ def test_tolerances_have_the_documented_value(name: str, value: str, module: str
 
 
 def test_every_tolerance_of_the_method_is_documented() -> None:
-    from clench.base import tolerances
+    from clench.core import tolerances
 
     names = {name for name in vars(tolerances) if name.isupper()}
     assert names <= {name for name, _, _ in TOLERANCES}

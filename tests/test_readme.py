@@ -12,15 +12,15 @@ import pytest
 
 import clench
 from clench.apps.cli.commands import COMMANDS
-from clench.execution.driver import MEMBERS
-from clench.grasp import criterion_registry
-from clench.grasp.calibration import preset_names
-from clench.grasp.criterion_registry import criterion_names, find_criterion
+from clench.execution.hardware.driver import MEMBERS
 from clench.models.command_file import KEYS, command_from_dict
 from clench.models.hand.findings import FindingCode
 from clench.models.hand.hand_file import read_hand_file
 from clench.planner.options import PlanArguments
 from clench.planner.rejections import Rejection
+from clench.scoring import criterion_registry
+from clench.scoring.calibration import preset_names
+from clench.scoring.criterion_registry import criterion_names, find_criterion
 from clench.solver.causes import CauseCode
 from handmade import make_solution
 

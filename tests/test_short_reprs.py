@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.short_repr import short_repr
+from clench.core.short_repr import short_repr
 
 POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 
@@ -42,7 +42,7 @@ def instances(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     made += [report.hold, report.history, simulated, simulated.hold, clench.Record(folder / "record.db")]
     made += [clench.ReadySignal(hand, folder / "record.db", f"file:{folder / 'ready'}"), clench.Film()]
     made += [clench.JointMap(), clench.Ros2Driver(), clench.OrcaDriver(mock=True), clench.DriverLimits()]
-    made += [clench.DrivenHand(hand, clench.Ros2Driver()), clench.HandState(dict(solution.joint_angles))]
+    made += [clench.HardwareHand(hand, clench.Ros2Driver()), clench.HandState(dict(solution.joint_angles))]
     made += [clench.JointPath(hand.joint_names, np.ones(50), np.ones((50, len(hand.joints))), 0.1)]
     made += [clench.GraspPosture("grasp_0", POSE, joint_angles=dict(solution.joint_angles))]
     finding = clench.Finding(next(iter(clench.FindingCode)), "what was found " * 50, joints=hand.joint_names)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 import clench
-from clench.base.json_files import write_json
-from clench.execution.convex_pieces import in_pieces
-from clench.execution.hold import Hold
-from clench.execution.pulling import hold_and_pull
+from clench.core.files.json_files import write_json
+from clench.execution.simulation.convex_pieces import in_pieces
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.pulling import hold_and_pull
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.planner.confidence import SCHEMA, ConfidenceTable

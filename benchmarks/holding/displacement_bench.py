@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import clench
-from clench.base.pose import FloatArray, Pose
-from clench.execution.convex_pieces import in_pieces
-from clench.execution.hold import Hold
-from clench.execution.pulling import hold_and_pull
+from clench.core.pose import FloatArray, Pose
+from clench.execution.simulation.convex_pieces import in_pieces
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.pulling import hold_and_pull
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.mass import mass_properties

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 import clench
-from clench.base.json_files import write_atomically, write_json
-from clench.execution.convex_pieces import in_pieces
-from clench.execution.hold import Hold, HoldTest
-from clench.execution.scene import lowest
-from clench.grasp.contact_kinds import GraspKind
+from clench.core.files.json_files import write_atomically, write_json
+from clench.execution.simulation.convex_pieces import in_pieces
+from clench.execution.simulation.hold import Hold, HoldTest
+from clench.execution.simulation.mujoco_scene import lowest
+from clench.mechanics.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 
 
 def wilson(yes: int, count: int) -> tuple[float, float]:

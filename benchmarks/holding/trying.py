@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from clench.execution.hold import Hold, HoldReport
-from clench.execution.pulling import hold_and_pull
-from clench.execution.scene import Scene, build_scene
-from clench.execution.simulation import nearest
+from clench.closing.collision.depths import hand_depths
+from clench.closing.collision.packed_object import pack_object
+from clench.execution.simulation.hold import Hold, HoldReport
+from clench.execution.simulation.mujoco_scene import Scene, build_scene
+from clench.execution.simulation.pulling import hold_and_pull
+from clench.execution.simulation.simulated_hand import nearest
 from clench.execution.trajectory import plan_trajectory
-from clench.grasp.contact_kinds import GraspKind
-from clench.grasp.depths import hand_depths
-from clench.grasp.scene import pack_object
+from clench.mechanics.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solver.grasp_kinds import grasp_kind
-from clench.solver.posture import posture
+from clench.solver.analysis.grasp_kinds import grasp_kind
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 #: Links this near touch, and fingers without anything nearer count so far away [m], as in DexGraspBench.

@@ -10,13 +10,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 import clench
-from clench.base.pose import FloatArray, Pose
-from clench.grasp.scene import PackedObject, pack_object
+from clench.closing.collision.packed_object import PackedObject, pack_object
+from clench.core.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.grasp_batch import GraspBatch
-from clench.solver.posture import posture
+from clench.solver.batch.grasp_batch import GraspBatch
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .driving import Driven, Rested

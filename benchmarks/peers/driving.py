@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from clench.base.pose import FloatArray, Pose
-from clench.execution.scene import build_scene
-from clench.grasp.plan import closing_joints
+from clench.closing.finger_plan import closing_joints
+from clench.core.pose import FloatArray, Pose
+from clench.execution.simulation.mujoco_scene import build_scene
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 

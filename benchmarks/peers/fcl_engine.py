@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from clench.base.errors import CommandError
-from clench.base.pose import FloatArray
-from clench.grasp.depths import hand_depths
-from clench.grasp.scene import PackedObject
+from clench.closing.collision.depths import hand_depths
+from clench.closing.collision.packed_object import PackedObject
+from clench.core.errors import CommandError
+from clench.core.pose import FloatArray
 from clench.models.hand.hand import Finger, Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject

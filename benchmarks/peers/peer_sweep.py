@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 import clench
-from clench.base.pose import FloatArray, Pose
+from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.shapes import Shape, ShapeKind
 

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 import clench
-from clench.base.json_files import write_atomically
+from clench.core.files.json_files import write_atomically
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.batch_progress import shown
+from clench.solver.batch.batch_progress import shown
 
 from ..bench_options import Objects, Pages, Runs
 from ..bench_report import BenchReport, describe_place, timed

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray
-from clench.grasp.linkage import hand_frames
-from clench.grasp.plan import closing_joints
-from clench.grasp.scene import shape_elements
+from clench.closing.collision.packed_object import shape_elements
+from clench.closing.finger_plan import closing_joints
+from clench.closing.linkage import hand_frames
+from clench.core.pose import FloatArray
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource, Shape
 
 if TYPE_CHECKING:
-    from clench.kernels.bodies import Elements
+    from clench.kernels.geometry.bodies import Elements
 
     from .kernels.box_query import BoxTrees
     from .kernels.stepped_closing import StepLog, SteppedHand
@@ -110,7 +110,7 @@ class Stepper:
 
 def _trees(solids: Sequence[Sequence[Shape]], source: CollisionSource) -> BoxTrees:
     """Return solids, each of several shapes, as exact sweeps take them: round shapes are cores with a radius."""
-    from clench.kernels.bodies import join_elements
+    from clench.kernels.geometry.bodies import join_elements
 
     from .kernels.box_query import box_trees
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.base.json_files import non_finite_path
-from clench.base.pose import FloatArray
-from clench.base.tolerances import CONTACT_OVERLAP, PASSED_GAP
+from clench.core.files.json_files import non_finite_path
+from clench.core.pose import FloatArray
+from clench.core.tolerances import CONTACT_OVERLAP, PASSED_GAP
 from clench.models.shapes import ShapeKind
 
 if TYPE_CHECKING:

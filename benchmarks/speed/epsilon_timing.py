@@ -10,15 +10,15 @@ import numpy as np
 
 import clench
 from clench.apps.figures.style import CHOSEN, FAINT, INK, new_figure, save_figure
-from clench.base.pose import FloatArray
-from clench.grasp.mechanics.actuation import HoldingForces, least_effort
-from clench.grasp.mechanics.contacts import make_contacts
-from clench.grasp.mechanics.held import HeldObject, held_by_contacts
-from clench.grasp.mechanics.loads import six_pulls_and_twists, weight
-from clench.grasp.mechanics.squeeze import squeeze_forces
-from clench.grasp.mechanics.steadiness import EDGES, epsilon, epsilon_bound
-from clench.grasp.mechanics.wrench_space import volume_l1
-from clench.solver.holding import hold
+from clench.core.pose import FloatArray
+from clench.mechanics.actuation import HoldingForces, least_effort
+from clench.mechanics.contacts import make_contacts
+from clench.mechanics.epsilon_quality import EDGES, epsilon, epsilon_bound
+from clench.mechanics.held import HeldObject, held_by_contacts
+from clench.mechanics.loads import six_pulls_and_twists, weight
+from clench.mechanics.squeeze import squeeze_forces
+from clench.mechanics.wrench_space import volume_l1
+from clench.solver.analysis.holding import hold
 
 from ..bench_report import BenchReport, describe_place, timed
 

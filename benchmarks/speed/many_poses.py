@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.batch_progress import shown
-from clench.solver.grasp_batch import GraspBatch
+from clench.solver.batch.batch_progress import shown
+from clench.solver.batch.grasp_batch import GraspBatch
 from clench.solver.solution import GraspSolution
 
 from ..bench_options import Case, Runs

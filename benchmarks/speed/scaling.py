@@ -11,14 +11,14 @@ from typing import Final
 import numpy as np
 
 import clench
-from clench.base.json_files import write_atomically
-from clench.base.pose import FloatArray, Pose
-from clench.grasp.scene import pack_object
+from clench.closing.collision.packed_object import pack_object
+from clench.core.files.json_files import write_atomically
+from clench.core.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.batch_progress import shown
+from clench.solver.batch.batch_progress import shown
 from clench.solver.solution import GraspSolution
 
 from ..bench_options import Case, Pages, Runs

@@ -11,14 +11,13 @@ from functools import partial
 import numpy as np
 
 import clench
-from clench.grasp.calibration import calibration_of
-from clench.grasp.solving import empty_answers, run_stages
-from clench.kernels.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
+from clench.closing.kernel_run import empty_answers, run_stages
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 from clench.models.tessellation import shape_mesh
+from clench.scoring.calibration import calibration_of
 from clench.solver.alternatives import candidates_of
 from clench.solver.problem import make_problem
 from clench.solver.solution import GraspSolution
@@ -182,6 +181,8 @@ def stage_times(hand: Hand, obj: GraspObject, command: GraspCommand) -> dict[str
 
     The kernels choose here as they do in a solve by their criteria, so the command may have no others.
     """
+    from clench.kernels.closing.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
+
     problem = make_problem(hand, obj, command)
     packed = candidates_of(problem, calibration_of(command.criteria)).problem
     T, answers = problem.T_palm_object[None, :3], empty_answers(packed, 1)

@@ -16,14 +16,14 @@ import clench
 from clench.apps.cli import commands
 from clench.apps.cli.demo import MUG_POSE
 from clench.apps.cli.main import main
-from clench.base.defaults import MASS
-from clench.base.errors import CommandError
+from clench.closing.collision import sizes
+from clench.core.defaults import MASS
+from clench.core.errors import CommandError
 from clench.execution.report import ExecutionReport, JointReached
-from clench.grasp import sizes
-from clench.kernels import warming
+from clench.kernels.runtime import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource
-from clench.solver.record import Record
+from clench.solver.analysis.record import Record
 from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_solution
 

@@ -14,7 +14,7 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.solver.batch_solver import BatchSolver
+from clench.solver.batch.batch_solver import BatchSolver
 
 BASE = ["batch", "--hand", "patent15", "--object", "ball", "--planes", "2"]
 

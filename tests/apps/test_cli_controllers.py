@@ -20,14 +20,14 @@ from clench.apps.cli import actuators
 from clench.apps.cli.exchange import Format
 from clench.apps.cli.interrupts import stopped_by_signals
 from clench.apps.cli.main import main
-from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver_line import Call
+from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.execution.drivers.ros2 import RosInterface
 from clench.execution.formats.exchange import GraspFormat
-from clench.grasp.scene import hash_bodies, hash_hand
+from clench.execution.hardware.driver_line import Call
+from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.models.command_file import load_command
 from clench.models.shapes import CollisionSource
-from clench.solver.record import Record
+from clench.solver.analysis.record import Record
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
 
@@ -96,7 +96,7 @@ def test_bad_input_moves_nothing(
     if "orca-mock" in arguments:
         pytest.importorskip("orca_core")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(DrivenHand, "carry_out", lambda *_: pytest.fail("moved"))
+    monkeypatch.setattr(HardwareHand, "execute", lambda *_: pytest.fail("moved"))
     assert main(["execute", "s.json", *arguments]) == 2
     err = capsys.readouterr().err
     assert err.startswith(f"clench: error: {message}")
@@ -194,7 +194,7 @@ def test_a_next_step_that_cannot_be_taken_moves_nothing(
     message: str,
 ) -> None:
     replace(solution, next_steps=({}, step)).save(tmp_path / "s.json")
-    monkeypatch.setattr(clench.SimulatedHand, "carry_out", lambda *_: pytest.fail("moved"))
+    monkeypatch.setattr(clench.SimulatedHand, "execute", lambda *_: pytest.fail("moved"))
     assert main(["execute", str(tmp_path / "s.json")]) == 2
     err = capsys.readouterr().err
     assert err.startswith(f"clench: error: {message}")

@@ -63,7 +63,7 @@ def test_a_bad_target_is_told_before_anything_is_done(call, sentence, tmp_path, 
         "clench.apps.cli.export_sources.read_grasps", lambda *args: pytest.fail("the solutions were read first")
     )
     monkeypatch.setattr(
-        "clench.solver.examples.read_examples", lambda *args: pytest.fail("the examples were read first")
+        "clench.solver.analysis.examples.read_examples", lambda *args: pytest.fail("the examples were read first")
     )
     monkeypatch.setattr(
         "benchmarks.speed.epsilon_timing.bench_steadiness", lambda *args: pytest.fail("it was run first")

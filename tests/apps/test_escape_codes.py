@@ -8,7 +8,7 @@ import pytest
 import clench
 from clench.apps.cli import printing
 from clench.apps.cli.main import main
-from clench.base.visible_text import visible
+from clench.core.visible_text import visible
 from clench.execution.report import ExecutionReport
 from fuzz.originals import MJCF, link_stl
 from handmade import make_solution

@@ -17,7 +17,7 @@ from clench.apps.figures.hand_view import _labels, viewpoints
 from clench.apps.figures.plane_scene import PlaneScene, bounds
 from clench.apps.figures.set_grid import MOST_SETS, _selected, _short, _verdict
 from clench.apps.figures.surfaces import hand_surface, object_surface, thinned
-from clench.base.errors import FileError
+from clench.core.errors import FileError
 from clench.models.command import GraspCommand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.obstacles import table

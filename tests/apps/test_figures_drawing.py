@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from clench.apps.figures import raster
 from clench.apps.figures.loops import join_segments, outline_loops
 from clench.apps.figures.raster import Camera, borders, halved, look_along, rasterise, shade
-from clench.base.pose import Pose
-from clench.grasp.outlines import cut_shape
+from clench.closing.outlines import cut_shape
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
 

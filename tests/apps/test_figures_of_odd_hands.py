@@ -9,7 +9,7 @@ import pytest
 import clench
 from chain_hands import HandBuilder, along_x
 from clench.apps.figures import draw_solution
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 
 
 @pytest.mark.filterwarnings("error")

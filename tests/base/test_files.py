@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from clench.base.errors import FileError
-from clench.base.files import read_file, read_text
+from clench.core.errors import FileError
+from clench.core.files.file_bytes import read_file, read_text
 
 
 def test_bytes_and_text(tmp_path):

@@ -5,8 +5,8 @@ import stat
 
 import pytest
 
-from clench.base.errors import FileError
-from clench.base.json_files import check_folder, check_writable, write_atomically
+from clench.core.errors import FileError
+from clench.core.files.json_files import check_folder, check_writable, write_atomically
 
 
 def test_a_file_that_can_be_written_leaves_nothing_behind(tmp_path):

@@ -9,13 +9,13 @@ import sys
 import numpy as np
 import pytest
 
-from clench.base.memory import AT_ONCE, in_parts
+from clench.core.memory import AT_ONCE, in_parts
 
 #: Arrays as work on a mesh makes them: large ones come and go, small ones between them stay.
 TRIAL = """
 import sys
 import numpy as np
-from clench.base.memory import LARGE, expect
+from clench.core.memory import LARGE, expect
 
 def resident():
     return int(open("/proc/self/statm").read().split()[1]) * 4096

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from clench.base.numbers import is_finite_number
+from clench.core.numbers import is_finite_number
 
 
 @pytest.mark.parametrize("value", [0, -3, 1.5, np.float32(2.0), np.int64(4), 10**308, -1e308])

@@ -26,7 +26,7 @@ def test_a_hand_loads_whatever_is_to_draw(drawn_by: str) -> None:
 
 
 def test_the_variable_is_left_as_it_was() -> None:
-    said = "import os; from clench.base.opengl import import_mujoco; import_mujoco(); print(os.environ['MUJOCO_GL'])"
+    said = "import os; from clench.core.opengl import import_mujoco; import_mujoco(); print(os.environ['MUJOCO_GL'])"
     assert run(said, "bogus").stdout == "bogus\n"
 
 

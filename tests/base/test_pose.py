@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clench.base.errors import CommandError
-from clench.base.pose import Pose, rotation_about
+from clench.core.errors import CommandError
+from clench.core.pose import Pose, rotation_about
 
 HALF, TURN = math.pi / 2.0, 2.0 * math.pi
 #: Roll, pitch and yaw: none, one each, both gimbal locks, half turns, whole turns, tiny ones, and random ones.

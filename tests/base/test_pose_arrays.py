@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clench.base.pose import Pose, quaternion_from_rotation, quaternions_from_rotations
-from clench.base.pose_arrays import pose_rows
+from clench.core.pose import Pose, quaternion_from_rotation, quaternions_from_rotations
+from clench.core.pose_arrays import pose_rows
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-9e-4, 9e-4))

@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from clench.base.array_files import read_array
-from clench.base.errors import FileError
-from clench.base.file_limits import DOCUMENT_DEPTH
-from clench.base.json_files import non_finite_path, read_json
-from clench.base.nesting import is_too_deep
-from clench.base.numbers import real_array
-from clench.base.toml_files import read_toml
-from clench.base.yaml_files import read_yaml
+from clench.core.errors import FileError
+from clench.core.files.array_files import read_array
+from clench.core.files.file_limits import DOCUMENT_DEPTH
+from clench.core.files.json_files import non_finite_path, read_json
+from clench.core.files.nesting import is_too_deep
+from clench.core.files.toml_files import read_toml
+from clench.core.files.yaml_files import read_yaml
+from clench.core.numbers import real_array
 
 
 def nested(depth):

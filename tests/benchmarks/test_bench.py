@@ -12,13 +12,13 @@ import pytest
 import clench
 from benchmarks.bench_commands import BENCHMARKS, main
 from benchmarks.bench_report import BenchReport, describe_place
-from benchmarks.speed import choosing, solving
+from benchmarks.speed import choice_timing, solving
 from benchmarks.speed.answer_checks import Checked, Surface, check_answer, triangle_distances
-from clench.base.errors import CommandError, UnknownNameError
-from clench.grasp.calibration import calibration_of
-from clench.grasp.solving import empty_answers, run_stages, solve_packed
-from clench.kernels.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
+from clench.closing.kernel_run import empty_answers, run_stages, solve_packed
+from clench.core.errors import CommandError, UnknownNameError
+from clench.kernels.closing.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
+from clench.scoring.calibration import calibration_of
 from clench.solver.alternatives import candidates_of, finger_sets
 from clench.solver.problem import make_problem, make_setting
 from clench.solver.solution import GraspSolution
@@ -50,9 +50,9 @@ def test_solve_prints_flat_lines(capsys: pytest.CaptureFixture[str]) -> None:
     for part in ("read", "plan", "close", "assemble"):
         assert float(lines[f"stage_{part}_median_ms"]) >= 0.0
     assert float(lines["then_read_contacts_median_ms"]) <= float(lines["then_read_everything_max_ms"])
-    assert 0.0 < float(lines["close_fingers_median_ms"]) < 2.0 * float(lines["solve_max_ms"])
-    assert not any(key.startswith(("close_cut", "close_overlap")) for key in lines)
-    assert all(float(lines[f"planes_{part}_median_ms"]) > 0.0 for part in ("cut", "overlap", "fingers"))
+    assert 0.0 < float(lines["width_close_median_ms"]) < 2.0 * float(lines["solve_max_ms"])
+    stages = [f"{kind}_{stage}_median_ms" for kind in ("width", "planes") for stage in ("close", "choose", "finish")]
+    assert all(float(lines[stage]) > 0.0 for stage in stages)
     statuses = [int(lines[f"status_{s}"]) for s in ("grasp", "partial", "no_contact", "blocked")]
     assert sum(statuses) == 2
 
@@ -194,7 +194,7 @@ def test_choose_is_checked_and_timed(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_wrong_choice_is_not_timed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(choosing, "_wrong", lambda *_: ["steady: chose 1, the best is 2."])
+    monkeypatch.setattr(choice_timing, "_wrong", lambda *_: ["steady: chose 1, the best is 2."])
     assert main(["choose", "--poses", "1", "--passes", "1", "--alternatives", "2"]) == 1
     printed = capsys.readouterr()
     assert "choose_steady_median_ms" not in printed.out
@@ -207,16 +207,16 @@ def test_the_check_of_choices_sees_one_that_is_not_the_best(monkeypatch: pytest.
     command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1), preshape="open")
     problem = make_problem(hand, obj, command)
     groups = [[c for c in g if c.plane is None] for g in finger_sets(problem)]
-    setting = make_setting(problem, choosing.ADDITIVE)
-    assert choosing._wrong(groups, setting) == []
-    real = choosing.choose
+    setting = make_setting(problem, choice_timing.ADDITIVE)
+    assert choice_timing._wrong(groups, setting) == []
+    real = choice_timing.choose
 
     def worst(given: Any, calibration: Any, setting: Any) -> Any:
         choice = real(given, calibration, setting)
         return replace(choice, total=choice.total - 1.0) if len(given[0]) > 1 else choice
 
-    monkeypatch.setattr(choosing, "choose", worst)
-    assert len(choosing._wrong(groups, setting)) == 2
+    monkeypatch.setattr(choice_timing, "choose", worst)
+    assert len(choice_timing._wrong(groups, setting)) == 2
 
 
 def test_steadiness_checks_times_and_draws(capsys: pytest.CaptureFixture[str], tmp_path) -> None:

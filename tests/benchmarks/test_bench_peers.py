@@ -18,9 +18,9 @@ from benchmarks.peers.fcl_engine import Engine
 from benchmarks.peers.peer_sweep import FACTORS, blade_misses, with_wires
 from benchmarks.peers.stepper import RULES, Stepper
 from chain_hands import one_link
-from clench.base.errors import CommandError, FileError
-from clench.base.pose import Pose
-from clench.grasp.scene import pack_object
+from clench.closing.collision.packed_object import pack_object
+from clench.core.errors import CommandError, FileError
+from clench.core.pose import Pose
 from clench.models.shapes import CollisionSource
 
 SMALL = ["peers", "--object", "ball", "--poses", "1", "--passes", "1", "--planes", "1"]

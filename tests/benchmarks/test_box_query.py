@@ -6,8 +6,8 @@ import pytest
 
 from benchmarks.peers.kernels import box_query
 from benchmarks.peers.kernels.box_query import Query, box_trees
-from clench.base.pose import rotation_about
-from clench.kernels.bodies import Elements
+from clench.core.pose import rotation_about
+from clench.kernels.geometry.bodies import Elements
 from kernels.kernel_entries import entry
 
 within = entry(box_query.within)

@@ -8,7 +8,7 @@ import pytest
 import clench
 from benchmarks.bench_commands import main
 from benchmarks.holding.confidence_bench import ConfidenceBench, Outcome, brier, document, summarise
-from clench.execution.hold import Hold
+from clench.execution.simulation.hold import Hold
 from clench.planner.confidence import ConfidenceTable
 
 

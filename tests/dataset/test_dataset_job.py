@@ -9,7 +9,7 @@ import pytest
 
 from clench.apps.cli import exchange, generate
 from clench.apps.cli.main import main
-from clench.base.errors import CommandError, UnknownNameError
+from clench.core.errors import CommandError, UnknownNameError
 from clench.dataset.exporting import DatasetFormat
 from clench.dataset.job import DatasetJob, job_from, read_job
 from clench.dataset.shards import Shard

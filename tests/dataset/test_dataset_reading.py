@@ -14,7 +14,7 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.base.errors import ClenchError, CommandError, UnknownNameError
+from clench.core.errors import ClenchError, CommandError, UnknownNameError
 from clench.dataset.columns import COLUMNS, arrow_schema
 from clench.dataset.exporting import export
 from clench.dataset.generating import generate

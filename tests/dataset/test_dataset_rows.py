@@ -17,7 +17,7 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.base.errors import ClenchError
+from clench.core.errors import ClenchError
 from clench.dataset.columns import COLUMNS, SCHEMA
 from clench.dataset.exporting import export
 from clench.dataset.generating import GenerateReport, generate
@@ -29,7 +29,7 @@ from clench.dataset.sources import license_beside, load_hand, load_object
 from clench.dataset.unit_run import UnitResult
 from clench.dataset.units import Unit
 from clench.dataset.workers import run_units
-from clench.execution.hold import Hold
+from clench.execution.simulation.hold import Hold
 from clench.planner.rejections import Rejection
 
 #: A closed box of triangles [m], 40 × 40 × 80 mm, as a file.
@@ -152,7 +152,7 @@ def test_failures_are_rows_with_stage_and_reason() -> None:
 
 
 def test_a_dropped_grasp_failed_in_the_hold_test() -> None:
-    from clench.execution.pulling import hold_and_pull
+    from clench.execution.simulation.pulling import hold_and_pull
 
     hand, obj = load_hand("robonaut2"), load_object("ball", 1.0, False)
     (grasp,) = clench.plan_grasps(hand, obj, 1, effort=8)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from clench.base.errors import ClenchError
+from clench.core.errors import ClenchError
 from clench.dataset.folder import DatasetFolder
 from clench.dataset.generating import GenerateReport, generate
 from clench.dataset.job import DatasetJob

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import Pose
-from clench.grasp.depths import hand_depths
-from clench.grasp.scene import pack_object
+from clench.closing.collision.depths import hand_depths
+from clench.closing.collision.packed_object import pack_object
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 from engine.collisions import Collisions
 from engine.statistics import HANDS, OBJECTS, Judge

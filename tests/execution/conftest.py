@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from virtual_clock import VirtualClock
 
-from clench.base.pose import FloatArray, Pose
-from clench.grasp.scene import hash_bodies, hash_hand
+from clench.closing.collision.packed_object import hash_bodies, hash_hand
+from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Coupling, Finger, Hand, Joint, JointRole, Link
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind

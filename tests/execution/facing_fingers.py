@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chain_hands import HandBuilder, along_x, mount, turned
-from clench.grasp.scene import hash_hand
+from clench.closing.collision.packed_object import hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus

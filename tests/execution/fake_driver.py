@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
+from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
 
 class FakeDriver:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from fake_driver import FakeDriver
 
-from clench.execution.driver import HandState, JointPath
+from clench.execution.hardware.driver import HandState, JointPath
 
 #: Calls after which the hand may move.
 MOVING = ("command", "pull")

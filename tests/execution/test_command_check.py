@@ -7,8 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from clench.execution.command_check import CommandCheck, CommandLimits, slowed_down
-from clench.execution.driver import HandState, JointPath, RefusedCommandError
+from clench.execution.hardware.command_check import CommandCheck, CommandLimits, slowed_down
+from clench.execution.hardware.driver import HandState, JointPath, RefusedCommandError
 
 LIMITS = {"a": CommandLimits(-1.0, 1.0, 2.0, 1.0, "rad"), "b": CommandLimits(0.0, 90.0, 60.0, 57.3, "deg")}
 CHECK = CommandCheck(LIMITS, max_age=0.5, max_deviation=0.2)

@@ -14,15 +14,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from virtual_clock import VirtualClock
 
-from clench.base.errors import CommandError, UnknownNameError
-from clench.execution import driven_hand, executing
-from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
+from clench.core.errors import CommandError, UnknownNameError
+from clench.execution import executing
 from clench.execution.executing import execute
-from clench.execution.following import HORIZON, PERIOD, TimedPlan
-from clench.execution.joint_map import JointMap, MappedJoint
+from clench.execution.hardware import hardware_hand as driven_hand
+from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
+from clench.execution.hardware.following import HORIZON, PERIOD, TimedPlan
+from clench.execution.hardware.hardware_hand import HardwareHand
+from clench.execution.hardware.joint_map import JointMap, MappedJoint
 from clench.models.hand.hand import Hand
-from clench.models.hand.tendons import TendonMap
+from clench.models.hand.reading.tendons import TendonMap
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution
 
@@ -36,7 +37,7 @@ def solution(pinch: GraspSolution) -> GraspSolution:
 
 
 def run(driver: FakeDriver, hand: Hand, solution: GraspSolution, speed: float = 1.0, **options: object):
-    return execute(solution, DrivenHand(hand, driver, **options), speed=speed)  # type: ignore[arg-type]
+    return execute(solution, HardwareHand(hand, driver, **options), speed=speed)  # type: ignore[arg-type]
 
 
 def test_a_trajectory_is_followed_to_its_end(pincer: Hand, solution: GraspSolution, ball: GraspObject) -> None:
@@ -249,7 +250,7 @@ def test_a_driver_that_lacks_members_is_refused_at_once(pincer: Hand) -> None:
         "a driver has name, joints, limits, connect, read, command, stop, disconnect."
     )
     with pytest.raises(CommandError, match=f"^{re.escape(message)}$"):
-        DrivenHand(pincer, Bare())  # type: ignore[arg-type]
+        HardwareHand(pincer, Bare())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -300,7 +301,7 @@ def test_a_wrong_state_on_the_way_stops_the_hand(
     driver = FakeDriver(OPEN)
     read = driver.read
     driver.read = lambda: read() if len(driver.commands) < 4 else state  # type: ignore[method-assign, assignment, return-value]
-    hand = DrivenHand(pincer, driver)
+    hand = HardwareHand(pincer, driver)
     report = execute(solution, hand, speed=0.3)
     assert not report.success
     assert report.reason.startswith(f"read() of FakeDriver: {message} The hand was told to stop")
@@ -310,7 +311,7 @@ def test_a_wrong_state_on_the_way_stops_the_hand(
 
 def test_a_stop_from_another_thread(pincer: Hand, solution: GraspSolution, clock: VirtualClock) -> None:
     driver = FakeDriver(OPEN)
-    hand = DrivenHand(pincer, driver)
+    hand = HardwareHand(pincer, driver)
     clock.after(0.3, hand.stop)
     report = execute(solution, hand, speed=0.2)
     assert report.reason.startswith("Stopped on request. The hand was told to stop: it was seen to stand still")
@@ -322,7 +323,7 @@ def test_a_stop_while_the_trajectory_is_planned_is_heeded(
     pincer: Hand, solution: GraspSolution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     driver = FakeDriver(OPEN)
-    hand = DrivenHand(pincer, driver)
+    hand = HardwareHand(pincer, driver)
     plan = executing.plan_trajectory
     monkeypatch.setattr(executing, "plan_trajectory", lambda *a, **k: [hand.stop(), plan(*a, **k)][1])
     report = execute(solution, hand)
@@ -342,7 +343,7 @@ def test_an_interrupt_stops_the_hand_and_goes_on(pincer: Hand, solution: GraspSo
         return {}
 
     driver = FakeDriver(OPEN, fault=fault)
-    hand = DrivenHand(pincer, driver)
+    hand = HardwareHand(pincer, driver)
     with pytest.raises(KeyboardInterrupt):
         execute(solution, hand, speed=0.3)
     assert driver.stops == 1
@@ -450,7 +451,7 @@ def test_after_a_stop_no_tendon_is_pulled(
     pincer: Hand, solution: GraspSolution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     driver = Puller(OPEN)
-    hand = DrivenHand(replace(pincer, tendons=TENDONS), driver)
+    hand = HardwareHand(replace(pincer, tendons=TENDONS), driver)
     monkeypatch.setattr(driven_hand, "squeeze_by_driver", lambda *_: hand.stop())
     report = execute(replace(solution, squeeze={"tensions": [12.0, 1.0]}), hand)
     assert report.reason.startswith("Stopped on request. The hand was told to stop")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from clench.base.errors import CommandError
-from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver import DriverError, DriverLimits
+from clench.core.errors import CommandError
 from clench.execution.executing import execute
+from clench.execution.hardware.driver import DriverError, DriverLimits
+from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.execution.report import ExecutionReport
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
@@ -26,7 +26,7 @@ def squeezed(pinch: GraspSolution, **changes: object) -> GraspSolution:
 
 
 def run(driver: FakeDriver, hand: Hand, solution: GraspSolution, **options: float) -> ExecutionReport:
-    return execute(solution, DrivenHand(hand, driver, **options))  # type: ignore[arg-type]
+    return execute(solution, HardwareHand(hand, driver, **options))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])
@@ -106,4 +106,4 @@ def test_a_line_that_is_cut_while_squeezing_stops_the_hand(pincer: Hand, pinch: 
 @pytest.mark.parametrize("share", [-1.0, np.nan, np.inf])
 def test_a_share_that_makes_no_sense(pincer: Hand, share: float) -> None:
     with pytest.raises(CommandError, match="squeeze: expected a finite number of at least 0"):
-        DrivenHand(pincer, FakeDriver(OPEN), squeeze=share)
+        HardwareHand(pincer, FakeDriver(OPEN), squeeze=share)

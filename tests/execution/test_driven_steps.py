@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver import DriverError, DriverLimits
 from clench.execution.executing import execute
+from clench.execution.hardware.driver import DriverError, DriverLimits
+from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.execution.report import ExecutionReport
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
@@ -25,7 +25,7 @@ def run(
     driver: FakeDriver, hand: Hand, pinch: GraspSolution, *steps: dict[str, float], **options: float
 ) -> ExecutionReport:
     solution = replace(pinch, squeeze=SQUEEZE, next_steps=steps)
-    return execute(solution, DrivenHand(hand, driver, **options))  # type: ignore[arg-type]
+    return execute(solution, HardwareHand(hand, driver, **options))  # type: ignore[arg-type]
 
 
 def test_steps_come_after_the_squeeze_and_the_other_finger_goes_on_pressing(pincer: Hand, pinch: GraspSolution) -> None:

@@ -11,13 +11,13 @@ import pytest
 from facing_fingers import crossing, facing_fingers
 from fake_driver import FakeDriver
 
-from clench.base.pose import Pose
-from clench.execution.driven_hand import DrivenHand
+from clench.closing.collision.path_check import find_path_overlap
+from clench.core.pose import Pose
 from clench.execution.executing import execute
+from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.execution.report import ExecutionReport
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.trajectory import plan_trajectory
-from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
@@ -34,8 +34,8 @@ def hand() -> Hand:
 
 
 def run(driver: FakeDriver, hand: Hand, solution: GraspSolution, **options: object) -> ExecutionReport:
-    actuator = DrivenHand(hand, driver, **options)  # type: ignore[arg-type]
-    return actuator.carry_out(solution, plan_trajectory(solution, hand, force=True))
+    actuator = HardwareHand(hand, driver, **options)  # type: ignore[arg-type]
+    return actuator.execute(solution, plan_trajectory(solution, hand, force=True))
 
 
 @pytest.mark.usefixtures("clock")
@@ -74,7 +74,7 @@ def test_without_a_free_way_nothing_is_sent(hand: Hand) -> None:
 @pytest.mark.usefixtures("clock")
 def test_a_forced_trajectory_that_is_not_free_is_not_sent(hand: Hand) -> None:
     driver = FakeDriver({"a_0": -1.0, "b_0": -1.0})
-    report = execute(crossing(hand, -1.0, 0.0), DrivenHand(hand, driver), force=True)
+    report = execute(crossing(hand, -1.0, 0.0), HardwareHand(hand, driver), force=True)
     assert not report.success
     assert "On the way to the touch, 'b_link_0' would overlap 'a_link_0'" in report.reason
     assert not driver.commands
@@ -157,7 +157,7 @@ def test_what_blocks_a_simulated_joint_is_named(tmp_path: Path) -> None:
         ),
         object_pose=Pose((0.0, 0.0, 0.5)),
     )
-    report = SimulatedHand(hand, box).carry_out(solution, plan_trajectory(solution, hand, force=True))
+    report = SimulatedHand(hand, box).execute(solution, plan_trajectory(solution, hand, force=True))
     assert not report.success
     said = r"Not reached: joint '(a|b)' is .* tolerance 0.02 rad. '(a|b)' presses on '(a|b)' with"
     assert re.search(said, report.reason), report.reason

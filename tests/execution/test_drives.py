@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from clench.apps.cli.actuators import ActuatorOptions, make_actuator
-from clench.base.errors import CommandError
-from clench.base.pose import FloatArray, Pose
-from clench.execution.drives import Drive
+from clench.core.errors import CommandError
+from clench.core.pose import FloatArray, Pose
 from clench.execution.executing import execute
-from clench.execution.hold import Hold
-from clench.execution.scene import Scene, build_scene
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.mujoco_scene import Scene, build_scene
+from clench.execution.simulation.simulated_actuators import Drive
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import Shape, ShapeKind

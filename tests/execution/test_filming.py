@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from clench.apps.cli.actuators import make_film, make_hold
-from clench.base.errors import ClenchError, CommandError, FileError
+from clench.core.errors import ClenchError, CommandError, FileError
 from clench.execution.executing import execute
-from clench.execution.filming import FRAME, Film
-from clench.execution.hold import Hold
-from clench.execution.scene import build_scene
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.filming import FRAME, Film
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.mujoco_scene import build_scene
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from clench.base.errors import CommandError, FileError, UnknownNameError
-from clench.execution.joint_map import JointMap, MappedJoint, joint_map_from_dict
+from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.execution.hardware.joint_map import JointMap, MappedJoint, joint_map_from_dict
 from clench.models.hand.hand import Hand
 
 TEXT = """

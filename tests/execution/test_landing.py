@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import FloatArray, invert
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.collision.path_check import find_path_overlap
+from clench.closing.collision.reach import nearest_link
+from clench.core.pose import FloatArray, invert
 from clench.execution.landing import LANDING_SPEED, plan_landing
 from clench.execution.step_check import placed_object
 from clench.execution.trajectory import Trajectory, plan_trajectory
-from clench.grasp.path_check import find_path_overlap
-from clench.grasp.reach import nearest_link
-from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from clench.base.errors import CommandError, UnknownNameError
+from clench.core.errors import CommandError, UnknownNameError
 from clench.execution.next_steps import Phase, moved_joints, plan_after_touch, plan_next_steps, squeeze_offsets
 from clench.execution.timing import ACCELERATION
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import DEFAULT_SPEED, Coupling, Hand
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 VELOCITY = np.array([3.0, DEFAULT_SPEED, 1.0])

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from virtual_clock import VirtualClock
 
-from clench.base.errors import CommandError, FileError
-from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver import DriverError, JointPath
+from clench.core.errors import CommandError, FileError
 from clench.execution.executing import execute
-from clench.execution.joint_map import JointMap, joint_map_from_dict
+from clench.execution.hardware.driver import DriverError, JointPath
+from clench.execution.hardware.hardware_hand import HardwareHand
+from clench.execution.hardware.joint_map import JointMap, joint_map_from_dict
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
 
@@ -45,7 +45,7 @@ def test_a_pinch_on_the_mock(
 ) -> None:
     driver = OrcaDriver(mock=True)
     leave, driver.disconnect = driver.disconnect, lambda: None  # what the mock knows is lost with its connection
-    report = execute(pinch, DrivenHand(pincer, driver, joint_map=joint_map))
+    report = execute(pinch, HardwareHand(pincer, driver, joint_map=joint_map))
     assert report.success, report.reason
     assert report.actuator == "orca (mock)"
     assert set(report.joints) == {"thumb", "index", "index_tip"}
@@ -112,7 +112,7 @@ def test_what_other_threads_print_is_kept(capsys: pytest.CaptureFixture[str]) ->
 
 def test_stopped_on_the_way(pincer: Hand, pinch: GraspSolution, joint_map: JointMap, clock: VirtualClock) -> None:
     driver = OrcaDriver(mock=True)
-    hand = DrivenHand(pincer, driver, joint_map=joint_map)
+    hand = HardwareHand(pincer, driver, joint_map=joint_map)
     clock.after(1.0, hand.stop)
     report = execute(pinch, hand, speed=0.05)
     assert report.reason.startswith("Stopped on request. The hand was told to stop: it was seen to stand still")
@@ -120,7 +120,7 @@ def test_stopped_on_the_way(pincer: Hand, pinch: GraspSolution, joint_map: Joint
 
 def test_the_configuration_limits_what_is_sent(pincer: Hand, pinch: GraspSolution) -> None:
     far = {**MAP, "joints": {**MAP["joints"], "index": {"name": "index_mcp", "offset": -14.0, "upper": -8.0}}}
-    report = execute(pinch, DrivenHand(pincer, OrcaDriver(mock=True), joint_map=joint_map_from_dict(far)))
+    report = execute(pinch, HardwareHand(pincer, OrcaDriver(mock=True), joint_map=joint_map_from_dict(far)))
     assert "outside its limits" in report.reason
     assert "deg" in report.reason
 

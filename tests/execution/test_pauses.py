@@ -15,12 +15,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from virtual_clock import VirtualClock
 
-from clench.execution.command_check import CommandCheck, CommandLimits
-from clench.execution.driver import DriverError, HandState, JointPath
-from clench.execution.driver_session import DriverSession
-from clench.execution.following import HORIZON, LATE, PERIOD, Followed, Follower, TimedPlan
-from clench.execution.halting import halt
-from clench.execution.supervision import supervision_of
+from clench.execution.hardware.command_check import CommandCheck, CommandLimits
+from clench.execution.hardware.driver import DriverError, HandState, JointPath
+from clench.execution.hardware.driver_session import DriverSession
+from clench.execution.hardware.following import HORIZON, LATE, PERIOD, Followed, Follower, TimedPlan
+from clench.execution.hardware.halting import halt
+from clench.execution.hardware.supervision import supervision_of
 
 #: What every look at the clock takes [s].
 LOOK = 2e-5

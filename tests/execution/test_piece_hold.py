@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import clench
-from clench.execution.convex_pieces import in_pieces
-from clench.execution.hold import Hold
-from clench.execution.piece_hold import hold_as_collided
+from clench.closing.collision.depths import hand_depths
+from clench.closing.collision.packed_object import pack_object
+from clench.execution.simulation.convex_pieces import in_pieces
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.piece_hold import hold_as_collided
 from clench.execution.trajectory import plan_trajectory
-from clench.grasp.depths import hand_depths
-from clench.grasp.scene import pack_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource

@@ -9,10 +9,10 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.base.errors import CommandError
-from clench.base.pose import invert
-from clench.grasp.reach import nearest_link
-from clench.grasp.scene import pack_object
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.collision.reach import nearest_link
+from clench.core.errors import CommandError
+from clench.core.pose import invert
 from clench.models.shapes import CollisionSource
 
 

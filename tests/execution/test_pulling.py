@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.base.errors import CommandError
-from clench.base.pose import Pose
+from clench.core.errors import CommandError
+from clench.core.pose import Pose
 from clench.execution.executing import execute
-from clench.execution.hold import Hold
-from clench.execution.pulling import hold_and_pull, joint_torques
 from clench.execution.report import ExecutionReport
-from clench.execution.scene import build_scene, lowest
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.mujoco_scene import build_scene, lowest
+from clench.execution.simulation.pulling import hold_and_pull, joint_torques
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import Shape, ShapeKind
-from clench.solver.posture import posture
+from clench.solver.analysis.squeezing import plan_squeeze
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
-from clench.solver.squeezing import plan_squeeze
 
 #: Two fingers hold a ball in every direction only if they also resist turning about the line between them.
 FIRM = Hold(friction=1.0, contact_model="soft")
@@ -204,7 +204,7 @@ def test_an_obstacle_under_the_object_does_not_carry_it(pincer: Hand, pinch: Gra
 
 def test_a_touch_that_is_not_reached_is_not_tested(pincer: Hand, pinch: GraspSolution) -> None:
     dot = GraspObject("ball", (Body("ball", (Shape(ShapeKind.SPHERE, (0.001, 0, 0)),)),))
-    report = SimulatedHand(pincer, dot, hold=FIRM).carry_out(pinch, plan_trajectory(pinch, pincer))
+    report = SimulatedHand(pincer, dot, hold=FIRM).execute(pinch, plan_trajectory(pinch, pincer))
     assert not report.success
     assert report.hold is None
     assert report.notes[-1] == "Holding was not tested: the touch was not reached."

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from clench.base.errors import CommandError, FileError
+from clench.core.errors import CommandError, FileError
 from clench.execution.drivers import ros2
 from clench.execution.executing import execute
-from clench.execution.ready_signal import ReadySignal
+from clench.execution.hardware.ready_signal import ReadySignal
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.record import Record
+from clench.solver.analysis.record import Record
 from clench.solver.solution import GraspSolution
 
 DOMAIN = 1 + os.getpid() % 100

@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 from virtual_clock import VirtualClock
 
-from clench.base.errors import CommandError, UnknownNameError
-from clench.execution.driver import JointPath
+from clench.core.errors import CommandError, UnknownNameError
 from clench.execution.drivers import ros2
 from clench.execution.drivers.ros2 import Ros2Driver, topic_name
+from clench.execution.hardware.driver import JointPath
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
 
@@ -38,12 +38,12 @@ import sys
 sys.path[:0] = {paths!r}
 import pickle
 from pathlib import Path
-from clench.execution.driven_hand import DrivenHand
+from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.execution.drivers.ros2 import Ros2Driver
 from clench.execution.executing import execute
 hand, solution = pickle.loads(Path({inputs!r}).read_bytes())
 driver = Ros2Driver({controller!r}, joint_states={states!r}, interface={interface!r}, domain={domain})
-hand = DrivenHand(hand, driver, connect_timeout=15.0, **{options!r})
+hand = HardwareHand(hand, driver, connect_timeout=15.0, **{options!r})
 report = execute(solution, hand, speed={speed})
 report.save({out!r})
 """

@@ -11,11 +11,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from clench.base.errors import CommandError
-from clench.execution.driver import DriverError, JointPath
+from clench.core.errors import CommandError
 from clench.execution.drivers import action_link, ros2
 from clench.execution.drivers.action_link import ABORTED, ActionLink
 from clench.execution.drivers.ros2 import RosInterface, installed_interface
+from clench.execution.hardware.driver import DriverError, JointPath
 
 PATH = JointPath(("a", "b"), np.array([0.1, 0.30000001]), np.array([[0.0, 0.5], [1.0, 2.0]]), 0.05)
 

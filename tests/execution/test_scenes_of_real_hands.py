@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.base.pose import Pose
-from clench.execution.scene import body_pose, build_scene
+from clench.core.pose import Pose
+from clench.execution.simulation.mujoco_scene import body_pose, build_scene
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import Shape, ShapeKind

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.base.errors import CommandError, HandError, ObjectError
-from clench.base.pose import Pose
-from clench.execution import convex_pieces as convex_pieces_module
-from clench.execution.convex_pieces import convex_pieces
+from clench.core.errors import CommandError, HandError, ObjectError
+from clench.core.pose import Pose
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
-from clench.execution.scene import body_pose, build_scene
-from clench.execution.simulation import SimulatedHand, nearest
+from clench.execution.simulation.convex_pieces import convex_pieces
+from clench.execution.simulation.mujoco_scene import body_pose, build_scene
+from clench.execution.simulation.simulated_hand import SimulatedHand, nearest
+from clench.execution.simulation.simulated_hand import convex_pieces as convex_pieces_module
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
@@ -56,7 +56,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def carried_out(solution: GraspSolution, hand: Hand, obj: GraspObject) -> ExecutionReport:
     """Carry a solution out on another object than it was computed for, which `execute` refuses."""
-    return SimulatedHand(hand, obj).carry_out(solution, plan_trajectory(solution, hand))
+    return SimulatedHand(hand, obj).execute(solution, plan_trajectory(solution, hand))
 
 
 def test_a_pinch_is_reached(pincer: Hand, pinch: GraspSolution, ball: GraspObject, tmp_path: Path) -> None:

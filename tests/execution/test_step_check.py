@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from test_drives import FAR
 
-from clench.base.pose import Pose
-from clench.execution.executing import execute
+from clench.closing.collision.packed_object import hash_bodies, hash_hand
+from clench.core.pose import Pose
 from clench.execution.next_steps import Phase, plan_next_steps
 from clench.execution.report import ExecutionReport
-from clench.execution.scene import PREFIX, build_scene
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.mujoco_scene import PREFIX, build_scene
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.step_check import squeeze_overlap, step_overlap
-from clench.grasp.scene import hash_bodies, hash_hand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution
@@ -112,11 +111,11 @@ def test_a_squeeze_is_checked_but_for_fingers_that_the_object_holds(hand: Hand) 
 def test_it_is_refused_unless_forced(hand: Hand, monkeypatch: pytest.MonkeyPatch) -> None:
     moved: list[bool] = []
 
-    def carry_out(*_: object) -> ExecutionReport:
+    def execute(*_: object) -> ExecutionReport:
         moved.append(True)
         return ExecutionReport("simulated", success=True, reason="done")
 
-    monkeypatch.setattr(SimulatedHand, "carry_out", carry_out)
+    monkeypatch.setattr(SimulatedHand, "execute", execute)
     simulated = SimulatedHand(hand, FAR)
     report = execute(stepping(hand, ACROSS), simulated)
     assert not report.success

@@ -11,10 +11,10 @@ import pytest
 from test_drives import POSITIONS, changed
 from test_pulling import FIRM, on_a_table
 
-from clench.base.errors import CommandError, UnknownNameError
+from clench.core.errors import CommandError, UnknownNameError
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution
@@ -126,7 +126,7 @@ def test_steps_can_be_left_out_and_are_refused_before_anything_moves(
     assert report.success
     assert report.next_steps == ()
     assert not any("step" in note for note in report.notes)
-    monkeypatch.setattr(SimulatedHand, "carry_out", lambda *_: pytest.fail("moved"))
+    monkeypatch.setattr(SimulatedHand, "execute", lambda *_: pytest.fail("moved"))
     with pytest.raises(UnknownNameError, match="toe"):
         execute(replace(pinch, next_steps=({"toe": 1.0},)), hand)
     with pytest.raises(CommandError, match=r"next_steps\[0\]\.index: -0.1 rad is outside"):

@@ -23,12 +23,11 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from recording_driver import MOVING, RecordingDriver
 from virtual_clock import VirtualClock
 
-from clench.base.errors import CommandError
-from clench.execution import supervision
-from clench.execution.driven_hand import DrivenHand
-from clench.execution.driver import DriverError
-from clench.execution.report import ExecutionReport
-from clench.execution.supervision import (
+from clench.core.errors import CommandError
+from clench.execution.hardware import supervision
+from clench.execution.hardware.driver import DriverError
+from clench.execution.hardware.hardware_hand import HardwareHand
+from clench.execution.hardware.supervision import (
     ACTIVE,
     TRANSITIONS,
     Event,
@@ -37,9 +36,10 @@ from clench.execution.supervision import (
     Supervision,
     supervision_of,
 )
+from clench.execution.report import ExecutionReport
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
-from clench.models.hand.tendons import TendonMap
+from clench.models.hand.reading.tendons import TendonMap
 from clench.solver.solution import GraspSolution
 
 EXECUTION = Path(supervision.__file__).parent
@@ -62,7 +62,7 @@ def throw(error: type[BaseException]) -> Callable[[], None]:
     return thrown
 
 
-class Setting:
+class ScoringContext:
     """Hold one driver with two hands around it, and a solution with every phase: squeeze, tendons, a next step."""
 
     def __init__(self, pincer: Hand, pinch: GraspSolution) -> None:
@@ -70,17 +70,17 @@ class Setting:
         self.solution = replace(pinch, squeeze=SQUEEZE, next_steps=({"thumb": 0.2},))
         self.trajectory: Trajectory = plan_trajectory(self.solution, self.hand, speed=1.0)
         self.driver = RecordingDriver(OPEN)
-        self.hands = [DrivenHand(self.hand, self.driver, settling=0.2) for _ in range(2)]
+        self.hands = [HardwareHand(self.hand, self.driver, settling=0.2) for _ in range(2)]
 
     def again(self, at: dict[int, Callable[[], object]]) -> None:
         self.driver.forget(at)
         self.driver.start, self.driver.path = dict(OPEN), None
 
-    def carry_out(self, which: int = 0) -> tuple[ExecutionReport | None, BaseException | None]:
+    def execute(self, which: int = 0) -> tuple[ExecutionReport | None, BaseException | None]:
         """Return the report, and what was raised."""
         hand = self.hands[which]
         try:
-            return hand.carry_out(self.solution, self.trajectory), None
+            return hand.execute(self.solution, self.trajectory), None
         except (Exception, KeyboardInterrupt, SystemExit) as error:
             return hand.last_report, error
 
@@ -101,8 +101,8 @@ class Setting:
 
 
 @pytest.fixture
-def setting(pincer: Hand, pinch: GraspSolution, clock: VirtualClock) -> Setting:
-    return Setting(pincer, pinch)
+def setting(pincer: Hand, pinch: GraspSolution, clock: VirtualClock) -> ScoringContext:
+    return ScoringContext(pincer, pinch)
 
 
 @contextmanager
@@ -136,12 +136,12 @@ def watched_transitions() -> Iterator[None]:
 class Supervised(RuleBasedStateMachine):
     """Carry out, stop, release and fail in any order; the model knows only whether a stop is in force."""
 
-    setting: Setting
+    setting: ScoringContext
 
     @initialize()
     def begin(self) -> None:
         self.stopped = False
-        self.__class__.setting = Setting(self.setting.hand, self.setting.solution)
+        self.__class__.setting = ScoringContext(self.setting.hand, self.setting.solution)
 
     def happening(self, kind: str, which: int) -> Callable[[], None]:
         hand, driver = self.setting.hands[which], self.setting.driver
@@ -152,7 +152,7 @@ class Supervised(RuleBasedStateMachine):
 
         def execute() -> None:
             calls = len(driver.calls)
-            report = hand.carry_out(self.setting.solution, self.setting.trajectory)
+            report = hand.execute(self.setting.solution, self.setting.trajectory)
             assert not report.success
             assert report.reason.startswith("Not carried out: The driver is already in use: another execution is ")
             assert len(driver.calls) == calls
@@ -187,11 +187,11 @@ class Supervised(RuleBasedStateMachine):
             max_size=4,
         ),
     )
-    def carry_out(self, which: int, happenings: dict[int, tuple[str, int]]) -> None:
+    def execute(self, which: int, happenings: dict[int, tuple[str, int]]) -> None:
         setting, driver = self.setting, self.setting.driver
         setting.again({number: self.happening(*what) for number, what in happenings.items()})
         refused, self.wrong = self.stopped, list[AssertionError]()
-        report, raised = setting.carry_out(which)
+        report, raised = setting.execute(which)
         note(f"{driver.calls} {raised!r} {report and report.reason}")
         happened = {happenings[number][0] for number in happenings if number <= len(driver.calls)}
         assert self.wrong == []
@@ -238,7 +238,7 @@ class Supervised(RuleBasedStateMachine):
 def test_any_order_of_executions_stops_faults_and_releases(pincer: Hand, pinch: GraspSolution) -> None:
     with pytest.MonkeyPatch.context() as patched, watched_transitions():
         VirtualClock().use(patched, fake_driver)
-        Supervised.setting = Setting(pincer, pinch)
+        Supervised.setting = ScoringContext(pincer, pinch)
         run_state_machine_as_test(
             Supervised,
             settings=settings(
@@ -247,9 +247,9 @@ def test_any_order_of_executions_stops_faults_and_releases(pincer: Hand, pinch: 
         )
 
 
-def number_of_calls(setting: Setting) -> int:
+def number_of_calls(setting: ScoringContext) -> int:
     setting.again({})
-    report, raised = setting.carry_out()
+    report, raised = setting.execute()
     assert report is not None
     assert report.success, report.reason
     assert raised is None
@@ -257,13 +257,13 @@ def number_of_calls(setting: Setting) -> int:
 
 
 @pytest.mark.parametrize("error", ERRORS)
-def test_whatever_is_raised_at_any_call_stops_the_hand(setting: Setting, error: type[BaseException]) -> None:
+def test_whatever_is_raised_at_any_call_stops_the_hand(setting: ScoringContext, error: type[BaseException]) -> None:
     count = number_of_calls(setting)
     what = list(setting.driver.calls)
     assert set(what) == {"connect", "read", "command", "pull", "disconnect"}
     for number in range(1, count + 1):
         setting.again({number: throw(error)})
-        report, raised = setting.carry_out()
+        report, raised = setting.execute()
         assert report is not None
         setting.check_truth(report)
         if issubclass(error, Exception) and what[number - 1] in ("connect", "disconnect"):
@@ -281,7 +281,7 @@ def test_whatever_is_raised_at_any_call_stops_the_hand(setting: Setting, error: 
         setting.hands[0].release_stop()
 
 
-def test_a_stop_at_any_call_is_heeded(setting: Setting) -> None:
+def test_a_stop_at_any_call_is_heeded(setting: ScoringContext) -> None:
     for number in range(1, number_of_calls(setting) + 1):
         order: list[int] = []
 
@@ -290,7 +290,7 @@ def test_a_stop_at_any_call_is_heeded(setting: Setting) -> None:
             order.append(len(setting.driver.calls))
 
         setting.again({number: stop})
-        report, _ = setting.carry_out()
+        report, _ = setting.execute()
         assert report is not None
         setting.check_truth(report)
         assert not report.success
@@ -301,9 +301,9 @@ def test_a_stop_at_any_call_is_heeded(setting: Setting) -> None:
         setting.hands[0].release_stop()
 
 
-def test_a_stop_that_fails_is_told_again_and_reported(setting: Setting) -> None:
+def test_a_stop_that_fails_is_told_again_and_reported(setting: ScoringContext) -> None:
     setting.again({9: throw(OSError), 10: throw(KeyboardInterrupt)})
-    report, raised = setting.carry_out()
+    report, raised = setting.execute()
     assert report is not None
     assert setting.driver.calls[8:11] == ["read", "stop", "stop"] or setting.driver.calls[8:11] == [
         "command",
@@ -314,7 +314,7 @@ def test_a_stop_that_fails_is_told_again_and_reported(setting: Setting) -> None:
     assert report.reason.startswith("The driver failed (OSError: on purpose). The hand was told to stop: it was seen")
     setting.hands[0].release_stop()
     setting.again(dict.fromkeys(range(9, 99), throw(OSError)))
-    report, _ = setting.carry_out()
+    report, _ = setting.execute()
     assert report is not None
     assert (
         "The hand could not be told to stop (The driver failed (OSError: on purpose), tried twice); it was told "
@@ -327,19 +327,19 @@ def test_a_stop_that_fails_is_told_again_and_reported(setting: Setting) -> None:
     assert setting.hands[0].state is State.FAULTED
 
 
-def test_how_to_release_is_said_and_a_stop_outlives_its_hand(setting: Setting) -> None:
+def test_how_to_release_is_said_and_a_stop_outlives_its_hand(setting: ScoringContext) -> None:
     setting.hands[1].stop()
     setting.hands.clear()
     gc.collect()
-    hand = DrivenHand(setting.hand, setting.driver)
+    hand = HardwareHand(setting.hand, setting.driver)
     for _ in range(2):
-        report = hand.carry_out(setting.solution, setting.trajectory)
+        report = hand.execute(setting.solution, setting.trajectory)
         assert report.reason == (
             "Not carried out: A stop is in force (Stopped on request); release it with release_stop()."
         )
     assert setting.driver.calls == ["stop"]
     hand.release_stop()
-    assert hand.carry_out(setting.solution, setting.trajectory).success
+    assert hand.execute(setting.solution, setting.trajectory).success
 
 
 def test_drivers_share_nothing() -> None:
@@ -365,7 +365,7 @@ def test_drivers_share_nothing() -> None:
     assert [key in supervision._supervised for key in keys] == [False, False, True, True]
 
 
-def hang(setting: Setting, clock: VirtualClock, number: int) -> tuple[threading.Event, ExecutionReport]:
+def hang(setting: ScoringContext, clock: VirtualClock, number: int) -> tuple[threading.Event, ExecutionReport]:
     """Let a call hang until an event is set; return the event and the report."""
     goes_on = threading.Event()
 
@@ -378,7 +378,7 @@ def hang(setting: Setting, clock: VirtualClock, number: int) -> tuple[threading.
         clock.hanging.clear()
 
     setting.again({number: hanging, number + 1: stopping})
-    report, raised = setting.carry_out()
+    report, raised = setting.execute()
     assert report is not None
     assert raised is None
     setting.check_truth(report)
@@ -386,7 +386,7 @@ def hang(setting: Setting, clock: VirtualClock, number: int) -> tuple[threading.
 
 
 @pytest.mark.parametrize("what", ["read", "command", "pull"])
-def test_a_call_that_does_not_return_is_a_fault(setting: Setting, clock: VirtualClock, what: str) -> None:
+def test_a_call_that_does_not_return_is_a_fault(setting: ScoringContext, clock: VirtualClock, what: str) -> None:
     number_of_calls(setting)
     number = [k for k, call in enumerate(setting.driver.calls, 1) if call == what][-1]
     goes_on, report = hang(setting, clock, number)
@@ -399,7 +399,7 @@ def test_a_call_that_does_not_return_is_a_fault(setting: Setting, clock: Virtual
     assert hand.state is State.FAILING
     assert (
         "The driver is already in use: another execution is failing"
-        in hand.carry_out(setting.solution, setting.trajectory).reason
+        in hand.execute(setting.solution, setting.trajectory).reason
     )
     with pytest.raises(HandStoppedError, match="a call of the driver has not returned"):
         hand.release_stop()
@@ -437,7 +437,7 @@ def test_the_page_has_the_table() -> None:
     assert found == {(str(state), str(event)): str(after) for (state, event), after in TRANSITIONS.items()}
 
 
-def signalled(setting: Setting, number: int) -> Callable[[], None]:
+def signalled(setting: ScoringContext, number: int) -> Callable[[], None]:
     """Return a happening that sends a signal to the main thread, and goes on when the stop is in force."""
 
     def happening() -> None:
@@ -451,7 +451,9 @@ def signalled(setting: Setting, number: int) -> Callable[[], None]:
 
 @pytest.mark.parametrize("what", ["read", "command", "pull"])
 @pytest.mark.parametrize("handled", ["interrupt", "stop"])
-def test_a_signal_in_the_middle_of_a_call_stops_the_hand_after_it(setting: Setting, what: str, handled: str) -> None:
+def test_a_signal_in_the_middle_of_a_call_stops_the_hand_after_it(
+    setting: ScoringContext, what: str, handled: str
+) -> None:
     """Ctrl-C, or a handler that calls `stop`: the call is not torn, and the hand is told to stop afterwards."""
     hand, driver = setting.hands[0], setting.driver
     number_of_calls(setting)
@@ -460,7 +462,7 @@ def test_a_signal_in_the_middle_of_a_call_stops_the_hand_after_it(setting: Setti
     handler = signal.default_int_handler if handled == "interrupt" else lambda *_: hand.stop()
     before = signal.signal(signal.SIGINT, handler)
     try:
-        report, raised = setting.carry_out()
+        report, raised = setting.execute()
     finally:
         signal.signal(signal.SIGINT, before)
     assert report is not None
@@ -476,7 +478,7 @@ def test_a_signal_in_the_middle_of_a_call_stops_the_hand_after_it(setting: Setti
     assert hand.state is State.STOPPED
 
 
-def test_a_second_interrupt_does_not_keep_the_hand_from_being_stopped(setting: Setting) -> None:
+def test_a_second_interrupt_does_not_keep_the_hand_from_being_stopped(setting: ScoringContext) -> None:
     """One comes from the driver, and another one while the hand is told to stop for the second time."""
     driver = setting.driver
 
@@ -492,7 +494,7 @@ def test_a_second_interrupt_does_not_keep_the_hand_from_being_stopped(setting: S
     setting.again({9: throw(OSError), 10: throw(KeyboardInterrupt), 11: interrupted})
     before = signal.signal(signal.SIGINT, handler)
     try:
-        report, raised = setting.carry_out()
+        report, raised = setting.execute()
     finally:
         signal.signal(signal.SIGINT, before)
     assert report is not None
@@ -522,7 +524,7 @@ class Interrupt:
 
 @pytest.mark.parametrize("fault", [{}, {9: throw(OSError)}], ids=["no fault", "after a fault"])
 def test_an_interrupt_at_any_line_leaves_the_hand_stopped_and_the_driver_free(
-    setting: Setting, fault: dict[int, Callable[[], object]]
+    setting: ScoringContext, fault: dict[int, Callable[[], object]]
 ) -> None:
     before = sys.gettrace()
 
@@ -531,7 +533,7 @@ def test_an_interrupt_at_any_line_leaves_the_hand_stopped_and_the_driver_free(
         interrupt = Interrupt(at)
         sys.settrace(interrupt)
         try:
-            setting.carry_out()
+            setting.execute()
         finally:
             sys.settrace(before)
         return interrupt
@@ -551,7 +553,7 @@ def test_an_interrupt_at_any_line_leaves_the_hand_stopped_and_the_driver_free(
         setting.hands[0].release_stop()
 
 
-def test_a_stop_from_another_thread_is_told_again_after_a_command_on_its_way(setting: Setting) -> None:
+def test_a_stop_from_another_thread_is_told_again_after_a_command_on_its_way(setting: ScoringContext) -> None:
     hand, driver = setting.hands[0], setting.driver
     order: list[str] = []
 
@@ -565,7 +567,7 @@ def test_a_stop_from_another_thread_is_told_again_after_a_command_on_its_way(set
 
     number_of_calls(setting)
     setting.again({driver.calls.index("command") + 1: late})
-    report, _ = setting.carry_out()
+    report, _ = setting.execute()
     assert report is not None
     assert report.reason.startswith("Stopped on request.")
     until = time.monotonic() + 60.0

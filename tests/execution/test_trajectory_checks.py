@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from clench.base.errors import CommandError, FileError
-from clench.execution.driven_hand import DrivenHand
+from clench.core.errors import CommandError, FileError
+from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.execution.next_steps import Phase
-from clench.execution.simulation import SimulatedHand
+from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -56,10 +56,10 @@ def test_no_hand_moves_along_an_edited_trajectory(
     edited = edit(plan_trajectory(pinch, pincer))
     driver, steps = FakeDriver({"thumb": 0.0, "index": 0.0}), []
     with pytest.raises(CommandError, match="trajectory: .*" + message):
-        DrivenHand(pincer, driver).carry_out(pinch, edited)
+        HardwareHand(pincer, driver).execute(pinch, edited)
     assert (driver.commands, driver.connected) == ([], False)
     with pytest.raises(CommandError, match="trajectory: .*" + message):
-        SimulatedHand(pincer, ball, on_step=lambda *of: steps.append(of)).carry_out(pinch, edited)
+        SimulatedHand(pincer, ball, on_step=lambda *of: steps.append(of)).execute(pinch, edited)
     assert steps == []
 
 

@@ -10,11 +10,11 @@ import pytest
 from facing_fingers import crossing, facing_fingers
 
 import clench
-from clench.base.errors import MotionError
+from clench.closing.collision.path_check import find_path_overlap
+from clench.core.errors import MotionError
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
 from clench.execution.trajectory import Trajectory, plan_trajectory
-from clench.grasp.path_check import find_path_overlap
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution
@@ -70,7 +70,7 @@ def test_execution_is_refused_and_says_why() -> None:
         def __init__(self) -> None:
             self.hand = hand
 
-        def carry_out(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
+        def execute(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
             sent.append(trajectory)
             return ExecutionReport(self.name, success=True, reason="done")
 

@@ -9,12 +9,12 @@ import pytest
 from facing_fingers import crossing, facing_fingers
 
 from chain_hands import HandBuilder, along_x, mount
-from clench.base.errors import MotionError
-from clench.base.pose import Pose
-from clench.execution.blocking import modelled_blocker
+from clench.closing.collision.path_check import find_path_overlap, place_object
+from clench.core.errors import MotionError
+from clench.core.pose import Pose
+from clench.execution.hardware.joint_blocking import modelled_blocker
 from clench.execution.step_check import told_overlap
 from clench.execution.trajectory import Trajectory, plan_trajectory
-from clench.grasp.path_check import find_path_overlap, place_object
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource

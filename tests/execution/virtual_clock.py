@@ -9,9 +9,9 @@ from types import ModuleType
 
 import pytest
 
-from clench.execution import following, halting
-from clench.execution.driver_line import Call
-from clench.execution.supervision import Supervision
+from clench.execution.hardware import following, halting
+from clench.execution.hardware.driver_line import Call
+from clench.execution.hardware.supervision import Supervision
 
 
 class VirtualClock:

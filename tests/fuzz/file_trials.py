@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 import clench
-from clench.base.array_files import read_array
-from clench.base.pose_arrays import pose_rows
-from clench.execution.joint_map import JointMap
-from clench.models.hand.pictures import checked_png
+from clench.core.files.array_files import read_array
+from clench.core.pose_arrays import pose_rows
+from clench.execution.hardware.joint_map import JointMap
+from clench.models.hand.reading.png_checks import checked_png
 
 from .mutation import Rng, pick, spoil_bytes, spoil_text, spoil_tree, to_json
 from .originals import MJCF, link_stl

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 
 from .mutation import NUMBERS, TEXTS, VALUES, Rng, pick, spoil_bytes, spoil_text, spoil_tree, to_json
 from .originals import CALIBRATION, COMMAND, HAND_FILE, MJCF, SHAPES, URDF, link_stl, mesh_files

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
 from .file_trials import (

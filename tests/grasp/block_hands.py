@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.hand.hand import Finger, Hand, Joint, JointRole, Link
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 

@@ -3,8 +3,8 @@
 import numpy as np
 from small_chain import CLOSING, chain
 
-from clench.grasp.candidates import FingerCandidate, Touch
-from clench.grasp.plan import plan_finger
+from clench.closing.candidates import FingerCandidate, Touch
+from clench.closing.finger_plan import plan_finger
 from clench.models.shapes import CollisionSource
 
 HAND = chain([CLOSING, CLOSING])

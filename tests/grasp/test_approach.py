@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from block_hands import block_hand
 
-from clench.base.errors import CommandError, ObjectError, UnknownNameError
-from clench.base.pose import Pose
-from clench.grasp.approach import BACK_OFF, MAX_TILT, approach_poses
-from clench.grasp.depths import first_touch, hand_depths, travel_to_touch
-from clench.grasp.scene import pack_object
+from clench.closing.collision.approach import BACK_OFF, MAX_TILT, approach_poses
+from clench.closing.collision.depths import first_touch, hand_depths, travel_to_touch
+from clench.closing.collision.packed_object import pack_object
+from clench.core.errors import CommandError, ObjectError, UnknownNameError
+from clench.core.pose import Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.objects.obstacles import table
 from clench.models.shapes import Shape, ShapeKind
-from clench.solver.batch import solve_batch
+from clench.solver.batch.solve_batch import solve_batch
 
 BALL = GraspObject("ball", (Body("ball", (Shape(ShapeKind.SPHERE, (0.03, 0.0, 0.0)),)),), pose=Pose([0.4, 0.5, 0.6]))
 TABLE = Body("table", (Shape(ShapeKind.BOX, (1.0, 1.0, 0.1), Pose([0.0, 0.0, -0.13])),), role=BodyRole.OBSTACLE)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from chain_hands import HandBuilder, along_x, mount
-from clench.base.pose import Pose
-from clench.grasp.exact import HandBodies, hand_bodies
-from clench.kernels.bodies import pack_bodies
-from clench.kernels.boxes import mark_meeting
-from clench.kernels.nearness import link_gap
+from clench.closing.link_bodies import HandBodies, hand_bodies
+from clench.core.pose import Pose
+from clench.kernels.geometry.bodies import pack_bodies
+from clench.kernels.geometry.link_boxes import mark_meeting
+from clench.kernels.geometry.smallest_gap import link_gap
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 

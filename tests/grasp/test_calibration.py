@@ -4,8 +4,8 @@ import tomllib
 
 import pytest
 
-from clench.base.errors import CommandError, FileError, UnknownNameError
-from clench.grasp.calibration import (
+from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.scoring.calibration import (
     Calibration,
     calibration_of,
     calibration_to_toml,
@@ -61,7 +61,7 @@ def test_presets_load_and_say_what_they_are_for(name):
     preset = load_preset(name)
     assert preset.name == name
     assert preset.criteria
-    from clench.grasp import calibration
+    from clench.scoring import calibration
 
     text = (calibration._PRESETS / f"{name}.toml").read_text()
     assert text.startswith("# ")

@@ -10,13 +10,13 @@ from candidate_cases import HAND, candidate, touch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.grasp import criterion_registry
-from clench.grasp.calibration import Calibration
-from clench.grasp.choice import choose
-from clench.grasp.criteria import Setting
-from clench.grasp.explaining import explain_choice
+from clench.scoring import criterion_registry
+from clench.scoring.calibration import Calibration
+from clench.scoring.choice import choose
+from clench.scoring.criteria import ScoringContext
+from clench.scoring.explaining import explain_choice
 
-SETTING = Setting(HAND, np.zeros(2))
+SETTING = ScoringContext(HAND, np.zeros(2))
 CALIBRATION = Calibration(weights={"range_of_motion": 1.0})
 
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from small_chain import CLOSING, POSTURE, chain
 
-from clench.base.pose import Pose
-from clench.grasp.hand_plan import make_hand_plan
-from clench.grasp.packed_problem import capacity_of, items_around, pack_problem, planes_tell
-from clench.grasp.plan import plan_finger
-from clench.grasp.scene import pack_object
-from clench.grasp.solving import close_items, row_of
-from clench.grasp.threads import kernel_threads, share_out
-from clench.kernels.start_overlap import CROSSED, FREE
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.finger_plan import plan_finger
+from clench.closing.hand_plan import make_hand_plan
+from clench.closing.kernel_run import close_items, row_of
+from clench.closing.packed_problem import capacity_of, items_around, pack_problem, planes_tell
+from clench.closing.threads import kernel_threads, share_out
+from clench.core.pose import Pose
+from clench.kernels.closing.start_overlap import CROSSED, FREE
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 

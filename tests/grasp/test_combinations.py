@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from clench.grasp.combinations import MOST_JUDGED, Ceilings, Combination, best_combination
+from clench.scoring.combinations import MOST_JUDGED, Ceilings, Combination, best_combination
 
 
 class WorstDirection:

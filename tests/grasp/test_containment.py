@@ -5,11 +5,11 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
-from clench.base.pose import Pose
-from clench.grasp.containment import contained_link, link_within_link
-from clench.grasp.exact import hand_bodies
-from clench.grasp.scene import pack_object
-from clench.kernels.tree import build_tree
+from clench.closing.collision.containment import contained_link, link_within_link
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.link_bodies import hand_bodies
+from clench.core.pose import Pose
+from clench.kernels.geometry.bvh import build_tree
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.parts import part_points
 from clench.models.shapes import CollisionSource, Shape, ShapeKind

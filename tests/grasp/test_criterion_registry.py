@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from candidate_cases import HAND, candidate
 
-from clench.base.errors import CommandError, UnknownNameError
-from clench.grasp import criterion_registry
-from clench.grasp.criteria import Setting
-from clench.grasp.criterion_registry import (
+from clench.core.errors import CommandError, UnknownNameError
+from clench.scoring import criterion_registry
+from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_registry import (
     check_numbers,
     criterion_names,
     find_criterion,
@@ -18,7 +18,7 @@ from clench.grasp.criterion_registry import (
     score_sets,
 )
 
-SETTING = Setting(HAND, np.array([0.1, 0.0]))
+SETTING = ScoringContext(HAND, np.array([0.1, 0.0]))
 
 
 class Gentle:

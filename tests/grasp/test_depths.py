@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from block_hands import block_hand
 
-from clench.base.pose import Pose
-from clench.grasp.depths import hand_depths, retreat_distance, travel_to_touch
-from clench.grasp.scene import pack_object
+from clench.closing.collision.depths import hand_depths, retreat_distance, travel_to_touch
+from clench.closing.collision.packed_object import pack_object
+from clench.core.pose import Pose
 from clench.models.hand.link_mesh import link_meshes
 from clench.models.mesh import TriangleMesh, is_closed
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from clench.grasp import criterion_registry
-from clench.grasp.calibration import Calibration
-from clench.grasp.choice import choose
-from clench.grasp.criteria import Setting
-from clench.grasp.explaining import explain_choice, pareto_front
+from clench.scoring import criterion_registry
+from clench.scoring.calibration import Calibration
+from clench.scoring.choice import choose
+from clench.scoring.criteria import ScoringContext
+from clench.scoring.explaining import explain_choice, pareto_front
 
-SETTING = Setting(HAND, np.zeros(2))
+SETTING = ScoringContext(HAND, np.zeros(2))
 CALIBRATION = Calibration(weights={"range_of_motion": 1.0, "limit_distance": 0.5})
 
 

@@ -7,11 +7,11 @@ import pytest
 from small_chain import CLOSING, chain
 
 import clench
-from clench.base.pose import Pose
-from clench.grasp.candidates import FingerCandidate
-from clench.grasp.feasibility import judge_sets
-from clench.grasp.plan import plan_finger
-from clench.grasp.scene import pack_object
+from clench.closing.candidates import FingerCandidate
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.feasibility import judge_sets
+from clench.closing.finger_plan import plan_finger
+from clench.core.pose import Pose
 from clench.models.shapes import CollisionSource
 
 HAND = chain([CLOSING], upper=2.0)

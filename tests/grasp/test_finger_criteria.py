@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from candidate_cases import HAND, candidate, touch
 
-from clench.grasp.criteria import Setting
-from clench.grasp.criterion_registry import criterion_names, find_criterion
 from clench.models.hand.hand import DEFAULT_SPEED
+from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_registry import criterion_names, find_criterion
 
 START = np.array([0.1, 0.0])
 
 
 def score(name, c, **changes):
-    return find_criterion(name, "test").score(c, Setting(HAND, START, **changes))
+    return find_criterion(name, "test").score(c, ScoringContext(HAND, START, **changes))
 
 
 def test_every_criterion_says_what_it_is():
@@ -51,7 +51,7 @@ def test_limit_distance_is_the_nearest_as_a_fraction_of_the_range():
 def test_the_next_step_takes_the_time_of_the_slowest_joint():
     fast = replace(HAND, joints=(replace(HAND.joints[0], velocity=10.0), HAND.joints[1]))
     c = candidate((0.3, 0.4))
-    setting = Setting(fast, START, steps=(np.array([1.3, 0.2]),))
+    setting = ScoringContext(fast, START, steps=(np.array([1.3, 0.2]),))
     assert find_criterion("next_step_time", "test").score(c, setting) == pytest.approx(
         max(1.0 / 10.0, 0.2 / DEFAULT_SPEED)
     )

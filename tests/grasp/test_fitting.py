@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.base.errors import CommandError
-from clench.grasp.fitting import Examples, fit_weights, likeliest, told_right
+from clench.core.errors import CommandError
+from clench.scoring.fitting import Examples, fit_weights, likeliest, told_right
 
 
 def examples(better=(), worse=(), outcomes=(), held=(), names=("a",)):

@@ -9,20 +9,20 @@ from scipy.optimize import linprog
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
-from clench.base.defaults import FRICTION
-from clench.base.pose import Pose
-from clench.grasp import criterion_registry
-from clench.grasp.calibration import Calibration
-from clench.grasp.candidates import combined_posture
-from clench.grasp.choice import choose
-from clench.grasp.criteria import Setting
-from clench.grasp.criterion_registry import find_criterion
-from clench.grasp.mechanics.contacts import make_contacts, pair_friction
-from clench.grasp.mechanics.held import held_by_contacts
-from clench.grasp.mechanics.steadiness import epsilon, epsilon_bound
-from clench.models.hand.tendons import TendonMap
+from clench.closing.candidates import combined_posture
+from clench.core.defaults import FRICTION
+from clench.core.pose import Pose
+from clench.mechanics.contacts import make_contacts, pair_friction
+from clench.mechanics.epsilon_quality import epsilon, epsilon_bound
+from clench.mechanics.held import held_by_contacts
+from clench.models.hand.reading.tendons import TendonMap
 from clench.models.objects.grasp_object import BodyRole
 from clench.models.objects.mass import mass_properties
+from clench.scoring import criterion_registry
+from clench.scoring.calibration import Calibration
+from clench.scoring.choice import choose
+from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_registry import find_criterion
 from clench.solver.alternatives import finger_sets
 from clench.solver.problem import make_problem, make_setting
 
@@ -259,7 +259,7 @@ def test_no_tendons_no_tension(chosen):
 
 
 def test_criteria_of_the_hand_say_nothing_without_an_object():
-    setting = Setting(pincer(), np.zeros(2))
+    setting = ScoringContext(pincer(), np.zeros(2))
     assert score("steadiness", [], setting) is None
     assert score("actuation_force", [], setting) is None
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import Pose, invert
-from clench.grasp.linkage import placed_links
-from clench.kernels.frames import relate_poses
+from clench.closing.linkage import placed_links
+from clench.core.pose import Pose, invert
+from clench.kernels.geometry.link_frames import relate_poses
 
 
 @pytest.mark.parametrize("name", ["robonaut2", "patent15"])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from small_chain import CLOSING, POSTURE, chain
 
-from clench.base.pose import Pose
-from clench.grasp.motion import alternatives, asked_fingers, decompose, next_postures, open_posture, palm_pose
+from clench.closing.motion import alternatives, asked_fingers, decompose, next_postures, open_posture, palm_pose
+from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from clench.base.pose import Pose
-from clench.base.tolerances import OUTLINE_DEVIATION
-from clench.grasp.outlines import RoundedOutline, cut_shape, extent, without_seams
+from clench.closing.outlines import RoundedOutline, cut_shape, extent, without_seams
+from clench.core.pose import Pose
+from clench.core.tolerances import OUTLINE_DEVIATION
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import Shape, ShapeKind
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, turned
-from clench.base.pose import FloatArray, Pose
-from clench.grasp.path_check import find_path_overlap, place_object
+from clench.closing.collision.path_check import find_path_overlap, place_object
+from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes, overlap_depth
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
@@ -18,7 +18,7 @@ from clench.models.shapes import CollisionSource, Shape, ShapeKind
 SOURCE = CollisionSource.ENGINE
 X, Y, Z = np.eye(3)
 RADIUS, LENGTH = 0.006, 0.04
-#: What a path may overlap by and still be free [m]; see `clench.kernels.path_overlap`.
+#: What a path may overlap by and still be free [m]; see `clench.kernels.toi.path_overlap`.
 TOLERANCE = 1e-5
 angles = st.lists(st.floats(-1.6, 1.6), min_size=4, max_size=4)
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_chain import CLOSING, LENGTH, POSTURE, chain
 
-from clench.base.errors import HandError
-from clench.base.pose import rotation_about
-from clench.grasp.plan import plan_finger
+from clench.closing.finger_plan import plan_finger
+from clench.core.errors import HandError
+from clench.core.pose import rotation_about
 from clench.models.hand.hand import Coupling
 from clench.models.shapes import CollisionSource
 

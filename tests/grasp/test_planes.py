@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from clench.base.tolerances import EDGE_INSET
-from clench.grasp.planes import family_frame, plane_offsets, refined
+from clench.closing.curl_planes import family_frame, plane_offsets, refined
+from clench.core.tolerances import EDGE_INSET
 
 extents = st.lists(
     st.tuples(st.floats(-1.0, 1.0), st.floats(0.01, 1.0)).map(lambda e: (e[0], e[0] + e[1])), min_size=1, max_size=6

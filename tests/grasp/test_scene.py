@@ -9,9 +9,9 @@ import pytest
 from block_hands import block_hand
 
 import clench
-from clench.base.errors import CommandError
-from clench.base.pose import Pose
-from clench.grasp.scene import OBJECT_CACHE, ROUND_KINDS, hash_hand, pack_object, packed_size
+from clench.closing.collision.packed_object import OBJECT_CACHE, ROUND_KINDS, hash_hand, pack_object, packed_size
+from clench.core.errors import CommandError
+from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind

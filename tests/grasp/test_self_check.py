@@ -9,9 +9,9 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
-from clench.grasp.self_check import check_hand
+from clench.closing.collision.self_check import check_hand
 from clench.models.hand.findings import FindingCode, Severity
-from clench.models.hand.opposition import check_thumbs
+from clench.models.hand.understanding.opposition import check_thumbs
 
 X, Y, Z = np.eye(3)
 RADIUS = 0.008

@@ -7,7 +7,7 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.grasp.sizes import hand_size
+from clench.closing.collision.sizes import hand_size
 from clench.models.objects.grasp_object import BodyRole
 
 INSIDE = clench.GraspCommand(hand_pose=clench.Pose([0.05, 0.02, 0.01]), preshape="open")

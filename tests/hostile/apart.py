@@ -99,7 +99,7 @@ def grasps(path: str) -> None:
 
 
 def calibration(path: str) -> None:
-    from clench.grasp.calibration import load_calibration
+    from clench.scoring.calibration import load_calibration
 
     load_calibration(Path(path))
 
@@ -111,7 +111,7 @@ def hand_file(path: str) -> None:
 
 
 def joint_map(path: str) -> None:
-    from clench.execution.joint_map import JointMap
+    from clench.execution.hardware.joint_map import JointMap
 
     JointMap.load(path)
 
@@ -141,7 +141,7 @@ def examples(path: str) -> None:
 def moved(path: str) -> None:
     """Tell a hand in a simulation a trajectory, which must not move it."""
     import clench
-    from clench.execution.simulation import SimulatedHand
+    from clench.execution.simulation.simulated_hand import SimulatedHand
 
     from .data import good_solution
 
@@ -152,7 +152,7 @@ def moved(path: str) -> None:
     def on_step(*_: Any) -> None:
         raise AssertionError("it moved")
 
-    SimulatedHand(hand, ball, on_step=on_step).carry_out(solution, trajectory)
+    SimulatedHand(hand, ball, on_step=on_step).execute(solution, trajectory)
 
 
 _ANSWERS = (hand, solve, execute, record, poses, export, examples)
@@ -162,7 +162,7 @@ READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in (*_
 
 def _in_child(read: Callable[[str], None], path: str, place: int) -> None:
     """Read a file under limits, and end this process with the exit code that the command line would give."""
-    from clench.base.errors import ClenchError
+    from clench.core.errors import ClenchError
 
     os.dup2(place, 1)
     os.dup2(place, 2)

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 import clench
-from clench.base.array_files import read_array
-from clench.base.pose_arrays import pose_rows
-from clench.execution.joint_map import JointMap
+from clench.core.files.array_files import read_array
+from clench.core.pose_arrays import pose_rows
+from clench.execution.hardware.joint_map import JointMap
 from clench.execution.trajectory_checks import check_for_hand
-from clench.grasp.calibration import load_calibration
-from clench.solver.saved_question import SavedBatch
+from clench.scoring.calibration import load_calibration
+from clench.solver.batch.saved_question import SavedBatch
 from fuzz.file_trials import GRASPS, JOINT_MAP
 from fuzz.originals import CALIBRATION, COMMAND, HAND_FILE, MJCF, URDF, link_stl
 from fuzz.trials import good

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from clench.base import file_limits
+from clench.core.files import file_limits
 
 PAGE = (Path(__file__).parents[2] / "docs" / "security.md").read_text(encoding="utf-8")
 

@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from kernel_solids import ball, bounding_volumes, box, gap, star
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import apart, family_pose
-from clench.kernels.depth import CROSSINGS, penetration
-from clench.kernels.link_meshes import LinkMeshArrays, ObjectMesh, measure_depths
-from clench.kernels.tree import STACK_SIZE, build_tree, feature_owners
+from clench.kernels.geometry import mesh_clearance as apart
+from clench.kernels.geometry.bvh import STACK_SIZE, build_tree, feature_owners
+from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, measure_depths
+from clench.kernels.geometry.penetration import CROSSINGS, penetration
+from clench.kernels.sections import plane_pose as family_pose
 from kernels.kernel_entries import entry
 
 surfaces_apart, compose_inverse = entry(apart.surfaces_apart), entry(family_pose.compose_inverse)

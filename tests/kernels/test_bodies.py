@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.base.memory import AT_ONCE
-from clench.kernels.bodies import Elements, pack_bodies, pack_triangles
-from clench.kernels.tree import build_tree
+from clench.core.memory import AT_ONCE
+from clench.kernels.geometry.bodies import Elements, pack_bodies, pack_triangles
+from clench.kernels.geometry.bvh import build_tree
 
 
 @settings(max_examples=60, deadline=None)

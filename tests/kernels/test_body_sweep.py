@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import body_sweep, core_motion, pair_queue, parting, sweeping
-from clench.kernels.bodies import Elements, pack_bodies
-from clench.kernels.leaving import OVERLAP
-from clench.kernels.sweep_pairs import sweep_pair
+from clench.kernels.geometry.bodies import Elements, pack_bodies
+from clench.kernels.toi import body_sweep, core_motion, pair_queue, parting, sweeping
+from clench.kernels.toi.separating import OVERLAP
+from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
 from kernels.test_spatial_motion import drawn
 

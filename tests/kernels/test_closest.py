@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels import closest
-from clench.kernels.closest import separation
+from clench.kernels.geometry import closest
+from clench.kernels.geometry.core_distance import separation
 from kernels.kernel_entries import entry
 
 crosses = entry(closest.crosses)

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.peers.kernels import stepped_closing
-from clench.kernels import compiling, warming
+from clench.kernels.runtime import compiling, warming
 
-KERNELS = Path(compiling.__file__).parent
+KERNELS = Path(compiling.__file__).parents[1]
 
 
 def test_every_kernel_is_kept_by_the_sources_that_it_is_compiled_from():
@@ -23,9 +23,12 @@ def test_every_kernel_is_kept_by_the_sources_that_it_is_compiled_from():
 @pytest.fixture
 def copied(tmp_path, monkeypatch):
     """A copy of the decorators in a folder of its own, with three modules: the first one imports the second."""
-    copy = shutil.copy(compiling.__file__, tmp_path)
-    Path(tmp_path, "handing.py").write_text("HANDED = 1\n")
-    spec = importlib.util.spec_from_file_location("clench.kernels.copied", copy)
+    runtime = tmp_path / "runtime"
+    runtime.mkdir()
+    copy = shutil.copy(compiling.__file__, runtime)
+    for name in ("by_reference", "kernel_cache"):
+        Path(runtime, f"{name}.py").write_text("HANDED = 1\n")
+    spec = importlib.util.spec_from_file_location("clench.kernels.runtime.copied", copy)
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, spec.name, module)
     spec.loader.exec_module(module)
@@ -41,24 +44,24 @@ def copied(tmp_path, monkeypatch):
 def stamps(module) -> dict[str, bytes]:
     module.source_stamp.cache_clear()
     module._read.cache_clear()
-    folder = Path(module.__file__).parent
+    folder = Path(module.__file__).parents[1]
     return {name: module.source_stamp(folder / f"{name}.py") for name in ("caller", "called", "other")}
 
 
 def test_a_change_of_a_kernel_changes_its_stamp_and_those_of_its_callers_only(copied):
     before = stamps(copied)
-    Path(copied.__file__).with_name("called.py").write_text("STEPS = 9\n")
+    Path(copied.__file__).parents[1].joinpath("called.py").write_text("STEPS = 9\n")
     after = stamps(copied)
     assert after["called"] != before["called"]
     assert after["caller"] != before["caller"]
     assert after["other"] == before["other"]
 
 
-@pytest.mark.parametrize("name", ["compiling", "handing", "tolerances"])
+@pytest.mark.parametrize("name", ["runtime/compiling", "runtime/by_reference", "tolerances"])
 def test_a_change_of_the_decorators_or_of_the_numbers_changes_every_stamp(copied, name):
     before = stamps(copied)
     # The copy of the decorators counts under the name that it was loaded from.
-    with Path(copied.__file__).with_name(f"{name}.py").open("a") as file:
+    with Path(copied.__file__).parents[1].joinpath(f"{name}.py").open("a") as file:
         file.write("# changed\n")
     after = stamps(copied)
     assert all(after[module] != before[module] for module in before)
@@ -66,16 +69,16 @@ def test_a_change_of_the_decorators_or_of_the_numbers_changes_every_stamp(copied
 
 @pytest.mark.parametrize("statement", ["from clench.kernels.called import STEPS", "from .beside import STEPS"])
 def test_a_kernel_of_another_folder_is_kept_by_the_kernels_that_it_imports(copied, statement):
-    folder = Path(copied.__file__).parent / "elsewhere"
+    folder = Path(copied.__file__).parents[1] / "elsewhere"
     folder.mkdir()
     folder.joinpath("beside.py").write_text("from ..called import STEPS\n")
     outside = folder / "outside.py"
     outside.write_text(f"{statement}\n")
     before = copied.source_stamp(outside)
-    Path(copied.__file__).with_name("other.py").write_text("STEPS = 9\n")
+    Path(copied.__file__).parents[1].joinpath("other.py").write_text("STEPS = 9\n")
     stamps(copied)
     assert copied.source_stamp(outside) == before
-    Path(copied.__file__).with_name("called.py").write_text("STEPS = 9\n")
+    Path(copied.__file__).parents[1].joinpath("called.py").write_text("STEPS = 9\n")
     stamps(copied)
     assert copied.source_stamp(outside) != before
 
@@ -104,5 +107,5 @@ def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expe
             elif isinstance(node, ast.ImportFrom) and not node.level and node.module.startswith("clench"):
                 outside.add(node.module)
     # Only numbers of `tolerances` are compiled in; `memory` is called by functions that Python runs.
-    allowed = {"clench.base", "clench.base.tolerances", "clench.base.memory"}
+    allowed = {"clench.core", "clench.core.tolerances", "clench.core.memory"}
     assert {module for module in outside if not module.startswith("clench.kernels.")} <= allowed

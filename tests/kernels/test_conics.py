@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from kernel_entries import entry
 
-from clench.kernels import conics
+from clench.kernels.sections import conics
 
 ellipse_foot, region_gap, support = entry(conics.ellipse_foot), entry(conics.region_gap), entry(conics.support)
 sweep_vertex_region, sweep_side_region = entry(conics.sweep_vertex_region), entry(conics.sweep_side_region)

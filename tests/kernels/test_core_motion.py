@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import core_motion
+from clench.kernels.toi import core_motion
 from kernels.kernel_entries import entry
 from kernels.motion_check import STEPS, check_motion
 

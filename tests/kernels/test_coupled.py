@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.coupled import (
+from clench.kernels.sections.coupled import (
     at_start,
     bounds,
     evaluate,

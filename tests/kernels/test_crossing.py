@@ -5,9 +5,9 @@ import pytest
 from kernel_entries import entry
 from scipy.spatial.transform import Rotation
 
-from clench.base.pose import Pose
-from clench.kernels import closest, crossing
-from clench.kernels.crossing import DEEP
+from clench.core.pose import Pose
+from clench.kernels.geometry import closest, crossing
+from clench.kernels.geometry.crossing import DEEP
 from clench.models.shapes import Shape, ShapeKind
 
 CELL = 0.01

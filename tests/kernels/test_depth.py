@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from kernel_solids import ball, bounding_volumes, box, gap, moved, star
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.depth import CROSSINGS, penetration
-from clench.kernels.distance import signed_distance
-from clench.kernels.tree import STACK_SIZE, build_tree, feature_owners
+from clench.kernels.geometry.bvh import STACK_SIZE, build_tree, feature_owners
+from clench.kernels.geometry.mesh_distance import signed_distance
+from clench.kernels.geometry.penetration import CROSSINGS, penetration
 from clench.models.mesh import TriangleMesh
 
 

@@ -7,9 +7,15 @@ from hypothesis import strategies as st
 from kernel_solids import ball, box, hull, moved, star, torus
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import distance
-from clench.kernels.distance import closest_on_triangle, closest_point, is_inside, signed_distance, winding_number
-from clench.kernels.tree import build_tree
+from clench.kernels.geometry import distance
+from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.geometry.mesh_distance import (
+    closest_on_triangle,
+    closest_point,
+    is_inside,
+    signed_distance,
+    winding_number,
+)
 from clench.models.mesh import TriangleMesh
 
 finite = st.floats(-2.0, 2.0)

@@ -6,11 +6,11 @@ import fcl
 import numpy as np
 import pytest
 
-from clench.base.pose import rotation_about
-from clench.kernels import sweeping
-from clench.kernels.bodies import Elements, pack_bodies
-from clench.kernels.closest import separation
-from clench.kernels.nearness import link_gap, smallest_gap
+from clench.core.pose import rotation_about
+from clench.kernels.geometry.bodies import Elements, pack_bodies
+from clench.kernels.geometry.core_distance import separation
+from clench.kernels.geometry.smallest_gap import link_gap, smallest_gap
+from clench.kernels.toi import sweeping
 from kernels.kernel_entries import entry
 
 make_sweep_work, bodies_overlap = entry(sweeping.make_sweep_work), entry(sweeping.bodies_overlap)

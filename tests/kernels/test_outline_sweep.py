@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.grasp.outlines import RoundedOutline
-from clench.grasp.packing import enclosing
-from clench.kernels import family_section, outline_sweep
-from clench.kernels.layout import Outline, SectionArrays, Work
+from clench.closing.outlines import RoundedOutline
+from clench.closing.plan_packing import enclosing
+from clench.kernels.closing.layout import Outline, SectionArrays, Work
+from clench.kernels.sections import family_section, outline_sweep
 from kernels.kernel_entries import entry
 from oracle.adapter import solve_planar
 from oracle.cases import placed_vertices, random_finger

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.layout import RoundArrays, no_rounds
+from clench.kernels.closing.layout import RoundArrays, no_rounds
 from kernels.plain_closing import find_overlaps
 from oracle.adapter import EMPTY_TREE, pack_curve, pack_finger
 from oracle.cases import make_case

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import clench
 from chain_hands import HandBuilder, along_x, bipyramid
-from clench.base.pose import Pose
-from clench.kernels.exact import PRESSED, find_link_overlap
+from clench.core.pose import Pose
+from clench.kernels.toi.full_width import PRESSED, find_link_overlap
 from clench.models.hand.hand import JointRole
 from clench.models.shapes import Shape, ShapeKind
 from clench.solver.planning import plan_hand

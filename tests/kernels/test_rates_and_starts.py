@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.layout import HIT_NX, HIT_X
+from clench.kernels.closing.layout import HIT_NX, HIT_X
 from oracle.adapter import pack_finger, solve_planar
 from oracle.cases import random_curve, random_finger
 from oracle.planar import gap_at

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import touches
-from clench.kernels.layout import RoundArrays
+from clench.kernels.closing.close_item import touches
+from clench.kernels.closing.layout import RoundArrays
 from kernels.kernel_entries import entry
 
 put_round_normal = entry(touches.put_round_normal)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from kernel_entries import entry
 
-from clench.base.pose import Pose
-from clench.kernels import conics, family_section
-from clench.kernels.layout import RoundArrays
-from clench.kernels.section import cut_mesh
+from clench.core.pose import Pose
+from clench.kernels.closing.layout import RoundArrays
+from clench.kernels.sections import conics, family_section
+from clench.kernels.sections.section import cut_mesh
 from clench.models.shapes import Shape, ShapeKind
 
 region_gap, cut_rounds = entry(conics.region_gap), entry(family_section.cut_rounds)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clench.kernels.layout import HIT_GAP, HIT_KIND, HIT_NX, HIT_X, KIND_SIDE
+from clench.kernels.closing.layout import HIT_GAP, HIT_KIND, HIT_NX, HIT_X, KIND_SIDE
 from oracle.adapter import pack_curve, pack_finger, solve_planar
 from oracle.cases import random_finger
 from oracle.planar import gap_at

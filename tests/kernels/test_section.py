@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from kernel_solids import ball, box, hull, moved, star, torus
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.section import cut, cut_mesh
-from clench.kernels.tree import build_tree
+from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.sections.section import cut, cut_mesh
 from clench.models.mesh import TriangleMesh
 
 IDENTITY = np.eye(4)

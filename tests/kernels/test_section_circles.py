@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from clench.kernels import family_section
-from clench.kernels.family_section import make_sections
-from clench.kernels.layout import RUN
+from clench.kernels.closing.layout import RUN
+from clench.kernels.sections import family_section
+from clench.kernels.sections.plane_sections import make_sections
 from kernels.kernel_entries import entry
 
 put_circles = entry(family_section.put_circles)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels import segments
-from clench.kernels.layout import ChainArrays
-from clench.kernels.segments import ALL
+from clench.kernels.closing.close_item import segments
+from clench.kernels.closing.layout import ChainArrays
+from clench.kernels.closing.segments import ALL
 from kernels.kernel_entries import entry
 
 next_segment, move_groups, lock_joints, lock_held = (

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels import slabs, sweeping
-from clench.kernels.bodies import Elements, pack_bodies
+from clench.kernels.geometry import obb as slabs
+from clench.kernels.geometry.bodies import Elements, pack_bodies
+from clench.kernels.toi import toi_work as sweeping
 from kernels.kernel_entries import entry
 from kernels.test_body_sweep import KINDS, patch, pose
 

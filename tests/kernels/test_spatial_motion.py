@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels import core_motion
-from clench.kernels.spatial_motion import SPATIAL
+from clench.kernels.toi import core_motion
+from clench.kernels.toi.spatial_motion import SPATIAL
 from kernels.kernel_entries import entry
 from kernels.motion_check import STEPS, check_motion
 

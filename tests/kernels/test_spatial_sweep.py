@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from clench.kernels import earliest
-from clench.kernels.leaving import OVERLAP
-from clench.kernels.sweep_pairs import sweep_pair
+from clench.kernels.toi import earliest
+from clench.kernels.toi.separating import OVERLAP
+from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
 from kernels.test_spatial_motion import drawn, placed
 from oracle.width import Core, gap

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from clench.kernels import core_motion
-from clench.kernels.leaving import OVERLAP
-from clench.kernels.sweep_pairs import sweep_pair
+from clench.kernels.toi import core_motion
+from clench.kernels.toi.separating import OVERLAP
+from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
 
 move_core, plane_gap = entry(core_motion.move_core), entry(core_motion.plane_gap)

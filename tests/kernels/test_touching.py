@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.bodies import no_body
-from clench.kernels.exact import planes_only
-from clench.kernels.family_section import make_sections
-from clench.kernels.layout import (
+from clench.kernels.closing.layout import (
     HIT_CURVE_X,
     HIT_GAP,
     HIT_GROUP,
@@ -17,8 +14,11 @@ from clench.kernels.layout import (
     ItemArrays,
     no_rounds,
 )
-from clench.kernels.solve_layout import ObjectArrays
-from clench.kernels.tree import build_tree
+from clench.kernels.closing.solve_layout import ObjectArrays
+from clench.kernels.geometry.bodies import no_body
+from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.sections.plane_sections import make_sections
+from clench.kernels.toi.full_width import planes_only
 from kernels.plain_closing import close_items
 from oracle.adapter import empty_answer, pack_curve, pack_finger, solve_planar
 from oracle.cases import cases

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from kernel_solids import box
 
-from clench.kernels.bodies import Elements, pack_bodies
-from clench.kernels.touching_pairs import PAIR_GAP, PAIR_NX, touching_pairs
+from clench.kernels.geometry.bodies import Elements, pack_bodies
+from clench.kernels.toi.touching_pairs import PAIR_GAP, PAIR_NX, touching_pairs
 
 WITHIN, TIE = 1e-5, 1e-9
 

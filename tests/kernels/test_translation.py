@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from kernel_solids import bounding_volumes, box, gap, hull, moved, star, torus
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.translation import PAIRS, first_contact
-from clench.kernels.tree import build_tree, feature_owners
+from clench.kernels.geometry.bvh import build_tree, feature_owners
+from clench.kernels.toi.toi_translation import PAIRS, first_contact
 from clench.models.mesh import TriangleMesh
 
 

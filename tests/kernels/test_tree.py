@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_solids import ball, torus
 
-from clench.kernels.tree import LEAF_SIZE, STACK_SIZE, build_tree, feature_owners
+from clench.kernels.geometry.bvh import LEAF_SIZE, STACK_SIZE, build_tree, feature_owners
 
 
 def depth_of(tree, node=0):

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from clench.kernels.turning import disk_on_segment, disk_on_vertex, grazing_band, side_on_vertex, turn_to
+from clench.kernels.sections.turning import disk_on_segment, disk_on_vertex, grazing_band, side_on_vertex, turn_to
 
 TOUCH = 1e-10
 TURN = 2.0 * math.pi

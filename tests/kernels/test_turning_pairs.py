@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from clench.kernels import turning_pairs
-from clench.kernels.layout import KIND_SIDE, Outline
+from clench.kernels.closing.layout import KIND_SIDE, Outline
+from clench.kernels.sections import turning_pairs
 from kernels.kernel_entries import entry
 
 turn_sides = entry(turning_pairs.turn_sides)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.layout import HIT_NX
+from clench.kernels.closing.layout import HIT_NX
 from oracle.adapter import pack_finger, solve_planar
 from oracle.cases import cases
 from oracle.planar import overlaps_at_start

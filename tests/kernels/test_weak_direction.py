@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clench.kernels.weak_direction import nearer_facets
+from clench.kernels.mechanics.weak_direction import nearer_facets
 
 
 def weakest(points, starts):

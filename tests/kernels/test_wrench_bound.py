@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from clench.kernels.wrench_bound import resisted_ball
+from clench.kernels.mechanics.wrench_bound import resisted_ball
 
 EDGES = 6
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from small_hand import small_hand
 
-from clench.base.errors import CommandError, UnknownNameError
-from clench.base.pose import Pose
+from clench.core.errors import CommandError, UnknownNameError
+from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command
 

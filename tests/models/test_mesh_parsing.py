@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 
-from clench.base.file_limits import SCENE_PARTS
+from clench.core.files.file_limits import SCENE_PARTS
 from clench.models.gltf_scene import bare_glb
 from clench.models.mesh_parsing import MeshError, arrays_of, parse_mesh
 

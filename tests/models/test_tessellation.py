@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.base.errors import ObjectError
-from clench.base.pose import Pose
+from clench.core.errors import ObjectError
+from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.topology import edge_defects
 from clench.models.shapes import Shape, ShapeKind

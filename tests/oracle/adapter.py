@@ -3,13 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from clench.grasp.outlines import RoundedOutline
-from clench.grasp.packing import enclosing
-from clench.kernels import family_section
-from clench.kernels.bodies import no_body
-from clench.kernels.exact import planes_only
-from clench.kernels.family_section import make_sections
-from clench.kernels.layout import (
+from clench.closing.outlines import RoundedOutline
+from clench.closing.plan_packing import enclosing
+from clench.kernels.closing.layout import (
     HIT_INTEGERS,
     ChainArrays,
     ClosingArrays,
@@ -19,8 +15,12 @@ from clench.kernels.layout import (
     SectionArrays,
     no_rounds,
 )
-from clench.kernels.solve_layout import ObjectArrays
-from clench.kernels.tree import build_tree
+from clench.kernels.closing.solve_layout import ObjectArrays
+from clench.kernels.geometry.bodies import no_body
+from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.sections import family_section
+from clench.kernels.sections.plane_sections import make_sections
+from clench.kernels.toi.full_width import planes_only
 from kernels.kernel_entries import entry
 from kernels.plain_closing import close_items
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from oracle.width import Oracle, judge_places, make_case
 
 FINGERS, PLACES = 16, 3

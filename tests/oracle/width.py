@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 import clench
 from chain_hands import HandBuilder, along_x
-from clench.base.pose import Pose, rotation_about
+from clench.core.pose import Pose, rotation_about
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject

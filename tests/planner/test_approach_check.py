@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import invert
-from clench.grasp.depths import hand_depths
-from clench.grasp.scene import pack_object
+from clench.closing.collision.depths import hand_depths
+from clench.closing.collision.packed_object import pack_object
+from clench.core.pose import invert
 from clench.models.objects.obstacles import table
 from clench.planner.approach_check import OFF, SHORT, Approach
 from clench.planner.proposals import DEEP, Arm, Proposals, frames, turns_about, vary

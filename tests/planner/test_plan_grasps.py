@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import CommandError, ObjectError, UnknownNameError
-from clench.execution.hold import Hold
-from clench.execution.pulling import hold_and_pull
+from clench.core.errors import CommandError, ObjectError, UnknownNameError
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.pulling import hold_and_pull
 from clench.models.objects.obstacles import table
 from clench.planner.options import PlanOptions
 from clench.planner.search import GraspSearch
@@ -57,7 +57,7 @@ def test_every_proposal_is_a_grasp_or_fell_for_one_reason(hand, mug):
 
 
 def test_the_best_grasps_hold_in_simulation(plan, hand, mug):
-    from clench.execution.convex_pieces import in_pieces
+    from clench.execution.simulation.convex_pieces import in_pieces
 
     pieces = in_pieces(mug, show_progress=False)
     best = clench.plan_grasps(hand, pieces, 2, effort=32, most=64)

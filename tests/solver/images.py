@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clench.base.pose import FloatArray, Pose
+from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import GraspObject

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import CommandError
-from clench.base.pose import Pose
-from clench.grasp import criterion_registry, packed_problem
-from clench.grasp.packed_problem import pack_problem
+from clench.closing import packed_problem
+from clench.closing.packed_problem import pack_problem
+from clench.core.errors import CommandError
+from clench.core.pose import Pose
+from clench.scoring import criterion_registry
 from clench.solver import alternatives, single
 from clench.solver.planning import plan_hand
 from clench.solver.problem import make_problem

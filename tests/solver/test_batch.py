@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import ClenchError, CommandError
-from clench.base.pose import Pose
-from clench.solver import batch_progress, posture_choice
-from clench.solver.batch_solver import BatchSolver
-from clench.solver.grasp_batch import GraspBatch
+from clench.core.errors import ClenchError, CommandError
+from clench.core.pose import Pose
+from clench.solver.batch.batch_solver import BatchSolver
+from clench.solver.batch.grasp_batch import GraspBatch
+from clench.solver.batch.solve_batch import batch_progress
+from clench.solver.preshapes.preshapes import posture_choice
 
 HANDS = {name: clench.Hand.load(name) for name in ("robonaut2", "patent15")}
 BOX = "box:x=0.05,y=0.06,z=0.08"
@@ -243,7 +244,7 @@ def test_every_shipped_form_of_hand_is_packed_once(monkeypatch: pytest.MonkeyPat
 
 
 def test_vectors_are_turned_with_the_same_bits_alone_and_together() -> None:
-    from clench.solver.batch_solver import rotations, turned
+    from clench.solver.batch.batch_solver import rotations, turned
 
     rng = np.random.default_rng(0)
     rows, vectors = rng.normal(size=(200, 7)), rng.normal(size=(200, 3))

@@ -5,7 +5,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
 POSES = {

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import FileError
+from clench.core.errors import FileError
 from clench.models.command import GraspCommand
-from clench.solver.batch_parts import parts_folder
-from clench.solver.batch_solver import BatchSolver
+from clench.solver.batch.batch_parts import parts_folder
+from clench.solver.batch.batch_solver import BatchSolver
 
 PLANES = GraspCommand(hand_pose=clench.Pose.identity(), planes=2, preshape="open")
 

@@ -9,7 +9,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, three_links, turned
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.hand.hand import Hand, JointRole
 
 RADIUS, LENGTHS = 0.007, (0.05, 0.035, 0.025)

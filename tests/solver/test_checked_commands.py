@@ -7,9 +7,9 @@ import pytest
 
 import clench
 from clench import ClosingOrder, GraspCommand, Pose
-from clench.base.errors import ClenchError
+from clench.core.errors import ClenchError
 from clench.solver import checked as module
-from clench.solver.checked import checked
+from clench.solver.checked_command import checked
 
 HAND = clench.Hand.load("patent15")
 JOINT = next(j.name for j in HAND.joints if str(j.role) == "closing")
@@ -82,7 +82,7 @@ def test_a_list_that_contains_itself_is_refused(key):
 
 
 def test_criteria_that_write_to_what_they_are_given_change_no_later_solve():
-    from clench.grasp.calibration import calibration_of
+    from clench.scoring.calibration import calibration_of
     from clench.solver.problem import make_problem, make_setting
 
     problem = make_problem(HAND, clench.GraspObject.load("ball"), GraspCommand(HERE, preshape="open"))

@@ -7,7 +7,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, X, Y, Z, along_x, bipyramid, mount, turned
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import Shape, ShapeKind
 

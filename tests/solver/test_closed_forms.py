@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, one_link, three_links, turned
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
 EXACT = 1e-9
@@ -259,8 +259,8 @@ def test_a_short_capsule_across_the_planes(thing):
 
 
 def test_an_arena_has_room_for_the_sections_of_short_capsules():
-    from clench.kernels.family_section import cut_rounds, make_sections
-    from clench.kernels.layout import RoundArrays
+    from clench.kernels.closing.layout import RoundArrays
+    from clench.kernels.sections.plane_sections import cut_rounds, make_sections
 
     pose = turned(X, np.pi / 2.0)
     rounds = RoundArrays(np.array([1]), np.array([[0.01, 0.006, 0.0]]), np.column_stack([pose, np.zeros(3)])[None])

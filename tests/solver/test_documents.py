@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.base.errors import ClenchError, FileError
-from clench.base.json_files import write_atomically
-from clench.base.pose import Pose
-from clench.models.hand.extremes import LARGEST_ANGLE
+from clench.core.errors import ClenchError, FileError
+from clench.core.files.json_files import write_atomically
+from clench.core.pose import Pose
+from clench.models.hand.reading.extremes import LARGEST_ANGLE
 from clench.solver.solution import FingerResult, FingerStatus, GraspSolution, SolutionStatus
 from handmade import make_candidate, make_contact, make_solution
 

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from clench.apps.cli.main import main
-from clench.base.errors import FileError, UnknownNameError
-from clench.grasp.calibration import Calibration, load_calibration
-from clench.solver import record as record_module
-from clench.solver.examples import SCHEMA, read_examples, recorded_outcomes, solve_scores
-from clench.solver.record import Record
+from clench.core.errors import FileError, UnknownNameError
+from clench.scoring.calibration import Calibration, load_calibration
+from clench.solver.analysis import record as record_module
+from clench.solver.analysis.examples import SCHEMA, read_examples, recorded_outcomes, solve_scores
+from clench.solver.analysis.record import Record
 from handmade import make_candidate, make_solution
 
 

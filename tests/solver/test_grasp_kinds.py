@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.grasp.contact_kinds import KINDS, contact_kinds
+from clench.mechanics.contact_kinds import KINDS, contact_kinds
 from clench.models.objects.obstacles import obstacle
-from clench.solver.grasp_kinds import PALM_NEAR
+from clench.solver.analysis.grasp_kinds import PALM_NEAR
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from images import mirrored_hand, mirrored_object, mirrored_pose, scaled_hand, s
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, turned
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
 EXACT = 1e-9

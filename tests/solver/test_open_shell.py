@@ -5,7 +5,7 @@ import pytest
 
 import clench
 from chain_hands import one_link
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 #: The faces of a cube but for that towards -x.

@@ -5,7 +5,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, three_links
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import JointRole
 from clench.solver.alternatives import finger_sets

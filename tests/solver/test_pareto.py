@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import Pose
-from clench.solver.pareto import hand_front
+from clench.core.pose import Pose
+from clench.solver.analysis.pareto import hand_front
 from clench.solver.solution import FingerResult, FingerStatus, GraspSolution
 from handmade import make_candidate, make_solution
 

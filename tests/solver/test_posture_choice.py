@@ -13,10 +13,10 @@ import pytest
 import clench
 from clench.models.command_file import command_from_dict, command_to_dict
 from clench.models.hand.hand import JointRole
+from clench.solver.batch.saved_question import SavedBatch
 from clench.solver.orders import settled
-from clench.solver.postures import MOST_COMPARED, posture_options
-from clench.solver.preshapes import opposition_zones, posture_joints
-from clench.solver.saved_question import SavedBatch
+from clench.solver.preshapes.postures import MOST_COMPARED, posture_options
+from clench.solver.preshapes.preshapes import opposition_zones, posture_joints
 
 HAND = clench.Hand.load("robonaut2")
 MUG = clench.GraspObject.load("mug")
@@ -210,7 +210,7 @@ def test_batches_and_streams_have_the_bits_of_solves(asked: dict[str, Any], tmp_
 
 
 def test_a_batch_goes_on_where_it_ended(tmp_path, monkeypatch) -> None:
-    from clench.solver.posture_choice import PostureSolver
+    from clench.solver.preshapes.posture_choice import PostureSolver
 
     whole = clench.solve_batch(HAND, MUG, POSES, chunk=2)
     solve, calls = PostureSolver.solve, []

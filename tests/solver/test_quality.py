@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import CommandError
-from clench.base.pose import Pose
-from clench.grasp.mechanics.loads import GRAVITY
+from clench.core.errors import CommandError
+from clench.core.pose import Pose
+from clench.mechanics.loads import GRAVITY
 
 
 @pytest.fixture(scope="module")

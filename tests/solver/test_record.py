@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.base.errors import ClenchError, FileError, UnknownNameError
-from clench.solver.record import SCHEMA_VERSION, Record
+from clench.core.errors import ClenchError, FileError, UnknownNameError
+from clench.solver.analysis.record import SCHEMA_VERSION, Record
 from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_solution
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 from oracle.width import make_case
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import FileError
-from clench.solver.saved_question import SavedBatch
+from clench.core.errors import FileError
+from clench.solver.batch.saved_question import SavedBatch
 
 
 def test_grasps_of_a_file_are_solved_again(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ from test_invariance import two_fingers
 
 import clench
 from chain_hands import HandBuilder, along_x, one_link, three_links
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import Shape, ShapeKind
-from clench.solver.pose_error import displaced
+from clench.solver.analysis.pose_error import displaced
 from oracle.width import make_case
 
 STEP = 1e-5

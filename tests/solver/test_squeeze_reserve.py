@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.defaults import FRICTION, FRICTION_RESERVE, LOSS_RESERVE, MASS, MOST_FORCE_PER_WEIGHT
-from clench.base.errors import CommandError
-from clench.execution.hold import Hold
-from clench.grasp.mechanics.held import HeldObject
-from clench.grasp.mechanics.loads import GRAVITY
+from clench.core.defaults import FRICTION, FRICTION_RESERVE, LOSS_RESERVE, MASS, MOST_FORCE_PER_WEIGHT
+from clench.core.errors import CommandError
+from clench.execution.simulation.hold import Hold
+from clench.mechanics.held import HeldObject
+from clench.mechanics.loads import GRAVITY
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.solver.analysis.squeezing import SqueezePlan, plan_squeeze
 from clench.solver.solution import GraspSolution
-from clench.solver.squeezing import SqueezePlan, plan_squeeze
 
 Grip = tuple[Hand, GraspObject, GraspSolution]
 

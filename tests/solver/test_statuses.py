@@ -5,7 +5,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, one_link, three_links, turned
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.hand.hand import JointRole
 from clench.models.shapes import Shape, ShapeKind
 

@@ -5,7 +5,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import Shape, ShapeKind

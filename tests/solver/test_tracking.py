@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import CommandError
-from clench.base.pose import Pose
+from clench.core.errors import CommandError
+from clench.core.pose import Pose
 
 HAND = clench.Hand.load("patent15")
 BALL = clench.GraspObject.load("ball")

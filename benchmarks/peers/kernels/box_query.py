@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from clench.kernels.bodies import Elements
-from clench.kernels.closest import crosses, separation
-from clench.kernels.compiling import inner_allocating_kernel, inner_kernel
-from clench.kernels.family_pose import put_point
-from clench.kernels.layout import Floats, Ints
-from clench.kernels.tree import build_tree
+from clench.kernels.closing.layout import Floats, Ints
+from clench.kernels.geometry.bodies import Elements
+from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.geometry.core_distance import crosses, separation
+from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.sections.plane_pose import put_point
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
 PAIRS = 512

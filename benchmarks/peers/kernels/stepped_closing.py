@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from clench.kernels.compiling import allocating_kernel, inner_kernel
-from clench.kernels.family_pose import compose_inverse
-from clench.kernels.frames import FrameArrays, couple, put_link
-from clench.kernels.layout import Floats, Ints
+from clench.kernels.closing.layout import Floats, Ints
+from clench.kernels.geometry.link_frames import FrameArrays, couple, put_link
+from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.sections.plane_pose import compose_inverse
 
 from .box_query import BoxTrees, Query, make_query, within
 

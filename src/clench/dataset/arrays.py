@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.errors import ClenchError
-from clench.base.file_limits import ARRAY_BYTES
+from clench.core.errors import ClenchError
+from clench.core.files.file_limits import ARRAY_BYTES
 
 from .columns import COLUMNS
 

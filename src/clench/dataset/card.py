@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from clench import __version__
-from clench.base.errors import FileError
-from clench.base.json_files import write_atomically
-from clench.base.pose import FloatArray
+from clench.core.errors import FileError
+from clench.core.files.json_files import write_atomically
+from clench.core.pose import FloatArray
 
 from .columns import COLUMNS, SCHEMA
 from .folder import MANIFEST_FILE, ROWS_FILE, DatasetFolder, whole_file

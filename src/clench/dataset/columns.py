@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from clench.base.errors import ClenchError
+from clench.core.errors import ClenchError
 
 if TYPE_CHECKING:
     import pyarrow

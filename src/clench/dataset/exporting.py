@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.errors import ClenchError, FileError, UnknownNameError
-from clench.base.json_files import check_folder, check_writable
+from clench.core.errors import ClenchError, FileError, UnknownNameError
+from clench.core.files.json_files import check_folder, check_writable
 from clench.execution.formats.dexgraspbench import write_dexgraspbench
 from clench.execution.formats.grasp_posture import BASE
 from clench.execution.formats.isaac_grasp import write_isaac_grasp

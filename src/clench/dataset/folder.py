@@ -13,10 +13,10 @@ from typing import Any, Final
 import msgspec
 
 from clench import __version__
-from clench.base.errors import ClenchError, FileError
-from clench.base.file_limits import ARRAY_BYTES
-from clench.base.files import read_file
-from clench.base.json_files import check_folder, read_json, write_atomically, write_json
+from clench.core.errors import ClenchError, FileError
+from clench.core.files.file_bytes import read_file
+from clench.core.files.file_limits import ARRAY_BYTES
+from clench.core.files.json_files import check_folder, read_json, write_atomically, write_json
 
 from .job import SCHEMA as JOB_SCHEMA
 from .job import DatasetJob, job_from

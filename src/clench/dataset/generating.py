@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 
 from .columns import need_pyarrow
 from .folder import DatasetFolder

@@ -11,12 +11,12 @@ from typing import Any, Final
 import msgspec
 
 from clench import __version__
-from clench.base.defaults import MASS
-from clench.base.errors import ClenchError, CommandError, FileError, UnknownNameError
-from clench.base.files import expanded
-from clench.base.fingerprint import fingerprint
-from clench.base.json_files import read_json
-from clench.base.toml_files import read_toml
+from clench.core.defaults import MASS
+from clench.core.errors import ClenchError, CommandError, FileError, UnknownNameError
+from clench.core.files.file_bytes import expanded
+from clench.core.files.json_files import read_json
+from clench.core.files.toml_files import read_toml
+from clench.core.fingerprint import fingerprint
 from clench.models.objects.loading import BUILTIN
 from clench.models.objects.shape_text import is_shape_text, parse_shape
 from clench.planner.options import APART, EFFORT, PlanOptions

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from clench import __version__
-from clench.base.errors import FileError
-from clench.base.json_files import write_json
+from clench.core.errors import FileError
+from clench.core.files.json_files import write_json
 
 from .columns import need_pyarrow
 from .folder import MANIFEST_FILE, MANIFEST_SCHEMA, ROWS_FILE, DatasetFolder, whole_file

@@ -8,9 +8,9 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from clench.base.errors import FileError
-from clench.base.file_limits import ARRAY_BYTES, DATASET_GROUP_ROWS, JSON_BYTES
-from clench.base.json_files import parse_json
+from clench.core.errors import FileError
+from clench.core.files.file_limits import ARRAY_BYTES, DATASET_GROUP_ROWS, JSON_BYTES
+from clench.core.files.json_files import parse_json
 
 from .columns import SCHEMA, TEXTS, arrow_schema
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from clench.base.errors import ClenchError, CommandError
+from clench.core.errors import ClenchError, CommandError
 
 from .generating import GenerateReport, Told, generate
 from .job import DatasetJob, job_from, read_job

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.errors import ClenchError, CommandError, FileError, UnknownNameError
-from clench.base.pose import Pose
+from clench.core.errors import ClenchError, CommandError, FileError, UnknownNameError
+from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -195,7 +195,7 @@ class GraspDataset:
             FileError: the models are others than those that the dataset was made from, or the answer is another one.
             ClenchError: a model cannot be loaded.
         """
-        from clench.solver.controller import solve
+        from clench.solver.solve import solve
 
         row, name = self.row(number), f"{self.path}: row {number}"
         hand = hand or load_hand(row["hand_model"])

@@ -8,14 +8,14 @@ from typing import Any, Final
 import numpy as np
 
 from clench import __version__
-from clench.base.pose import FloatArray, Pose
-from clench.execution.hold import HoldReport
+from clench.core.pose import FloatArray, Pose
+from clench.execution.simulation.hold import HoldReport
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.planner.grasp_plan import PlannedGrasp, UnfinishedGrasp
 from clench.planner.rejections import Rejection
-from clench.solver.holding import hold
-from clench.solver.squeezing import SqueezePlan
+from clench.solver.analysis.holding import hold
+from clench.solver.analysis.squeezing import SqueezePlan
 
 from .columns import COLUMNS
 from .sources import license_beside

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 
 from .units import Unit
 

@@ -7,9 +7,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from clench.base.errors import FileError
-from clench.base.files import expanded, read_text
-from clench.execution.convex_pieces import in_pieces
+from clench.core.errors import FileError
+from clench.core.files.file_bytes import expanded, read_text
+from clench.execution.simulation.convex_pieces import in_pieces
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 

@@ -7,11 +7,11 @@ import time
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from clench.base.defaults import FRICTION
-from clench.base.errors import ClenchError
-from clench.execution.hold import Hold, HoldReport
-from clench.grasp.mechanics.contacts import friction_range
-from clench.grasp.mechanics.loads import mass_range
+from clench.core.defaults import FRICTION
+from clench.core.errors import ClenchError
+from clench.execution.simulation.hold import Hold, HoldReport
+from clench.mechanics.contacts import friction_range
+from clench.mechanics.loads import mass_range
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.planner.grasp_plan import PlannedGrasp, UnfinishedGrasp
@@ -136,7 +136,7 @@ def _test(job: DatasetJob) -> Hold:
 
 
 def _tested(hand: Hand, obj: GraspObject, grasp: PlannedGrasp, hold: Hold) -> HoldReport:
-    from clench.execution.pulling import hold_and_pull
+    from clench.execution.simulation.pulling import hold_and_pull
     from clench.execution.trajectory import plan_trajectory
 
     way = grasp.trajectory or plan_trajectory(grasp.solution, hand, obj=obj, force=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from clench.base.fingerprint import fingerprint
+from clench.core.fingerprint import fingerprint
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 
 #: Places of a path that differ by less than this share of its length are one [-].

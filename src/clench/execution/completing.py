@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from clench.base.defaults import MASS
-from clench.grasp.mechanics.contacts import ContactModel
+from clench.core.defaults import MASS
+from clench.mechanics.contacts import ContactModel
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.quality import grasp_quality
+from clench.solver.analysis.quality import grasp_quality
+from clench.solver.analysis.squeezing import plan_squeeze
 from clench.solver.solution import GraspSolution
-from clench.solver.squeezing import plan_squeeze
 
 from .landing import CLEARANCE
 from .pregrasp import plan_pregrasp

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from clench.base.argument_types import check_type
-from clench.base.errors import CommandError, MotionError, UnknownNameError
-from clench.grasp.scene import hash_bodies, hash_hand
+from clench.closing.collision.packed_object import hash_bodies, hash_hand
+from clench.core.argument_types import check_type
+from clench.core.errors import CommandError, MotionError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
@@ -20,7 +20,7 @@ from .trajectory import Trajectory, plan_trajectory
 from .trajectory_checks import ROUNDING
 
 
-class Actuator(Protocol):
+class Executor(Protocol):
     """Move a hand along a trajectory and report what was reached."""
 
     @property
@@ -35,12 +35,12 @@ class Actuator(Protocol):
     def obj(self) -> GraspObject | None:
         """The object that it closes on; None when it knows of none."""
 
-    def carry_out(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
+    def execute(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
         """Open the hand, follow the trajectory to the touch, and compare with the solution."""
 
 
 def execute(
-    solution: GraspSolution, actuator: Actuator, *, speed: float = 1.0, force: bool = False, next_steps: bool = True
+    solution: GraspSolution, actuator: Executor, *, speed: float = 1.0, force: bool = False, next_steps: bool = True
 ) -> ExecutionReport:
     """Carry out a solution: open, close along the computed path, all fingers arriving together; go to its next steps.
 
@@ -51,7 +51,7 @@ def execute(
         solution: what to carry out.
         actuator: what moves the hand, e.g. `SimulatedHand`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry it out all the same. A `DrivenHand` refuses what is not free even then.
+        force: carry it out all the same. A `HardwareHand` refuses what is not free even then.
         next_steps: carry out its next steps, too, after the touch and the squeeze.
 
     Raises:
@@ -60,7 +60,7 @@ def execute(
         UnknownNameError: its pregrasp, squeeze or a next step is of a joint that the hand does not have.
     """
     check_type(solution, GraspSolution, "solution")
-    if not hasattr(actuator, "carry_out"):
+    if not hasattr(actuator, "execute"):
         given = type(actuator).__name__
         raise CommandError(
             f"actuator: expected what moves a hand, such as clench.SimulatedHand(hand, obj), got {given}."
@@ -81,7 +81,7 @@ def execute(
         why = found[0] if found else f"its status is '{solution.status.value}'"
     if why is not None:
         return ExecutionReport(actuator.name, success=False, reason=f"Not carried out: {why.rstrip('.')}.")
-    report = actuator.carry_out(solution, trajectory)
+    report = actuator.execute(solution, trajectory)
     return replace(report, notes=(*report.notes, *trajectory.notes))
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from clench.base.pose import FloatArray
-from clench.base.short_repr import short_repr
+from clench.core.pose import FloatArray
+from clench.core.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)

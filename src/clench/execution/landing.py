@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.grasp.mechanics.contacts import make_contacts
-from clench.grasp.mechanics.jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
+from clench.core.pose import FloatArray
+from clench.mechanics.contacts import make_contacts
+from clench.mechanics.jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
 from clench.models.hand.hand import Finger, Hand, JointRole
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import Contact, GraspSolution
 
 #: Clearance of the pregrasp unless another is asked for [m].

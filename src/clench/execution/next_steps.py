@@ -9,11 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.grasp.motion import next_postures
+from clench.closing.motion import next_postures
+from clench.core.pose import FloatArray
 from clench.models.command_file import check_steps
 from clench.models.hand.hand import Hand
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .closing_path import STILL, closing_path, distinct

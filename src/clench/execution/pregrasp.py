@@ -7,14 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from clench.base.argument_types import check_type
-from clench.base.errors import CommandError, MotionError
-from clench.base.pose import FloatArray, invert
-from clench.grasp.path_check import find_path_overlap
+from clench.closing.collision.path_check import find_path_overlap
+from clench.core.argument_types import check_type
+from clench.core.errors import CommandError, MotionError
+from clench.core.pose import FloatArray, invert
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE

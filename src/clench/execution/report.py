@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clench.base.json_files import write_json
-from clench.base.pose import FloatArray
-from clench.base.short_repr import described, short_repr
+from clench.core.files.json_files import write_json
+from clench.core.pose import FloatArray
+from clench.core.short_repr import described, short_repr
+from clench.execution.simulation.hold import HoldReport, ObjectMotion, Pulled
 from clench.solver.solution import GraspSolution
 
 from .history import CommandsSent, ExecutionHistory
-from .hold import HoldReport, ObjectMotion, Pulled
 
 SCHEMA = "clench.execution/1"
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from clench.base.errors import MotionError
-from clench.base.pose import FloatArray, invert
-from clench.grasp.path_check import PlacedObject, find_path_overlap, place_object
+from clench.closing.collision.path_check import PlacedObject, find_path_overlap, place_object
+from clench.core.errors import MotionError
+from clench.core.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .next_steps import NEXT_STEP, Phase, squeeze_offsets

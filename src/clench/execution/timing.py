@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.errors import CommandError
-from clench.base.pose import FloatArray
+from clench.core.errors import CommandError
+from clench.core.pose import FloatArray
 
 #: Largest acceleration of a joint unless another is asked for [rad/s²]: models do not say.
 ACCELERATION: Final = 10.0

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.base.errors import CommandError, FileError
-from clench.base.pose import FloatArray
-from clench.models.hand.extremes import LARGEST_ANGLE
-from clench.solver.posture import posture
+from clench.core.errors import CommandError, FileError
+from clench.core.pose import FloatArray
+from clench.models.hand.reading.extremes import LARGEST_ANGLE
+from clench.solver.preshapes.named_angles import posture
 
 if TYPE_CHECKING:
     from clench.models.hand.hand import Hand

@@ -1,7 +1,7 @@
 """Find a free path from the open hand to the touch: straight, along the closing paths, or finger after finger.
 
-Every path is proven before it is returned: see `clench.grasp.path_check`. Where two fingers would meet, one of them
-waits until the other one has arrived. Where a finger would meet the object or the palm on a straight line in joint
+Every path is proven before it is returned, see `path_check`. Where two fingers would meet, one of them waits until the
+other one has arrived. Where a finger would meet the object or the palm on a straight line in joint
 space, the finger goes along its closing path instead, joint by joint.
 """
 
@@ -14,14 +14,14 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.errors import MotionError
-from clench.base.pose import FloatArray
-from clench.grasp.path_check import PathOverlap, find_path_overlap
+from clench.closing.collision.path_check import PathOverlap, find_path_overlap
+from clench.core.errors import MotionError
+from clench.core.pose import FloatArray
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import Hand, JointRole
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .closing_path import STILL, closing_path, distinct

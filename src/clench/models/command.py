@@ -9,11 +9,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from clench.base.argument_types import check_type
-from clench.base.pose import FloatArray, Pose
-from clench.base.short_repr import short_repr
+from clench.core.argument_types import check_type
+from clench.core.pose import FloatArray, Pose
+from clench.core.short_repr import short_repr
+from clench.models.hand.hand import Hand
 
-from .hand.hand import Hand
 from .shapes import CollisionSource
 
 

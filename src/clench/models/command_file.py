@@ -14,15 +14,15 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from clench.base.errors import CommandError, FileError
-from clench.base.file_limits import COMMAND_ITEMS, COMMAND_SETS, JSON_BYTES
-from clench.base.files import expanded, read_file
-from clench.base.nesting import TOO_DEEP, is_too_deep
-from clench.base.numbers import is_finite_number
-from clench.base.pose import Pose
+from clench.core.errors import CommandError, FileError
+from clench.core.files.file_bytes import expanded, read_file
+from clench.core.files.file_limits import COMMAND_ITEMS, COMMAND_SETS, JSON_BYTES
+from clench.core.files.nesting import TOO_DEEP, is_too_deep
+from clench.core.numbers import is_finite_number
+from clench.core.pose import Pose
+from clench.models.hand.hand import Hand, JointRole
 
 from .command import ClosingOrder, GraspCommand
-from .hand.hand import Hand, JointRole
 from .shapes import CollisionSource
 
 Choice = TypeVar("Choice", bound=StrEnum)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from clench.base.argument_types import check_type
-from clench.base.errors import CommandError
-from clench.base.pose import FloatArray, Pose
+from clench.core.argument_types import check_type
+from clench.core.errors import CommandError
+from clench.core.pose import FloatArray, Pose
+from clench.models.hand.hand import Hand, JointRole
 
 from .command import GraspCommand
 from .command_file import check_angle
-from .hand.hand import Hand, JointRole
 
 
 def command_from_posture(hand: Hand, q: FloatArray | Mapping[str, float], hand_pose: Pose) -> GraspCommand:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.base.file_limits import JSON_BYTES, MESH_TRIANGLES, SCENE_PARTS
+from clench.core.files.file_limits import JSON_BYTES, MESH_TRIANGLES, SCENE_PARTS
 
 _MAGIC: Final = 0x46546C67
 _JSON: Final = 0x4E4F534A

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.file_limits import LINE_BYTES, MESH_TRIANGLES, SCENE_PARTS
+from clench.core.files.file_limits import LINE_BYTES, MESH_TRIANGLES, SCENE_PARTS
 
 from .gltf_scene import bare_glb
 
@@ -72,7 +72,7 @@ def _glb(data: bytes) -> bytes:
 
 def _dae(data: bytes) -> bytes:
     """Let only plain XML of a small scene pass: the parser unpacks archives, and expands entities without end."""
-    from clench.base.xml_files import parse_xml
+    from clench.core.files.xml_files import parse_xml
 
     root = parse_xml(data, "", "COLLADA")
     copies = sum(1 for element in root.iter() if str(element.tag).endswith("}instance_node"))

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 
 if TYPE_CHECKING:
-    from clench.kernels.tree import MeshTree
+    from clench.kernels.geometry.bvh import MeshTree
 
 
 def part_points(tree: MeshTree) -> FloatArray:

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.base.errors import ObjectError
-from clench.base.pose import FloatArray
+from clench.core.errors import ObjectError
+from clench.core.pose import FloatArray
 
 from .mesh import IntArray, TriangleMesh
 from .shapes import CollisionSource, Shape, ShapeKind

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.grasp.depths import link_mesh_arrays, object_mesh
-from clench.grasp.scene import PackedObject
-from clench.grasp.threads import share_out
+from clench.closing.collision.depths import link_mesh_arrays, object_mesh
+from clench.closing.collision.packed_object import PackedObject
+from clench.closing.threads import share_out
+from clench.core.pose import FloatArray
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole
@@ -55,7 +55,7 @@ class Approach:
 
     def bring_up(self, proposals: Proposals, arms: tuple[Arm, ...], threads: int) -> Approached:
         """Return the proposals that arrive, each at its place or where the object stops the hand shortly before."""
-        from clench.kernels.placing import Placed, bring_up
+        from clench.kernels.mechanics.placing import Placed, bring_up
 
         count, packed = len(proposals), self.packed
         shape = np.array([arm.shape for arm in arms], dtype=np.int64)[proposals.arm]

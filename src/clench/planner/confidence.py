@@ -13,9 +13,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.errors import FileError
-from clench.base.json_files import read_json
-from clench.base.pose import FloatArray
+from clench.core.errors import FileError
+from clench.core.files.json_files import read_json
+from clench.core.pose import FloatArray
 
 SCHEMA: Final = "clench.confidence/1"
 #: Grasps per level of the score, about; a level is as wide as it has to be.

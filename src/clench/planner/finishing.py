@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from clench.base.errors import MotionError
-from clench.base.pose import FloatArray, Pose
+from clench.core.errors import MotionError
+from clench.core.pose import FloatArray, Pose
 from clench.execution.trajectory import plan_trajectory
-from clench.grasp.mechanics.contacts import ContactModel
-from clench.grasp.mechanics.steadiness import epsilon
+from clench.mechanics.contacts import ContactModel
+from clench.mechanics.epsilon_quality import epsilon
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.controller import solve
-from clench.solver.holding import hold
+from clench.solver.analysis.holding import hold
+from clench.solver.analysis.squeezing import SqueezePlan, plan_squeeze
 from clench.solver.solution import GraspSolution
-from clench.solver.squeezing import SqueezePlan, plan_squeeze
+from clench.solver.solve import solve
 
 from .confidence import shipped_table
 from .grasp_plan import PlannedGrasp, UnfinishedGrasp

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.execution.trajectory import Trajectory
-from clench.grasp.contact_kinds import GraspKind
+from clench.mechanics.contact_kinds import GraspKind
 from clench.models.command import GraspCommand
+from clench.solver.analysis.squeezing import SqueezePlan
 from clench.solver.solution import GraspSolution
-from clench.solver.squeezing import SqueezePlan
 
 from .options import PlanOptions
 from .rejections import HELP, Rejection

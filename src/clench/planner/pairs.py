@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.base.errors import ObjectError
-from clench.base.pose import FloatArray
-from clench.grasp.approach import GraspableSurface
-from clench.grasp.scene import PackedObject
+from clench.closing.collision.approach import GraspableSurface
+from clench.closing.collision.packed_object import PackedObject
+from clench.core.errors import ObjectError
+from clench.core.pose import FloatArray
 from clench.models.objects.grasp_object import GraspObject
 
 from .regions import Region

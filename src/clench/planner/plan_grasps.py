@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Unpack
 
-from clench.base.argument_types import check_type
+from clench.core.argument_types import check_type
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray
-from clench.solver.preshapes import Preshape
+from clench.core.pose import FloatArray
+from clench.solver.preshapes.preshapes import Preshape
 
 from .pairs import Pairs
 

@@ -11,17 +11,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from clench.base.defaults import FRICTION
-from clench.base.errors import CommandError
-from clench.base.pose import FloatArray, Pose
-from clench.base.short_repr import described
-from clench.grasp.motion import open_posture
-from clench.grasp.scene import pack_object
-from clench.grasp.threads import core_count
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.motion import open_posture
+from clench.closing.threads import core_count
+from clench.core.defaults import FRICTION
+from clench.core.errors import CommandError
+from clench.core.pose import FloatArray, Pose
+from clench.core.short_repr import described
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.preshapes import Preshape, opposition_zones
+from clench.solver.preshapes.preshapes import Preshape, opposition_zones
 
 from .approach_check import Approach
 from .finishing import Finisher

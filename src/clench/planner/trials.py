@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray, Pose, invert, quaternions_from_rotations
-from clench.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
-from clench.grasp.mechanics.batch_bounds import epsilon_bounds
-from clench.grasp.mechanics.contacts import ContactModel, pair_friction
+from clench.core.pose import FloatArray, Pose, invert, quaternions_from_rotations
+from clench.mechanics.batch_bounds import epsilon_bounds
+from clench.mechanics.contact_kinds import KINDS, GraspKind, contact_kinds
+from clench.mechanics.contacts import ContactModel, pair_friction
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.objects.mass import mass_properties
-from clench.solver.batch_solver import BatchSolver
-from clench.solver.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
-from clench.solver.preshapes import Preshape
+from clench.solver.batch.batch_solver import BatchSolver
+from clench.solver.batch.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
+from clench.solver.preshapes.preshapes import Preshape
 from clench.solver.solution import FingerStatus, SolutionStatus
 
 from .options import PlanOptions

@@ -6,26 +6,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from clench.base.deferring import once
-from clench.grasp.blocking import start_overlaps
-from clench.grasp.calibration import Calibration
-from clench.grasp.candidates import FingerCandidate, read_candidates
-from clench.grasp.choice import HandChoice, choose
-from clench.grasp.containment import link_within_link
-from clench.grasp.criteria import Setting
-from clench.grasp.criterion_registry import ALWAYS, is_built_in, score_hand
-from clench.grasp.explaining import explain_choice
-from clench.grasp.feasibility import judge_sets
-from clench.grasp.hand_plan import HandPlan
-from clench.grasp.packed_problem import PackedProblem, Terms, pack_problem
-from clench.grasp.solving import close_items, row_of
+from clench.closing.candidates import FingerCandidate, read_candidates
+from clench.closing.collision.containment import link_within_link
+from clench.closing.feasibility import judge_sets
+from clench.closing.hand_plan import HandPlan
+from clench.closing.kernel_run import close_items, row_of
+from clench.closing.packed_problem import PackedProblem, Terms, pack_problem
+from clench.closing.start_blocking import start_overlaps
+from clench.core.deferring import once
 from clench.models.command import ClosingOrder
+from clench.scoring.calibration import Calibration
+from clench.scoring.choice import HandChoice, choose
+from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_registry import ALWAYS, is_built_in, score_hand
+from clench.scoring.explaining import explain_choice
 
 from .planning import plan_hand
 
 if TYPE_CHECKING:
-    from clench.grasp.depths import LinkDepth
-    from clench.kernels.solve_layout import Closed
+    from clench.closing.collision.depths import LinkDepth
+    from clench.kernels.closing.solve_layout import Closed
 
     from .problem import Problem
 
@@ -143,7 +143,7 @@ class Alternatives:
 
     problem: Problem
     calibration: Calibration
-    setting: Setting
+    setting: ScoringContext
     close: Callable[[], Groups]
 
     def __post_init__(self) -> None:

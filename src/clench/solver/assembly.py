@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.base.deferring import DeferredMapping
-from clench.base.pose import FloatArray, Pose
-from clench.base.tolerances import ALLOWED_PENETRATION
-from clench.grasp.candidates import FingerCandidate, Touch
-from clench.grasp.depths import LinkDepth, retreat_distance
-from clench.grasp.motion import asked_fingers, decompose
-from clench.grasp.scene import hash_hand
-from clench.grasp.surface import nearest_body
+from clench.closing.candidates import FingerCandidate, Touch
+from clench.closing.collision.depths import LinkDepth, retreat_distance
+from clench.closing.collision.object_surface import nearest_body
+from clench.closing.collision.packed_object import hash_hand
+from clench.closing.motion import asked_fingers, decompose
+from clench.core.deferring import DeferredMapping
+from clench.core.pose import FloatArray, Pose
+from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from clench.grasp.candidates import FingerCandidate, Touch
-from clench.grasp.plan import last_closing_joint
-from clench.grasp.reach import beside, beyond_reach, graspable_body, nearest_link
-from clench.grasp.surface import nearest_body
+from clench.closing.candidates import FingerCandidate, Touch
+from clench.closing.collision.object_surface import nearest_body
+from clench.closing.collision.reach import beside, beyond_reach, graspable_body, nearest_link
+from clench.closing.finger_plan import last_closing_joint
 from clench.models.hand.hand import Hand, JointRole
 
 from .solution import FingerStatus
 
 if TYPE_CHECKING:
-    from clench.base.pose import FloatArray
-    from clench.kernels.bodies import BodyArrays
+    from clench.core.pose import FloatArray
+    from clench.kernels.geometry.bodies import BodyArrays
 
     from .problem import Problem
 

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.base.tolerances import ALLOWED_PENETRATION
-from clench.grasp.candidates import FingerCandidate
-from clench.grasp.containment import contained_link, link_within_link
-from clench.grasp.depths import LinkDepth, hand_depths
-from clench.grasp.exact import hand_bodies, swept_deviation
-from clench.grasp.linkage import placed_links
+from clench.closing.candidates import FingerCandidate
+from clench.closing.collision.containment import contained_link, link_within_link
+from clench.closing.collision.depths import LinkDepth, hand_depths
+from clench.closing.link_bodies import hand_bodies, swept_deviation
+from clench.closing.linkage import placed_links
+from clench.core.pose import FloatArray
+from clench.core.tolerances import ALLOWED_PENETRATION
 
 if TYPE_CHECKING:
-    from clench.kernels.exact import ExactArrays
+    from clench.kernels.toi.full_width import ExactArrays
 
     from .problem import Problem
 
@@ -173,7 +173,7 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
 
 def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[str]:
     """Return the names of two links that overlap at a posture, or of one that overlaps the object; or nothing."""
-    from clench.kernels.exact import find_link_overlap
+    from clench.kernels.toi.full_width import find_link_overlap
 
     hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])
     poses = placed_links(hand, q)

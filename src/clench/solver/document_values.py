@@ -9,8 +9,8 @@ from typing import Any, NoReturn, TypeVar
 import msgspec
 import numpy as np
 
-from clench.base.errors import ClenchError, FileError
-from clench.base.pose import Pose
+from clench.core.errors import ClenchError, FileError
+from clench.core.pose import Pose
 
 _T = TypeVar("_T")
 

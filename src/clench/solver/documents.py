@@ -12,10 +12,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from clench.base.errors import FileError
-from clench.base.json_files import encode_document, non_finite_path, read_json, write_json
-from clench.base.pose import Pose
-from clench.models.hand.extremes import LARGEST_ANGLE
+from clench.core.errors import FileError
+from clench.core.files.json_files import encode_document, non_finite_path, read_json, write_json
+from clench.core.pose import Pose
+from clench.models.hand.reading.extremes import LARGEST_ANGLE
 from clench.models.shapes import CollisionSource
 
 from .document_values import check_said, convert, read_limits, read_numbers, read_pose

@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from clench.base.errors import ClenchError
-from clench.grasp.criterion_registry import find_criterion, is_of_hand
-from clench.grasp.explaining import say_what_decided
+from clench.core.errors import ClenchError
 from clench.models.command import ClosingOrder, GraspCommand
+from clench.scoring.criterion_registry import find_criterion, is_of_hand
+from clench.scoring.explaining import say_what_decided
+from clench.solver.analysis.examples import solve_scores
 
-from .examples import solve_scores
 from .solution import GraspSolution, SolutionStatus
 
 #: What puts one order before another, whatever the scores, strongest first; as `_Solved.rank` lists them.

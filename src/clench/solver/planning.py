@@ -6,10 +6,10 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from typing import Final
 
-from clench.base.errors import CommandError, HandError
-from clench.grasp.hand_plan import HandPlan, make_hand_plan
-from clench.grasp.motion import alternatives, asked_fingers
-from clench.grasp.plan import FingerPlan, closing_joints, plan_finger
+from clench.closing.finger_plan import FingerPlan, closing_joints, plan_finger
+from clench.closing.hand_plan import HandPlan, make_hand_plan
+from clench.closing.motion import alternatives, asked_fingers
+from clench.core.errors import CommandError, HandError
 from clench.models.command import GraspCommand
 
 from .problem import Problem

@@ -7,19 +7,19 @@ from functools import cached_property
 
 import numpy as np
 
-from clench.base.errors import ObjectError, UnknownNameError
-from clench.base.pose import FloatArray, Pose
-from clench.grasp.calibration import Calibration
-from clench.grasp.criteria import Setting
-from clench.grasp.motion import next_postures, palm_pose, task_wrenches
-from clench.grasp.scene import PackedObject, pack_object
-from clench.grasp.sizes import warn_of_size
+from clench.closing.collision.packed_object import PackedObject, pack_object
+from clench.closing.collision.sizes import warn_of_size
+from clench.closing.motion import next_postures, palm_pose, task_wrenches
+from clench.core.errors import ObjectError, UnknownNameError
+from clench.core.pose import FloatArray, Pose
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
+from clench.scoring.calibration import Calibration
+from clench.scoring.criteria import ScoringContext
 
-from .checked import checked
+from .checked_command import checked
 
 #: More rounds than any finger needs that comes to rest.
 UNTIL_REST = 1000
@@ -57,7 +57,7 @@ class Problem:
     @cached_property
     def T_palm_object(self) -> FloatArray:
         """Where the object is for the hand, shape (4, 4)."""
-        from clench.kernels.frames import relate_poses
+        from clench.kernels.geometry.link_frames import relate_poses
 
         T, rows = np.zeros((4, 4)), np.array([self.T_world_palm.wxyz_xyz, self.T_world_object.wxyz_xyz])
         T[3, 3] = 1.0
@@ -95,14 +95,14 @@ def check_calibration(hand: Hand, calibration: Calibration) -> None:
             )
 
 
-def make_setting(problem: Problem, calibration: Calibration) -> Setting:
+def make_setting(problem: Problem, calibration: Calibration) -> ScoringContext:
     """Return what the criteria judge sets in; see `check_calibration`."""
     hand = problem.hand
     weights = np.ones(len(hand.joints)) if calibration.joints else None
     for name, weight in calibration.joints.items():
         assert weights is not None
         weights[hand.joint_index(name)] = weight
-    return Setting(
+    return ScoringContext(
         hand,
         problem.start.copy(),  # criteria of others may write to it
         problem.packed,

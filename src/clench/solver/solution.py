@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from clench.base.deferring import DeferredMapping, LateFields
-from clench.base.pose import FloatArray, Pose
-from clench.base.short_repr import described, short_repr
+from clench.core.deferring import DeferredMapping, LateFields
+from clench.core.pose import FloatArray, Pose
+from clench.core.short_repr import described, short_repr
 
 
 class SolutionStatus(StrEnum):
@@ -249,7 +249,7 @@ class GraspSolution(LateFields):
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""
-        from .judging import violations
+        from .validity import violations
 
         return violations(self)
 

@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import clench
-from clench.base.errors import CommandError, FileError, UnknownNameError
-from clench.base.pose import Pose
+from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.pose import Pose
 from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
 from clench.execution.formats.grasp_posture import GraspPosture
 from clench.models.hand.hand import Hand

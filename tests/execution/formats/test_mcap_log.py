@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 from clench.execution.formats import mcap_log
 from clench.execution.formats.mcap_log import write_log
 from clench.execution.history import ExecutionHistory

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.grasp.mechanics.contacts import ContactSet, make_contacts
-from clench.grasp.mechanics.held import HeldObject, held_by_contacts
+from clench.core.pose import FloatArray
+from clench.mechanics.contacts import ContactSet, make_contacts
+from clench.mechanics.held import HeldObject, held_by_contacts
 
 
 def directions(rng: np.random.Generator, count: int) -> FloatArray:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.defaults import FRICTION
-from clench.base.errors import CommandError
-from clench.grasp.mechanics.contacts import contact_frames, make_contacts, pair_friction
-from clench.grasp.mechanics.grasp_map import grasp_map
-from clench.grasp.mechanics.steadiness import cone_faces
+from clench.core.defaults import FRICTION
+from clench.core.errors import CommandError
+from clench.mechanics.contacts import contact_frames, make_contacts, pair_friction
+from clench.mechanics.epsilon_quality import cone_faces
+from clench.mechanics.grasp_map import grasp_map
 
 from .held_cases import directions, random_contacts
 

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from clench.base.errors import CommandError
-from clench.grasp.mechanics.actuation import actuation, least_effort
-from clench.grasp.mechanics.binding import why_not
-from clench.grasp.mechanics.contacts import make_contacts
-from clench.grasp.mechanics.held import HeldObject, held_by_contacts
-from clench.grasp.mechanics.loads import (
+from clench.core.errors import CommandError
+from clench.mechanics.actuation import actuation, least_effort
+from clench.mechanics.binding import why_not
+from clench.mechanics.contacts import make_contacts
+from clench.mechanics.held import HeldObject, held_by_contacts
+from clench.mechanics.loads import (
     GRAVITY,
     check_loads,
     gravity_any_direction,
@@ -24,8 +24,8 @@ from clench.grasp.mechanics.loads import (
     task_wrench,
     weight,
 )
-from clench.grasp.mechanics.squeeze import squeeze_forces
-from clench.grasp.mechanics.tendons import TendonDrive
+from clench.mechanics.squeeze import squeeze_forces
+from clench.mechanics.tendon_tensions import TendonDrive
 
 from .held_cases import around_the_equator, directions, random_held, with_joints
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chain_hands import HandBuilder, along_x, three_links
-from clench.base.errors import CommandError
-from clench.grasp.mechanics.jacobian import degrees_of_freedom
-from clench.grasp.mechanics.tendons import TendonDrive, tendon_drive
-from clench.models.hand.tendons import TendonMap
+from clench.core.errors import CommandError
+from clench.mechanics.jacobian import degrees_of_freedom
+from clench.mechanics.tendon_tensions import TendonDrive, tendon_drive
+from clench.models.hand.reading.tendons import TendonMap
 
 R_ANTAGONISTIC = np.array([[0.01, -0.01, 0.0, 0.0], [0.0, 0.0, 0.008, -0.008]])
 R_N_PLUS_1 = np.array([[0.01, 0.01, -0.01, -0.01], [0.01, -0.01, 0.006, -0.006], [0.008, 0.0, -0.008, 0.002]])

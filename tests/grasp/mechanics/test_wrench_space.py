@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from clench.base.pose import FloatArray, rotation_about
-from clench.grasp.mechanics.contacts import make_contacts
-from clench.grasp.mechanics.grasp_map import edge_wrenches
-from clench.grasp.mechanics.wrench_space import epsilon_l1, epsilon_linf, volume_l1
+from clench.core.pose import FloatArray, rotation_about
+from clench.mechanics.contacts import make_contacts
+from clench.mechanics.grasp_map import edge_wrenches
+from clench.mechanics.wrench_space import epsilon_l1, epsilon_linf, volume_l1
 
 from .held_cases import directions, random_contacts
 

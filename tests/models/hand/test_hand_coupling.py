@@ -8,9 +8,9 @@ from hand_models import finger, hand, three_fingers, urdf_hand, written
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clench.base.errors import HandError
-from clench.models.hand.coupling import Relation, flatten
+from clench.core.errors import HandError
 from clench.models.hand.hand import Hand
+from clench.models.hand.understanding.coupling import Relation, flatten
 
 
 def coupling(loaded: Hand, follower: str) -> tuple[str, float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hand_models import finger, hand, three_fingers, urdf_hand, written
 
-from clench.base.errors import FileError
+from clench.core.errors import FileError
 from clench.models.hand.findings import Finding, FindingCode, Severity, in_hand_file
 from clench.models.hand.hand import Hand
 
@@ -125,7 +125,7 @@ def test_a_joint_type_that_does_not_exist(tmp_path) -> None:
 
 @pytest.mark.parametrize(("tilt", "count"), [(1e-10, 0), (1e-8, 2), (1e-5, 2), (0.01, 2), (0.5, 0)])
 def test_axes_that_are_almost_parallel_split_the_planes(tmp_path, tilt: float, count: int) -> None:
-    from clench.grasp.plan import plan_finger
+    from clench.closing.finger_plan import plan_finger
 
     fingers = [
         finger(name, (x, 0, 0.05), axes=["1 0 0", f"1 0 {tilt}"]) for name, x in (("index", 0.02), ("ring", -0.02))
@@ -201,7 +201,7 @@ def test_names_that_need_quotes_in_the_hand_file() -> None:
 def test_links_that_are_only_drawn_close_like_those_that_collide(tmp_path) -> None:
     """The shapes that are drawn take the place of missing collision shapes, in the solve as in the report."""
     import clench
-    from clench.base.pose import Pose
+    from clench.core.pose import Pose
 
     text = urdf_hand(mimic="")
     drawn = text.replace("<collision>", "<visual>").replace("</collision>", "</visual>")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hand_models import finger, hand, three_fingers, written
 
-from clench.base.errors import HandError
-from clench.models.hand.finger_names import place_names, short_names
+from clench.core.errors import HandError
 from clench.models.hand.hand import Hand, Joint
+from clench.models.hand.understanding.finger_names import place_names, short_names
 
 
 def joint(loaded: Hand, name: str) -> Joint:

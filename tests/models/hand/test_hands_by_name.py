@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from hand_models import three_fingers, urdf_hand
 
-from clench.base.errors import FileError, HandError, UnknownNameError
-from clench.models.hand import named
+from clench.core.errors import FileError, HandError, UnknownNameError
 from clench.models.hand.hand import Hand
+from clench.models.hand.reading import named
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hand_models import finger, hand, written
 
-from clench.grasp.self_check import check_hand
+from clench.closing.collision.self_check import check_hand
 from clench.models.hand.hand import Hand
-from clench.models.hand.hulls import hull_distances, largest_distance
+from clench.models.hand.understanding.hulls import hull_distances, largest_distance
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource
 from clench.models.tessellation import BOX_CORNERS, BOX_TRIANGLES, convex_hull
@@ -48,8 +48,8 @@ def test_the_distance_is_that_of_many_points() -> None:
     corners = rng.normal(size=(40, 3, 3)) * 0.03
     mesh = TriangleMesh(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
     hull = convex_hull(mesh)
-    from clench.kernels.distance import closest_point
-    from clench.kernels.tree import build_tree
+    from clench.kernels.geometry.bvh import build_tree
+    from clench.kernels.geometry.mesh_distance import closest_point
 
     tree = build_tree(mesh.vertices, mesh.triangles)
     weights = rng.dirichlet(np.ones(3), size=(len(hull.triangles), 200))

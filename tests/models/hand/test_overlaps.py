@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hand_models import PALM, finger, hand, written
 
-from clench.grasp.exact import hand_bodies
-from clench.grasp.self_check import check_hand
+from clench.closing.collision.self_check import check_hand
+from clench.closing.link_bodies import hand_bodies
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.models.tessellation import BOX_CORNERS, BOX_TRIANGLES

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_hand_kinematics import assert_same_kinematics
 
-from clench.base.errors import HandError
+from clench.core.errors import HandError
 from clench.models.hand.hand import Hand
 
 
@@ -56,7 +56,7 @@ def test_packaged_hands(package: str, path: str, palm: str | None, names: str, c
 def test_packaged_hands_close_around_a_ball(package: str, path: str) -> None:
     """The ball lies between the fingertips when they are half closed, so that some of them must touch it."""
     import clench
-    from clench.models.hand.finger_geometry import finger_line
+    from clench.models.hand.understanding.finger_geometry import finger_line
 
     hand = Hand.load(packaged(package, path))
     q = hand.open_angles()

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from clench.models.hand.pictures import checked_png
+from clench.models.hand.reading.png_checks import checked_png
 from hostile.models import png
 
 RNG = np.random.default_rng(0)

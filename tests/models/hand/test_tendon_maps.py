@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.errors import FileError, HandError, UnknownNameError
-from clench.models.hand.tendons import TendonMap
+from clench.core.errors import FileError, HandError, UnknownNameError
+from clench.models.hand.reading.tendons import TendonMap
 
 PULLEY = """
 <mujoco><worldbody><body name="palm"><geom size="0.01"/>

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.base.errors import FileError, ObjectError, UnknownNameError
-from clench.base.pose import Pose
+from clench.core.errors import FileError, ObjectError, UnknownNameError
+from clench.core.pose import Pose
 from clench.models.objects.grasp_object import BodyRole, GraspObject, MeshPart
 from clench.models.objects.mesh_file import read_mesh
 from clench.models.objects.obstacles import obstacle, table

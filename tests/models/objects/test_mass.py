@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.mass import mass_properties
 from clench.models.tessellation import BOX_CORNERS, BOX_TRIANGLES

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.objects.object_report import describe_object
 from clench.models.objects.obstacles import table
 from clench.models.tessellation import BOX_CORNERS, BOX_TRIANGLES

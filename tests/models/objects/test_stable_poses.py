@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import clench
-from clench.base.pose import Pose
+from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects import stable_poses as module
 from clench.models.objects.grasp_object import BodyRole, GraspObject

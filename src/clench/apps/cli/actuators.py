@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 
 if TYPE_CHECKING:
-    from clench.execution.driver import HandDriver
-    from clench.execution.executing import Actuator
-    from clench.execution.filming import Film
-    from clench.execution.hold import Hold
+    from clench.execution.executing import Executor
+    from clench.execution.hardware.driver import HandDriver
     from clench.execution.report import ExecutionReport
+    from clench.execution.simulation.filming import Film
+    from clench.execution.simulation.hold import Hold
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
@@ -57,7 +57,7 @@ _SAID = {"hold": "hold or --lift", "film": "video or --stills"}
 
 def make_actuator(
     name: ActuatorName, hand: Hand, obj: GraspObject, options: ActuatorOptions, show_progress: bool
-) -> Actuator:
+) -> Executor:
     """Return the actuator that was asked for.
 
     Raises:
@@ -79,26 +79,26 @@ def make_actuator(
     if name == "signal":
         if options.to is None or options.record is None:
             raise CommandError("--actuator signal needs --to (file:PATH, tcp:HOST:PORT, …) and --record DB.")
-        return clench.ReadySignal(hand, options.record, options.to, obj=obj, timeout=options.timeout)
-    joint_map = None if options.joint_map is None else clench.JointMap.load(options.joint_map)
+        return clench.execution.ReadySignal(hand, options.record, options.to, obj=obj, timeout=options.timeout)
+    joint_map = None if options.joint_map is None else clench.execution.JointMap.load(options.joint_map)
     driver = _driver(name, options)
     squeeze = 1.0 if options.squeeze is None else options.squeeze
-    return clench.DrivenHand(
+    return clench.execution.HardwareHand(
         hand, driver, joint_map=joint_map, obj=obj, connect_timeout=options.timeout, squeeze=squeeze
     )
 
 
-def stop_of(actuator: Actuator) -> Callable[[], None]:
+def stop_of(actuator: Executor) -> Callable[[], None]:
     """Return what forbids further commands to a driven hand, at any moment and without waiting for its driver.
 
     The interrupt that follows tells the hand to stop. Nothing is done for other actuators.
     """
     import clench
 
-    return actuator.supervision.stop if isinstance(actuator, clench.DrivenHand) else lambda: None
+    return actuator.supervision.stop if isinstance(actuator, clench.execution.HardwareHand) else lambda: None
 
 
-def report_of(actuator: Actuator) -> ExecutionReport:
+def report_of(actuator: Executor) -> ExecutionReport:
     """Return what a driven hand reports of an execution that was interrupted.
 
     Raises:
@@ -106,7 +106,7 @@ def report_of(actuator: Actuator) -> ExecutionReport:
     """
     import clench
 
-    if not isinstance(actuator, clench.DrivenHand) or actuator.last_report is None:
+    if not isinstance(actuator, clench.execution.HardwareHand) or actuator.last_report is None:
         raise KeyboardInterrupt
     return actuator.last_report
 
@@ -121,7 +121,7 @@ def make_film(video: Path | None, stills: Path | None) -> Film | None:
         return None
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
         os.environ.setdefault("MUJOCO_GL", "egl")
-    from clench.execution.filming import Film
+    from clench.execution.simulation.filming import Film
 
     return Film(video, stills)
 
@@ -140,16 +140,16 @@ def make_hold(hold: bool, lift: bool, mass: float | None, friction: float | None
         raise CommandError("--hold and --lift are two tests: give one of them.")
     if not (hold or lift) and given:
         raise CommandError(f"--{next(iter(given))} means nothing without --hold or --lift.")
-    return clench.Hold(test="lift" if lift else "pulls", **given) if hold or lift else None
+    return clench.execution.Hold(test="lift" if lift else "pulls", **given) if hold or lift else None
 
 
 def _driver(name: ActuatorName, options: ActuatorOptions) -> HandDriver:
     import clench
 
     if name == "ros2":
-        return clench.Ros2Driver(
+        return clench.execution.Ros2Driver(
             options.controller or "hand_controller",
             joint_states=options.joint_states or "/joint_states",
             interface=options.interface or "auto",
         )
-    return clench.OrcaDriver(options.config, mock=name == "orca-mock")
+    return clench.execution.OrcaDriver(options.config, mock=name == "orca-mock")

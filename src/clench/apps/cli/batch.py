@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.base.errors import CommandError, FileError
+from clench.core.errors import CommandError, FileError
 
 from .command_files import read_command
 from .scene_options import with_scene
@@ -71,11 +71,11 @@ def batch(
     from dataclasses import replace
 
     import clench
-    from clench.grasp.sizes import warn_of_size
-    from clench.kernels.warming import announce, warm_up
-    from clench.solver.batch import CHUNK
-    from clench.solver.batch_parts import check_batch_file
-    from clench.solver.devices import CPU, why_not
+    from clench.closing.collision.sizes import warn_of_size
+    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.solver.batch.batch_parts import check_batch_file
+    from clench.solver.batch.devices import CPU, why_not
+    from clench.solver.batch.solve_batch import CHUNK
 
     from .printing import print_batch, print_files
     from .results import print_json
@@ -131,7 +131,7 @@ def batch(
 @contextmanager
 def _going_on(out: Path | None) -> Iterator[None]:
     """Say where the parts are when a batch is interrupted."""
-    from clench.solver.batch_parts import parts_folder
+    from clench.solver.batch.batch_parts import parts_folder
 
     try:
         yield
@@ -147,8 +147,8 @@ def _read(path: Path) -> np.ndarray:
     Raises:
         FileError: missing, no array of numbers, or empty.
     """
-    from clench.base.array_files import read_array
-    from clench.base.pose_arrays import pose_rows
+    from clench.core.files.array_files import read_array
+    from clench.core.pose_arrays import pose_rows
 
     rows = pose_rows(read_array(path), str(path))
     if not len(rows):

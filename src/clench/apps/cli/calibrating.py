@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 
 if TYPE_CHECKING:
-    from clench.grasp.fitting import Fit
+    from clench.scoring.fitting import Fit
 
 SCHEMA = "clench.calibrate/1"
 
@@ -35,10 +35,10 @@ def calibrate(
 
     import numpy as np
 
-    from clench.base.json_files import check_writable, write_atomically
-    from clench.grasp.calibration import calibration_of, calibration_to_toml
-    from clench.grasp.fitting import fit_weights, told_right
-    from clench.solver.examples import ScoredExamples, read_examples, recorded_outcomes
+    from clench.core.files.json_files import check_writable, write_atomically
+    from clench.scoring.calibration import calibration_of, calibration_to_toml
+    from clench.scoring.fitting import fit_weights, told_right
+    from clench.solver.analysis.examples import ScoredExamples, read_examples, recorded_outcomes
 
     from .printing import print_files
     from .results import print_json

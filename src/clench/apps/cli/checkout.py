@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Final
 
 import clench
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 
 _PACKAGE: Final = "benchmarks"
 _SOURCE: Final = Path(clench.__file__).resolve().parent

@@ -10,7 +10,7 @@ from .tables import console_out, plain, table_with
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from clench.solver.pareto import HandSets
+    from clench.solver.analysis.pareto import HandSets
     from clench.solver.solution import Candidate, FingerResult, GraspSolution
 
 #: Rows of a table that may be long.
@@ -19,7 +19,7 @@ _MOST_ROWS = 10
 
 def print_choice(solution: GraspSolution) -> None:
     """Print what counted, the sets of every finger, and the sentences; nothing where the solution does not say."""
-    from clench.solver.pareto import hand_front
+    from clench.solver.analysis.pareto import hand_front
 
     out, choice = console_out(), solution.choice
     if choice is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clench.base.errors import ClenchError, CommandError, FileError
+from clench.core.errors import ClenchError, CommandError, FileError
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
@@ -18,9 +18,9 @@ def read_command(path: Path, hand: Hand) -> GraspCommand:
     Raises:
         FileError: the command file, or the calibration file that it names. CommandError: what is wrong in it.
     """
-    from clench.grasp.calibration import calibration_of
     from clench.models.command_file import check_command, load_command
-    from clench.solver.postures import preshape_angles
+    from clench.scoring.calibration import calibration_of
+    from clench.solver.preshapes.postures import preshape_angles
 
     command = load_command(path)
     try:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from clench.base.errors import CommandError, FileError
+from clench.core.errors import CommandError, FileError
 
 from .batch import batch
 from .calibrating import calibrate
@@ -111,10 +111,10 @@ def solve(
     from math import radians
 
     import clench
-    from clench.grasp.sizes import warn_of_size
+    from clench.closing.collision.sizes import warn_of_size
     from clench.models.objects.loading import size_warnings
+    from clench.solver.analysis.pareto import hand_front
     from clench.solver.orders import settled
-    from clench.solver.pareto import hand_front
 
     from .choice_tables import print_choice
     from .kernel_loading import compile_kernels, load_kernels
@@ -138,18 +138,18 @@ def solve(
             return _no_grasp(plan, json)
         given, planned = replace(plan[0].command, seed=seed), plan[0]
     the_command = in_orders(replace(given, **asked), order or ())
-    load_kernels(the_command)
+    load_kernels()
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
     if json or forces or out is not None or record is not None:
-        solution = clench.complete(solution, the_hand, the_object, mass=carried, friction=gripped)
+        solution = clench.execution.complete(solution, the_hand, the_object, mass=carried, friction=gripped)
     files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)
     files += [] if record is None else [_recorded(solution, record)]
     error = None
     if pose_error is not None:
         off = pose_error[0], radians(pose_error[1])
-        error = clench.pose_error(the_hand, the_object, the_command, *off, solution=solution)
+        error = clench.mechanics.pose_error(the_hand, the_object, the_command, *off, solution=solution)
     if json:
         more: dict[str, Any] = {} if error is None else {"pose_error": error.to_dict()}
         if explain:
@@ -181,7 +181,7 @@ def _recorded(solution: GraspSolution, path: Path) -> Path:
 def _check_files(out: Path | None, record: Path | None) -> None:
     """Refuse a folder or a record that cannot be written, before anything is loaded."""
     import clench
-    from clench.base.json_files import check_folder
+    from clench.core.files.json_files import check_folder
 
     if out is not None:
         check_folder(out)
@@ -195,10 +195,10 @@ def _checked_forces(mass: tuple[float, ...], friction: tuple[float, ...], criter
     Returns:
         Mass [kg] and friction [-], numbers or ranges; the friction may be None.
     """
-    from clench.base.defaults import MASS
-    from clench.grasp.calibration import calibration_of
-    from clench.grasp.mechanics.contacts import friction_range
-    from clench.grasp.mechanics.loads import mass_range
+    from clench.core.defaults import MASS
+    from clench.mechanics.contacts import friction_range
+    from clench.mechanics.loads import mass_range
+    from clench.scoring.calibration import calibration_of
 
     carried, gripped = as_range(mass, "--mass"), as_range(friction, "--friction")
     if gripped is not None:
@@ -231,7 +231,7 @@ def hand(
     """
     import clench
     from clench.models.hand.report import describe_hand
-    from clench.solver.preshapes import opposition_zones
+    from clench.solver.preshapes.preshapes import opposition_zones
 
     from .preshape_tables import print_preshapes
     from .printing import print_files, print_hand

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clench.base.errors import CommandError
-from clench.base.pose import Pose
+from clench.core.errors import CommandError
+from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 
 from .commands import loadable
@@ -33,8 +33,8 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         0 when the hand grasps and the simulated hand reaches the computed angles, else 1.
     """
     import clench
-    from clench.base.json_files import check_folder
-    from clench.kernels.warming import warm_up
+    from clench.core.files.json_files import check_folder
+    from clench.kernels.runtime.warming import warm_up
 
     from .preshape_tables import print_posture_choice
     from .printing import print_files, print_report, print_solution
@@ -51,7 +51,7 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         # The first call of a process loads the compiled kernels; this one shows what a solve takes.
         solution = clench.solve(hand, obj, command)
         solution = replace(solution, hand_model=loadable(hand_model), object_model=loadable(object_model))
-        solution = clench.complete(solution, hand, obj)
+        solution = clench.execution.complete(solution, hand, obj)
         step("Drawing every finger in its curl planes, and the hand")
         files = write_results(hand, obj, command, solution, out)
         step("Closing the simulated hand")

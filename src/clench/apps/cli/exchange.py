@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.core.errors import CommandError, FileError, UnknownNameError
 
 from .parsing import as_range
 
@@ -57,7 +57,7 @@ def export(
         json: print one JSON document on standard output.
     """
     import clench
-    from clench.base.json_files import check_folder, check_writable
+    from clench.core.files.json_files import check_folder, check_writable
     from clench.execution.formats.exchange import format_of
 
     from .export_sources import make_test, read_grasps, refuse_several
@@ -164,8 +164,8 @@ def import_(
     from dataclasses import replace
 
     import clench
-    from clench.base.files import make_folder
-    from clench.base.json_files import check_folder, write_json
+    from clench.core.files.file_bytes import make_folder
+    from clench.core.files.json_files import check_folder, write_json
     from clench.models.command_file import command_to_dict
 
     from .printing import print_files

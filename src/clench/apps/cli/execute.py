@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from clench.base.errors import FileError
-from clench.base.json_files import check_writable
+from clench.core.errors import FileError
+from clench.core.files.json_files import check_writable
 
 from .actuators import (
     ActuatorName,
@@ -133,7 +133,7 @@ def execute(
     if log is not None and report.history is None:
         report = replace(report, notes=(*report.notes, "Nothing was measured on the way: no log was written."))
     elif log is not None:
-        clench.write_log(log, report, the_solution)
+        clench.formats.write_log(log, report, the_solution)
     if out is not None:
         report.save(out)
     if json:

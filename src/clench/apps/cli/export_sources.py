@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.base.errors import CommandError, FileError, UnknownNameError
+from clench.core.errors import CommandError, FileError, UnknownNameError
 
 if TYPE_CHECKING:
-    from clench.execution.hold import Hold
+    from clench.execution.simulation.hold import Hold
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
-    from clench.solver.saved_question import SavedBatch
+    from clench.solver.batch.saved_question import SavedBatch
     from clench.solver.solution import GraspSolution
 
 
@@ -39,10 +39,10 @@ def make_test(mass: Any, friction: Any) -> Hold:
     Raises:
         CommandError: a value out of range.
     """
-    from clench.base.defaults import FRICTION, MASS
-    from clench.execution.hold import Hold
-    from clench.grasp.mechanics.contacts import friction_range
-    from clench.grasp.mechanics.loads import mass_range
+    from clench.core.defaults import FRICTION, MASS
+    from clench.execution.simulation.hold import Hold
+    from clench.mechanics.contacts import friction_range
+    from clench.mechanics.loads import mass_range
 
     heaviest = mass_range(MASS if mass is None else mass, "--mass")[1]
     lowest = friction_range(FRICTION if friction is None else friction, "--friction")[0]
@@ -163,8 +163,8 @@ class _Objects:
 def _contents(file: Path) -> list[tuple[str, GraspSolution | SavedBatch]]:
     """Return the solutions of a file, or the batch that it is, each with its name for messages."""
     import clench
-    from clench.base.json_files import read_json
-    from clench.solver.saved_question import SavedBatch
+    from clench.core.files.json_files import read_json
+    from clench.solver.batch.saved_question import SavedBatch
 
     if file.suffix == ".npz":
         return [(str(file), SavedBatch(file))]
@@ -193,7 +193,7 @@ def _check_hand(solution: GraspSolution, hand: Hand | None, source: str, first: 
 
 
 def _solved(batch: SavedBatch, hand: Hand | None, obj: GraspObject | None) -> list[GraspSolution]:
-    from clench.kernels.warming import announce, warm_up
+    from clench.kernels.runtime.warming import announce, warm_up
 
     if hand is None or obj is None:
         what, model = ("hand", batch.hand_model) if hand is None else ("object", batch.object_model)

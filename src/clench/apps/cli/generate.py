@@ -10,7 +10,7 @@ from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from clench.base.errors import CommandError
+from clench.core.errors import CommandError
 
 if TYPE_CHECKING:
     from clench.dataset.generating import GenerateReport, Told
@@ -147,7 +147,7 @@ def _generate(
 ) -> int:
     import clench.dataset
     from clench.dataset.folder import DatasetFolder
-    from clench.kernels.warming import announce, warm_up
+    from clench.kernels.runtime.warming import announce, warm_up
 
     from .interrupts import stopped_by_signals
     from .results import print_json

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from clench import __version__
-from clench.base.errors import ClenchError, UnknownNameError
+from clench.core.errors import ClenchError, UnknownNameError
 
 from .parsing import EXIT_BAD_INPUT, EXIT_INTERRUPTED, PRINT_COMPLETION, parse_call, print_completion
 

@@ -9,7 +9,7 @@ from .parsing import as_range
 from .scene_options import with_scene
 
 if TYPE_CHECKING:
-    from clench.execution.hold import HoldReport
+    from clench.execution.simulation.hold import HoldReport
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
     from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
@@ -83,9 +83,9 @@ def plan(
     from math import radians
 
     import clench
-    from clench.base.json_files import check_folder
-    from clench.grasp.sizes import warn_of_size
-    from clench.kernels.warming import announce, warm_up
+    from clench.closing.collision.sizes import warn_of_size
+    from clench.core.files.json_files import check_folder
+    from clench.kernels.runtime.warming import announce, warm_up
 
     from .plan_table import print_plan
     from .printing import print_files
@@ -137,7 +137,7 @@ def plan(
 def _searched(hand: Hand, obj: GraspObject, count: int, asked: dict[str, Any]) -> GraspPlan:
     """Return the plan; a bar on standard error counts the grasps that are found."""
     import clench
-    from clench.solver.batch_progress import shown
+    from clench.solver.batch.batch_progress import shown
 
     search = clench.iter_grasps(hand, obj, count, **asked)
     with shown(count, None) as advance:
@@ -147,11 +147,11 @@ def _searched(hand: Hand, obj: GraspObject, count: int, asked: dict[str, Any]) -
 
 
 def _held(grasp: PlannedGrasp, hand: Hand, obj: GraspObject, friction: Any) -> HoldReport:
-    from clench.base.defaults import FRICTION
-    from clench.execution.hold import Hold
-    from clench.execution.piece_hold import hold_as_collided
+    from clench.core.defaults import FRICTION
+    from clench.execution.simulation.hold import Hold
+    from clench.execution.simulation.piece_hold import hold_as_collided
     from clench.execution.trajectory import plan_trajectory
-    from clench.grasp.mechanics.contacts import friction_range
+    from clench.mechanics.contacts import friction_range
 
     # Tried at the largest mass and the lowest friction that were planned for.
     lowest = FRICTION if friction is None else friction_range(friction)[0]
@@ -161,8 +161,8 @@ def _held(grasp: PlannedGrasp, hand: Hand, obj: GraspObject, friction: Any) -> H
 
 def _write(found: GraspPlan, document: dict[str, Any], folder: Path) -> list[Path]:
     """Write the plan, and the solution and trajectory of every grasp; return the paths of the files."""
-    from clench.base.files import make_folder
-    from clench.base.json_files import write_json
+    from clench.core.files.file_bytes import make_folder
+    from clench.core.files.json_files import write_json
 
     make_folder(folder)
     write_json(folder / "plan.json", document, "plan")

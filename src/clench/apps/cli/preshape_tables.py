@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from .tables import console_out, plain, table_with
 
 if TYPE_CHECKING:
-    from clench.solver.preshapes import Preshape
+    from clench.solver.preshapes.preshapes import Preshape
     from clench.solver.solution import GraspSolution
 
 

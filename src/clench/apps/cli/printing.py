@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from clench.execution.formats.exchange import ExportReport
-    from clench.execution.hold import HoldReport
     from clench.execution.report import ExecutionReport, NextStepReached
+    from clench.execution.simulation.hold import HoldReport
     from clench.models.hand.report import HandReport
-    from clench.solver.pose_error import PoseErrorReport
-    from clench.solver.record import RecordEntry
+    from clench.solver.analysis.pose_error import PoseErrorReport
+    from clench.solver.analysis.record import RecordEntry
     from clench.solver.solution import FingerResult, GraspSolution
 
 

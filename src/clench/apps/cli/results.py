@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.base.errors import MotionError
-from clench.base.files import make_folder
-from clench.base.json_files import encode_document
+from clench.core.errors import MotionError
+from clench.core.files.file_bytes import make_folder
+from clench.core.files.json_files import encode_document
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand

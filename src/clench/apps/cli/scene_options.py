@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from clench.base.errors import ClenchError, CommandError
+from clench.core.errors import ClenchError, CommandError
 
 if TYPE_CHECKING:
-    from clench.base.pose import Pose
+    from clench.core.pose import Pose
     from clench.models.objects.grasp_object import GraspObject
 
 _FORM: Final = "MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz"
@@ -45,7 +45,7 @@ def with_scene(
 
 
 def _height(obj: GraspObject, table: tuple[float, ...]) -> float:
-    from clench.execution.scene import lowest
+    from clench.execution.simulation.mujoco_scene import lowest
 
     if len(table) > 1:
         raise CommandError(f"--table: expected the height of its top in metres, or nothing, got {len(table)} numbers.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from clench.base.visible_text import visible
+from clench.core.visible_text import visible
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clench.base.files import make_folder
+from clench.core.files.file_bytes import make_folder
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray, invert
-from clench.grasp.outlines import cut_shape, extent
-from clench.grasp.plan import FingerPlan, LinkOutline
+from clench.closing.finger_plan import FingerPlan, LinkOutline
+from clench.closing.outlines import cut_shape, extent
+from clench.core.pose import FloatArray, invert
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
@@ -198,7 +198,7 @@ class FingerScenes:
         )
 
     def _section(self, family: int, offset: float) -> tuple[SectionCurve, ...]:
-        from clench.kernels.section import cut_mesh
+        from clench.kernels.sections.section import cut_mesh
 
         tree = self.packed.full_tree
         segments, sources = cut_mesh(tree, invert(self.frames[family]) @ self.T_palm_object, offset)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.grasp.plan import closing_joints, plan_finger
-from clench.models.hand.finger_geometry import finger_line
+from clench.closing.finger_plan import closing_joints, plan_finger
+from clench.core.pose import FloatArray
 from clench.models.hand.hand import Finger, Hand, JointRole
+from clench.models.hand.understanding.finger_geometry import finger_line
 from clench.models.shapes import CollisionSource
 
 from . import style
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from clench.solver.preshapes import Preshape
+    from clench.solver.preshapes.preshapes import Preshape
 
 _TEXT: Final = 450
 #: Half the length at which an axis is drawn, as a share of the hand's size [-].

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.grasp.outlines import RoundedOutline
+from clench.closing.outlines import RoundedOutline
+from clench.core.pose import FloatArray
 
 #: End points closer than this are one [m].
 _SAME = 1e-9

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 from clench.solver.solution import Contact
 
 from .loops import Loop

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray, Pose
-from clench.grasp.motion import open_posture
+from clench.closing.motion import open_posture
+from clench.core.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from clench.solver.preshapes import Preshape
+    from clench.solver.preshapes.preshapes import Preshape
 
 #: Size of one picture, and room for its text [px].
 _TILE: Final = (220, 220)

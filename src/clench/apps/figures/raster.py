@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 
 #: Red, green and blue per pixel, 0 to 1, shape (H, W, 3).
 Image = NDArray[np.float32]

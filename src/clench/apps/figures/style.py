@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from clench.base.errors import FileError
-from clench.base.json_files import check_writable
-from clench.base.visible_text import visible
+from clench.core.errors import FileError
+from clench.core.files.json_files import check_writable
+from clench.core.visible_text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand, JointRole
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import BodyRole, GraspObject

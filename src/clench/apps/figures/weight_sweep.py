@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 import clench
-from clench.base.errors import CommandError
-from clench.grasp.criterion_registry import find_criterion
+from clench.core.errors import CommandError
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.examples import solve_scores
+from clench.scoring.criterion_registry import find_criterion
+from clench.solver.analysis.examples import solve_scores
 from clench.solver.solution import GraspSolution
 
 from . import style

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
-from clench.models.hand.finger_geometry import finger_line
+from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.solver.preshapes import APERTURES, Preshape, opposition_zones
+from clench.models.hand.understanding.finger_geometry import finger_line
+from clench.solver.preshapes.preshapes import APERTURES, Preshape, opposition_zones
 
 from . import style
 from .raster import Camera, halved, rasterise

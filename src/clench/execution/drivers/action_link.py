@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any, Final
 
-from clench.execution.driver import DriverError
+from clench.execution.hardware.driver import DriverError
 
 from .rclpy_link import RclpyLink, clear_import, trajectory_message
 from .ros2 import LOOK, JointStates

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from clench.base.errors import CommandError
-from clench.execution.driver import DriverError
+from clench.core.errors import CommandError
+from clench.execution.hardware.driver import DriverError
 
 from .ros2 import JointStates, on_this_machine_only
 

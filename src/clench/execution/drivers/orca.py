@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-from clench.base.errors import CommandError, FileError
-from clench.base.short_repr import described
-from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
+from clench.core.errors import CommandError, FileError
+from clench.core.short_repr import described
+from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
 
 class OrcaDriver:

@@ -20,9 +20,9 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from clench.base.errors import CommandError, UnknownNameError
-from clench.base.short_repr import described
-from clench.execution.driver import DriverError, DriverLimits, HandState, JointPath
+from clench.core.errors import CommandError, UnknownNameError
+from clench.core.short_repr import described
+from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
 #: In this time a hand that was told to stop is back where it was measured [s].
 STOP_TIME: Final = 0.1

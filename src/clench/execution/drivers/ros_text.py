@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from clench.execution.driver import DriverError
+from clench.execution.hardware.driver import DriverError
 
 from .ros2 import LOOK, RosInterface, installed_interface
 

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.errors import CommandError, FileError
-from clench.base.file_limits import PICKLE_BYTES
-from clench.base.files import read_file
-from clench.base.json_files import write_atomically
-from clench.base.numbers import real_array
-from clench.base.pose import FloatArray, Pose
+from clench.core.errors import CommandError, FileError
+from clench.core.files.file_bytes import read_file
+from clench.core.files.file_limits import PICKLE_BYTES
+from clench.core.files.json_files import write_atomically
+from clench.core.numbers import real_array
+from clench.core.pose import FloatArray, Pose
 from clench.solver.solution import GraspSolution
 
 from .grasp_posture import BASE, GraspPosture

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from clench.base.errors import CommandError, FileError, UnknownNameError
-from clench.base.short_repr import short_repr
-from clench.execution.hold import Hold
+from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.short_repr import short_repr
+from clench.execution.simulation.hold import Hold
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.grasp_batch import GraspBatch
+from clench.solver.batch.grasp_batch import GraspBatch
 from clench.solver.solution import GraspSolution, SolutionStatus
 
 from .dexgraspbench import object_folder, read_dexgraspbench, write_dexgraspbench

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from clench.base.errors import CommandError
-from clench.base.pose import FloatArray, Pose, invert
-from clench.base.short_repr import short_repr
+from clench.core.errors import CommandError
+from clench.core.pose import FloatArray, Pose, invert
+from clench.core.short_repr import short_repr
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
-from clench.solver.posture import posture
+from clench.solver.preshapes.named_angles import posture
 
 #: How files call the frame of the hand's own model file.
 BASE: Final = "world"

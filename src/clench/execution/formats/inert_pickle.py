@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from clench.base.errors import FileError
-from clench.base.file_limits import DOCUMENT_DEPTH, DOCUMENT_VALUES
+from clench.core.errors import FileError
+from clench.core.files.file_limits import DOCUMENT_DEPTH, DOCUMENT_VALUES
 
 #: Plain numbers: letter and bytes.
 _NUMERIC: Final = re.compile(r"([<>=|]?)(f[248]|[iu][1248]|b1)")

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from clench.base.errors import CommandError, FileError
-from clench.base.json_files import write_atomically
-from clench.base.numbers import is_finite_number
-from clench.base.pose import Pose
-from clench.base.yaml_files import read_yaml
+from clench.core.errors import CommandError, FileError
+from clench.core.files.json_files import write_atomically
+from clench.core.files.yaml_files import read_yaml
+from clench.core.numbers import is_finite_number
+from clench.core.pose import Pose
 
 from .grasp_posture import GraspPosture
 from .outgoing import OutgoingGrasp, all_of_one

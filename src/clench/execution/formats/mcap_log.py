@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from clench.base.errors import CommandError
-from clench.base.json_files import encode_document, write_atomically
+from clench.core.errors import CommandError
+from clench.core.files.json_files import encode_document, write_atomically
 from clench.execution.report import ExecutionReport
 from clench.solver.solution import GraspSolution
 

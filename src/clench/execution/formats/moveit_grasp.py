@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.base.errors import CommandError, FileError
-from clench.base.json_files import non_finite_path, read_json, write_json
-from clench.base.pose import Pose
+from clench.core.errors import CommandError, FileError
+from clench.core.files.json_files import non_finite_path, read_json, write_json
+from clench.core.pose import Pose
 
 from .grasp_posture import GraspPosture
 from .outgoing import OutgoingGrasp

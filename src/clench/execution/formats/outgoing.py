@@ -7,22 +7,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from clench.base.defaults import MASS
-from clench.base.errors import CommandError
-from clench.base.pose import Pose, invert
+from clench.core.defaults import MASS
+from clench.core.errors import CommandError
+from clench.core.pose import Pose, invert
 from clench.execution.executing import check_angles, check_geometry
-from clench.execution.hold import Hold
-from clench.execution.piece_hold import hold_as_collided
 from clench.execution.pregrasp import plan_pregrasp
+from clench.execution.simulation.hold import Hold
+from clench.execution.simulation.piece_hold import hold_as_collided
 from clench.execution.step_check import told_overlap
 from clench.execution.trajectory import plan_trajectory
-from clench.grasp.mechanics.contacts import DEFAULT_TORSION, ContactModel
+from clench.mechanics.contacts import DEFAULT_TORSION, ContactModel
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.posture import posture
+from clench.solver.analysis.squeezing import plan_squeeze
+from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
-from clench.solver.squeezing import plan_squeeze
 
 from .grasp_posture import BASE
 
@@ -243,7 +243,7 @@ def _beyond(solution: GraspSolution, angles: Mapping[str, float]) -> Iterator[st
 
 def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], stiffness: float) -> dict[str, float]:
     """Return the offsets for servos of one gain at every joint or tendon [rad]."""
-    from clench.grasp.mechanics.jacobian import degrees_of_freedom
+    from clench.mechanics.jacobian import degrees_of_freedom
 
     if not stiffness > 0.0:
         raise CommandError(f"stiffness: expected a number above 0 Nm/rad, got {stiffness!r}.")

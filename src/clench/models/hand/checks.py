@@ -6,14 +6,14 @@ import itertools
 
 import numpy as np
 
-from clench.base.tolerances import CLOSING_ANGLE, PARALLEL_ANGLE
-from clench.base.visible_text import visible
+from clench.core.tolerances import CLOSING_ANGLE, PARALLEL_ANGLE
+from clench.core.visible_text import visible
+from clench.models.hand.understanding.finger_geometry import axis_angle, finger_line
+from clench.models.hand.understanding.known_couplings import check_couplings
 from clench.models.shapes import CollisionSource
 
 from .findings import Finding, FindingCode, Severity, in_hand_file, quoted
-from .finger_geometry import axis_angle, finger_line
 from .hand import Finger, Hand, JointRole
-from .known_couplings import check_couplings
 
 #: Links of fingers that are longer, or joints farther apart, are no hand's [m].
 _LARGE = 1.0

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 
 if TYPE_CHECKING:
     from .hand import Hand

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.errors import CommandError, UnknownNameError
-from clench.base.keeping import Keeper
-from clench.base.pose import FloatArray
-from clench.base.short_repr import described, short_repr
+from clench.core.errors import CommandError, UnknownNameError
+from clench.core.keeping import Keeper
+from clench.core.pose import FloatArray
+from clench.core.short_repr import described, short_repr
+from clench.models.hand.reading.tendons import TendonMap
 from clench.models.shapes import CollisionSource, Shape
 
 from .findings import Finding, Severity
 from .forward import JointArrays, joint_arrays, poses_at
-from .tendons import TendonMap
 
 if TYPE_CHECKING:
-    from .overlaps import Overlaps, Pairs
+    from clench.models.hand.understanding.overlaps import Overlaps, Pairs
 
 #: Speed of joints whose model gives no limit [rad/s].
 DEFAULT_SPEED: Final = 2.0
@@ -291,13 +291,13 @@ class Hand(Keeper):
         found = self._overlaps(source)
         if not found.when_open:
             return self._with_overlapping(source, found.always)
-        from .overlaps import overlapping
+        from clench.models.hand.understanding.overlaps import overlapping
 
         at_start = overlapping(self, CollisionSource(source), found.when_open, q)
         return self._with_overlapping(source, found.always | at_start)
 
     def _overlaps(self, source: CollisionSource) -> Overlaps:
-        from .overlaps import NO_OVERLAPS, find_overlaps
+        from clench.models.hand.understanding.overlaps import NO_OVERLAPS, find_overlaps
 
         if not self.overlaps_allowed:
             return NO_OVERLAPS

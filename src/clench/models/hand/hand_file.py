@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clench.base.errors import FileError, HandError
-from clench.base.numbers import is_finite_number
-from clench.base.toml_files import read_toml
+from clench.core.errors import FileError, HandError
+from clench.core.files.toml_files import read_toml
+from clench.core.numbers import is_finite_number
+from clench.models.hand.reading.tendons import TendonMap
 from clench.models.shapes import CollisionSource
 
 from .hand import JointRole
-from .tendons import TendonMap
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.pose import FloatArray, invert
+from clench.core.pose import FloatArray, invert
 from clench.models.mesh import TriangleMesh, is_closed
 from clench.models.parts import part_points
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
@@ -17,7 +17,7 @@ from clench.models.tessellation import shape_mesh
 from .hand import Hand
 
 if TYPE_CHECKING:
-    from clench.kernels.tree import MeshTree
+    from clench.kernels.geometry.bvh import MeshTree
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def _meshes(hand: Hand, source: CollisionSource) -> tuple[LinkMesh, ...]:
 
 
 def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:
-    from clench.kernels.tree import build_tree, feature_owners
+    from clench.kernels.geometry.bvh import build_tree, feature_owners
 
     meshes = [shape_mesh(shape, source) for shape in shapes]
     mesh = TriangleMesh.joined(meshes)
@@ -77,8 +77,8 @@ def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
     Args:
         a, b: the links. poses: of all links in the palm frame, shape (L, 4, 4).
     """
-    from clench.kernels.depth import CROSSINGS, penetration
-    from clench.kernels.tree import STACK_SIZE
+    from clench.kernels.geometry.bvh import STACK_SIZE
+    from clench.kernels.geometry.penetration import CROSSINGS, penetration
 
     centers = [poses[m.link][:3, :3] @ m.center + poses[m.link][:3, 3] for m in (a, b)]
     if np.linalg.norm(centers[0] - centers[1]) > a.radius + b.radius:

@@ -9,27 +9,27 @@ from pathlib import Path
 
 import numpy as np
 
-from clench.base.errors import FileError, UnknownNameError
-from clench.base.pose import FloatArray
+from clench.core.errors import FileError, UnknownNameError
+from clench.core.pose import FloatArray
+from clench.models.hand.reading.compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
+from clench.models.hand.reading.extremes import refuse_extremes
+from clench.models.hand.reading.kinematics import Skeleton, build_skeleton
+from clench.models.hand.reading.link_geometry import ShapeReader, bodies_without_collision
+from clench.models.hand.reading.model_files import ModelText, read_model
+from clench.models.hand.reading.tendons import TendonMap, model_tendons
+from clench.models.hand.reading.whole_meshes import with_whole_meshes
+from clench.models.hand.understanding.allowed_pairs import allowed_pairs, check_excluded, with_given_pairs
+from clench.models.hand.understanding.coupling import FoundCouplings, Relation, find_couplings, flatten
+from clench.models.hand.understanding.finger_geometry import built_alike, finger_line, tip_motion
+from clench.models.hand.understanding.fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
+from clench.models.hand.understanding.palm import find_palm, hand_bodies
+from clench.models.hand.understanding.roles import assign_roles
 from clench.models.shapes import CollisionSource
 
-from .allowed import allowed_pairs, check_excluded, with_given_pairs
 from .checks import check_understood
-from .compiled import CompiledModel, collide_visuals, compile_model, keep_bodies, refuse_loops
-from .coupling import FoundCouplings, Relation, find_couplings, flatten
-from .extremes import refuse_extremes
 from .findings import Finding, FindingCode, Severity, quoted
-from .finger_geometry import built_alike, finger_line, tip_motion
-from .fingers import find_fingers, find_thumb, fixed_links, name_fingers, row_places
-from .geometry import ShapeReader, bodies_without_collision
 from .hand import Finger, Hand, JointRole, Link
 from .hand_file import HandFile, LinkOverride, find_hand_file
-from .kinematics import Skeleton, build_skeleton
-from .model_files import ModelText, read_model
-from .palm import find_palm, hand_bodies
-from .roles import assign_roles
-from .tendons import TendonMap, model_tendons
-from .whole_meshes import with_whole_meshes
 
 #: Tips whose mean closing direction is shorter oppose each other: the palm faces along the fingers [-].
 _OPPOSED = 0.4

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.errors import HandError
-from clench.base.opengl import import_mujoco
-from clench.base.pose import FloatArray, Pose
+from clench.core.errors import HandError
+from clench.core.opengl import import_mujoco
+from clench.core.pose import FloatArray, Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import Shape
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 
 from .forward import poses_at
 from .hand import Finger, Hand, JointRole

@@ -142,7 +142,7 @@ def _allowed_pairs(hand: Hand) -> tuple[tuple[str, str], ...]:
 
 
 def _fingers(hand: Hand) -> tuple[FingerReport, ...]:
-    from .finger_geometry import finger_line
+    from clench.models.hand.understanding.finger_geometry import finger_line
 
     found = []
     for finger in hand.fingers:

@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clench.base.errors import ObjectError
-from clench.base.memory import expect, in_parts
-from clench.base.numbers import real_array
-from clench.base.pose import FloatArray
-from clench.base.tolerances import LARGEST_LENGTH, SMALLEST_LENGTH
+from clench.core.errors import ObjectError
+from clench.core.memory import expect, in_parts
+from clench.core.numbers import real_array
+from clench.core.pose import FloatArray
+from clench.core.tolerances import LARGEST_LENGTH, SMALLEST_LENGTH
 from clench.models.mesh import IntArray, TriangleMesh
 from clench.models.shapes import Shape
 

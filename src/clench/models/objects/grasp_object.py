@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from clench.base.argument_types import check_type
-from clench.base.errors import ObjectError
-from clench.base.keeping import Keeper
-from clench.base.pose import Pose
-from clench.base.short_repr import described, short_repr
+from clench.core.argument_types import check_type
+from clench.core.errors import ObjectError
+from clench.core.keeping import Keeper
+from clench.core.pose import Pose
+from clench.core.short_repr import described, short_repr
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape
 

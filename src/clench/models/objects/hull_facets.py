@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.base.errors import ObjectError
-from clench.base.pose import FloatArray
+from clench.core.errors import ObjectError
+from clench.core.pose import FloatArray
 from clench.models.mesh import IntArray
 
 #: Triangles of the hull share a facet when their corners are this near to one plane, as a fraction of the size [-].

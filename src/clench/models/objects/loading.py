@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.base.errors import ObjectError, UnknownNameError
-from clench.base.files import expanded
-from clench.base.pose import Pose
+from clench.core.errors import ObjectError, UnknownNameError
+from clench.core.files.file_bytes import expanded
+from clench.core.pose import Pose
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.models.tessellation import convex_hull
 

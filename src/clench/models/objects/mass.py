@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 from clench.models.shapes import Shape, ShapeKind
 
 from .grasp_object import Body, BodyRole, GraspObject

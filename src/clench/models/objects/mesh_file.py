@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.base.errors import FileError
-from clench.base.file_limits import MESH_BYTES
-from clench.base.files import read_file
-from clench.base.memory import expect
-from clench.base.pose import FloatArray
+from clench.core.errors import FileError
+from clench.core.files.file_bytes import read_file
+from clench.core.files.file_limits import MESH_BYTES
+from clench.core.memory import expect
+from clench.core.pose import FloatArray
 from clench.models.mesh import IntArray
 from clench.models.mesh_parsing import MeshError, arrays_of, parse_mesh
 

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.deferring import DeferredSequence
-from clench.base.pose import FloatArray
+from clench.core.deferring import DeferredSequence
+from clench.core.pose import FloatArray
 from clench.models.mesh import IntArray, TriangleMesh
 from clench.models.shapes import Shape, ShapeKind
 from clench.models.tessellation import circle, convex_hull, grid_triangles, revolve

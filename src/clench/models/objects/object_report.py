@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from numpy.typing import ArrayLike
 
-from clench.base.errors import ObjectError
-from clench.base.numbers import real_array
+from clench.core.errors import ObjectError
+from clench.core.numbers import real_array
 from clench.models.shapes import ShapeKind
 
 from .grasp_object import Body, GraspObject

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from clench.base.errors import ObjectError
-from clench.base.pose import Pose
+from clench.core.errors import ObjectError
+from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 
 from .grasp_object import Body, BodyRole

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import Shape, ShapeKind
 from clench.models.tessellation import circle, revolve

@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clench.base.errors import ObjectError
-from clench.base.numbers import is_finite_number
-from clench.base.pose import FloatArray, Pose, checked_vector
+from clench.core.errors import ObjectError
+from clench.core.numbers import is_finite_number
+from clench.core.pose import FloatArray, Pose, checked_vector
 from clench.models.shapes import Shape, ShapeKind
 
 from .grasp_object import BodyRole, GraspObject

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from clench.base.pose import FloatArray
+from clench.core.pose import FloatArray
 from clench.models.mesh import IntArray
 
 #: A table of all vertices pays up to so many for each that is named.

@@ -1,1 +1,0 @@
-"""Errors, poses, tolerances and array types: what every layer may use."""

@@ -1,0 +1,247 @@
+"""The alternative sets of a finger, read out of what the kernels computed (docs/method.md section 5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from clench.closing.collision.depths import LinkDepth
+from clench.closing.collision.object_surface import object_surface
+from clench.closing.collision.packed_object import PackedObject
+from clench.core.pose import FloatArray
+from clench.core.tolerances import PASSED_GAP
+from clench.mechanics.contacts import without_repeats
+from clench.models.hand.hand import Hand
+
+from .finger_plan import FingerPlan
+from .hand_plan import HandPlan
+
+if TYPE_CHECKING:
+    from clench.kernels.closing.layout import ClosingArrays
+    from clench.kernels.closing.meeting_layout import Meetings
+
+#: The kind of a touch of two links' surfaces that lie on no plane.
+_FACE: Final = 5
+
+
+class Touch(NamedTuple):
+    """Describe one contact, in the palm frame.
+
+    Args:
+        link, joint: indices in the hand: the touching link, and the leader of the group it stopped (where joints break
+            away, the last one that it stopped).
+        body: index of the touched body, or -1 - index of a touched link of the hand itself. graspable: whether that
+            body is to be grasped.
+        plane: of the family, None where the touch lies on none. offset: its place along y [m].
+        kind: 0 side, 1 tip, 2 edge on a plane or of a round link; 3 corner, 4 edge, 5 face of a link's mesh.
+        position: [m], normal: of the object's surface there, outward unit, shape (3,). gap: at the final posture [m].
+        curve_angle: tangent angle of the object's curve [rad]. link_angle: of the touching side [rad], else None.
+    """
+
+    link: int
+    joint: int
+    body: int
+    graspable: bool
+    plane: int | None
+    offset: float
+    kind: int
+    position: FloatArray
+    normal: FloatArray
+    gap: float
+    curve_angle: float
+    link_angle: float | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether a later motion opened it by more than 1 µm."""
+        return self.gap > PASSED_GAP
+
+
+@dataclass(eq=False)
+class FingerCandidate:
+    """Hold one alternative set of a finger; the judgement is filled in once it is closed.
+
+    Args:
+        plan: the finger at its posture. posture: index of the posture alternative.
+        plane: index, or None for the full width. travel: of the plan's groups [rad].
+        q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
+        touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
+            or None; then nothing moves.
+        late: it would do so on the plane only once joints about another axis had moved; nothing moves either.
+        exact: it was swept over the whole width. clear: it passes through nothing on any of the planes.
+        feasible, penetration: over the whole width, path included; None when not measured.
+        scores: criterion name to value. item: number of its item of work.
+    """
+
+    plan: FingerPlan
+    posture: int
+    plane: int | None
+    travel: FloatArray
+    q: FloatArray
+    touches: tuple[Touch, ...]
+    overlap: LinkDepth | None
+    late: bool = False
+    exact: bool = False
+    clear: bool = False
+    feasible: bool | None = None
+    penetration: float | None = None
+    scores: dict[str, float] = field(default_factory=dict)
+    item: int = -1
+
+    @property
+    def offset(self) -> float | None:
+        """Place of the plane along y of the first family [m]; None for the full width."""
+        return None if self.plane is None else float(self.plan.families[0].offsets[self.plane])
+
+    @property
+    def missed(self) -> bool:
+        """Whether another link than the fingertip touches first."""
+        return bool(self.touches) and self.touches[0].link != self.plan.finger.tip_link
+
+    def on_the_way(self, hand: Hand, travel: FloatArray) -> FloatArray:
+        """Return the angles of all joints when the groups have travelled so far, each joint until it was held [rad].
+
+        Args:
+            hand: the hand. travel: of the plan's groups [rad].
+        """
+        turns = []
+        for p in self.plan.joints:
+            moved = min(max(travel[p.group], p.start), p.stop) - p.start
+            final = abs(self.q[p.joint] - self.plan.posture[p.joint])
+            turns.append(np.sign(p.rate) * min(abs(p.rate) * moved, final))
+        return self.plan.turned(hand, np.array(turns))
+
+    @cached_property
+    def holding(self) -> tuple[Touch, ...]:
+        """Contacts with a graspable body that are still touching, each once."""
+        still = [t for t in self.touches if t.graspable and not t.passed]
+        kept = without_repeats([t.link for t in still], [t.position for t in still], [t.normal for t in still])
+        return tuple(still[i] for i in kept)
+
+
+def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandidate]) -> FloatArray:
+    """Return the posture of the whole hand with every finger at its chosen set, shape (J,) [rad]."""
+    q = start.copy()
+    for candidate in chosen:
+        own = candidate.plan.finger.own
+        q[own] = candidate.q[own]
+    return hand.tied(q)
+
+
+def read_candidates(
+    plan: HandPlan,
+    packed: PackedObject,
+    answer: ClosingArrays,
+    T_palm_object: FloatArray,
+    overlaps: Sequence[LinkDepth | None],
+) -> list[FingerCandidate]:
+    """Return one candidate per item, in item order.
+
+    Args:
+        plan: what closed. packed, T_palm_object: the object, shape (4, 4). answer: what the kernels computed.
+        overlaps: as `start_overlaps` gives them, per entry.
+    """
+    from clench.kernels.closing.layout import SUNK
+
+    entries = plan.items.entry.tolist()
+    blocked = [overlaps[entry] is not None for entry in entries]
+    if any(blocked):
+        still = np.array(blocked)
+        travel, contacts = answer.travel.copy(), np.where(still, 0, answer.contacts)
+        travel[still] = 0.0
+        answer = answer._replace(travel=travel, contacts=contacts)
+    touches, postures = _read_items(plan, packed, T_palm_object, answer)
+    sunk = [LinkDepth(SUNK - link, 0.0, None) if link <= SUNK else None for link in answer.overlap.tolist()]
+    groups, low, skipped = plan.arrays.entry_group.tolist(), plan.items.low.tolist(), answer.skipped.tolist()
+    candidates = []
+    for i, entry in enumerate(entries):
+        candidates.append(
+            FingerCandidate(
+                item=i,
+                plan=plan.plans[entry],
+                posture=plan.posture[entry],
+                plane=None if plan.whole[i] else low[i],
+                travel=answer.travel[i, groups[entry] : groups[entry + 1]],
+                q=postures[i],
+                touches=touches[i],
+                overlap=overlaps[entry] or sunk[i],
+                late=not blocked[i] and sunk[i] is not None,
+                exact=plan.whole[i] and not skipped[i],
+            )
+        )
+    return candidates
+
+
+def held_touches(plan: HandPlan, met: Meetings) -> dict[int, list[Touch]]:
+    """Return the touches of fingers that hold each other, by finger; those of a finger that rests are left out.
+
+    Args:
+        plan: of the hand. met: where fingers that close at once met, at one pose.
+    """
+    held: dict[int, list[Touch]] = {}
+    for number, value in zip(met.number[: met.size[0]].tolist(), met.value[: met.size[0]], strict=True):
+        for (finger, link, joint), other, sign in ((number[:3], number[4], 1.0), (number[3:], number[1], -1.0)):
+            if joint >= 0:
+                touch = _held(value, link, other, int(plan.frames.chain_joint[joint]), sign)
+                held.setdefault(finger, []).append(touch)
+    return held
+
+
+def _held(value: FloatArray, link: int, met: int, joint: int, sign: float) -> Touch:
+    return Touch(
+        link=link,
+        joint=joint,
+        body=-1 - met,
+        graspable=False,
+        plane=None,
+        offset=0.0,
+        kind=_FACE,
+        position=value[:3],
+        normal=sign * value[3:6],
+        gap=float(value[6]),
+        curve_angle=0.0,
+        link_angle=None,
+    )
+
+
+def _read_items(
+    plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, answer: ClosingArrays
+) -> tuple[list[tuple[Touch, ...]], FloatArray]:
+    """Return the touches of every item, in stage order, and the angles of all joints, (I, J) [rad]."""
+    from clench.kernels.closing.contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays, read_touches
+
+    shape = answer.hit.shape[:2]
+    read = TouchArrays(np.empty((*shape, TOUCH_INTEGERS), dtype=np.int64), np.empty((*shape, TOUCH_FLOATS)))
+    postures = np.empty((shape[0], len(plan.hand.joints)))
+    T = np.ascontiguousarray(T_palm_object[:3])
+    read_touches(plan.arrays, plan.frames, object_surface(packed), plan.items, answer, T, read, postures)
+    touches = []
+    for i, n in enumerate(answer.contacts.tolist()):
+        numbers, values = read.number[i, :n].tolist(), read.value[i, :n].tolist()
+        touches.append(tuple(map(_touch, numbers, values, read.value[i])))
+    return touches, postures
+
+
+def _touch(number: list[int], value: list[float], row: FloatArray) -> Touch:
+    """Return a touch of numbers as `contact_reading` lists them; position and normal are views of `row`."""
+    link, joint, body, kind, plane, graspable = number
+    gap, curve, side, offset = value[6:]
+    return Touch(
+        link=link,
+        joint=joint,
+        body=body,
+        graspable=bool(graspable),
+        plane=plane if plane >= 0 else None,
+        offset=offset,
+        kind=kind,
+        position=row[:3],
+        normal=row[3:6],
+        gap=gap,
+        curve_angle=curve,
+        link_angle=None if math.isnan(side) else side,
+    )

@@ -1,0 +1,1 @@
+"""Collision: where a posed hand overlaps an object, how far it is from it, and which paths are free."""

@@ -1,0 +1,287 @@
+"""Find where a hand on a path first overlaps itself, the object or an obstacle (docs/method.md section 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.closing.link_bodies import link_bodies
+from clench.closing.linkage import hand_frames
+from clench.core.keeping import kept_by_identity
+from clench.core.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.shapes import CollisionSource
+
+from .depths import hand_depths, link_mesh_arrays, object_mesh
+from .packed_object import PackedObject, pack_object
+
+if TYPE_CHECKING:
+    from clench.kernels.geometry.bodies import BodyArrays
+    from clench.kernels.toi.pair_motion import PathProblem
+
+_KEPT_HANDS: Final = 16
+#: Way-points whose joints are this close to a straight line lie on it [rad].
+STRAIGHT: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedObject:
+    """An object, with its obstacles, at its place beside the hand.
+
+    Args:
+        bodies: the object's bodies, packed one by one. T_palm_object: shape (4, 4).
+    """
+
+    bodies: tuple[PackedObject, ...]
+    T_palm_object: FloatArray
+
+
+def place_object(obj: GraspObject, T_palm_object: FloatArray) -> PlacedObject:
+    """Return an object at its place beside the hand.
+
+    Args:
+        obj: the object; its own pose plays no part. T_palm_object: shape (4, 4).
+    """
+    if len(obj.bodies) == 1:
+        return PlacedObject((pack_object(obj),), T_palm_object)
+    each = (replace(obj, bodies=(replace(body, role=BodyRole.GRASPABLE),)) for body in obj.bodies)
+    return PlacedObject(tuple(pack_object(one) for one in each), T_palm_object)
+
+
+@dataclass(frozen=True)
+class PathOverlap:
+    """Describe the first overlap on a path.
+
+    Args:
+        place: number of the way-point before it, plus the share of the way to the next one.
+        link: name of a link. other: name of the other link, or of the body of the object.
+        with_object: whether `other` is a body of the object.
+        depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm. Not
+            a number where they rub against each other for so long that the proof was given up.
+        position: place in the palm's frame [m]; None where the overlap is too shallow to locate.
+        from_start: whether the two overlap where the path begins, and go deeper.
+    """
+
+    place: float
+    link: str
+    other: str
+    with_object: bool
+    depth: float
+    position: tuple[float, float, float] | None = None
+    from_start: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """One sentence without a full stop, e.g. "'thumb_tip' would overlap 'index_tip' by 3.2 mm"."""
+        what = f"the object's '{self.other}'" if self.with_object else f"'{self.other}'"
+        if np.isnan(self.depth):
+            return f"'{self.link}' moves along {what} for so long that it cannot be proven that they stay apart"
+        depth = f"by at least {self.depth * 1e3:.2g} mm"
+        if self.from_start:
+            return f"'{self.link}' overlaps {what} where the path begins, and would go deeper, {depth}"
+        return f"'{self.link}' would overlap {what} {depth}"
+
+
+def find_path_overlap(
+    hand: Hand,
+    path: FloatArray,
+    source: CollisionSource,
+    around: PlacedObject | None = None,
+) -> PathOverlap | None:
+    """Return the first overlap on a path of the whole hand; None proves that the path is free.
+
+    Every link is checked against every other link and against the object with its obstacles, over the whole path. The
+    exact sweep goes on until two bodies touch. From there, steps are so short that the bodies cannot overlap by more
+    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs_for`) are left out. A
+    pair that overlaps where the path begins may stay as deep as it was since, until it is apart. A soft pad may be
+    indented by the object as far as the hand file says.
+
+    Args:
+        hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.
+        source: geometry of the links. around: the object; None checks the hand alone.
+    """
+    points, kept = _corners(np.ascontiguousarray(path, dtype=np.float64))
+    lines = _Lines(path, points, kept)
+    if around is None:
+        return _first(hand, lines, source, None, around)
+    # Body by body: a link that is in one of them where the path begins must still stay out of the others.
+    found = [_first(hand, lines, source, number, around) for number in range(len(around.bodies))]
+    return min((overlap for overlap in found if overlap is not None), key=lambda o: o.place, default=None)
+
+
+class _Lines(NamedTuple):
+    """A path as straight lines: its way-points, the ends of the lines, and the numbers of the ends."""
+
+    path: FloatArray
+    points: FloatArray
+    kept: NDArray[np.int64]
+
+
+def _first(
+    hand: Hand, lines: _Lines, source: CollisionSource, number: int | None, around: PlacedObject | None
+) -> PathOverlap | None:
+    """Return the first overlap with one body of the object; with the first one, or without any, of the links, too."""
+    from clench.kernels.toi.path_overlap import OVERLAP, first_overlap
+
+    path, points, kept = lines
+    problem = _problem(hand, points, source, number, around)
+    out = np.zeros(2)
+    found = first_overlap(problem, out)
+    if found < 0:
+        return None
+    m, r = problem.pairs[found].tolist()
+    corner = min(int(out[0]), len(points) - 1)
+    share = out[0] - corner
+    after = min(corner + 1, len(points) - 1)
+    q = points[corner] + share * (points[after] - points[corner])
+    place = _place(path[kept[corner] : kept[after] + 1], share) + float(kept[corner])
+    name = hand.links[m].name
+    # A pair that is apart is found before it is much deeper than the tolerance.
+    from_start = bool(out[1] > problem.allowed[found] + 3.0 * OVERLAP)
+    if r >= 0:
+        return PathOverlap(place, name, hand.links[r].name, False, float(out[1]), from_start=from_start)
+    assert around is not None
+    assert number is not None
+    body, position = _where(hand, q, m, source, around.bodies[number], around.T_palm_object)
+    return PathOverlap(place, name, body, True, float(out[1]), position, from_start)
+
+
+def _where(
+    hand: Hand, q: FloatArray, link: int, source: CollisionSource, packed: PackedObject, T_palm_object: FloatArray
+) -> tuple[str, tuple[float, float, float] | None]:
+    """Return the name of a body and the place in the palm's frame at which a link is deepest in it [m]."""
+    deepest = hand_depths(hand, q, packed, T_palm_object, source, links=[link])
+    spot = next((d.place for d in deepest if d.place is not None), None)
+    name = packed.body_names[0] if packed.body_names else "object"
+    if spot is None:
+        return name, None
+    x, y, z = (T_palm_object @ np.append(spot, 1.0))[:3].tolist()
+    return name, (x, y, z)
+
+
+def _corners(path: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return the way-points of a path at which its direction changes, and their numbers."""
+    kept = [0]
+    for k in range(1, len(path) - 1):
+        a, b, c = path[kept[-1]], path[k], path[k + 1]
+        whole = c - a
+        length = float(whole @ whole)
+        share = float((b - a) @ whole) / length if length > 0.0 else -1.0
+        if 0.0 <= share <= 1.0 and np.abs(a + share * whole - b).max() <= STRAIGHT:
+            continue
+        kept.append(k)
+    if len(path) > 1:
+        kept.append(len(path) - 1)
+    return np.ascontiguousarray(path[kept]), np.array(kept, dtype=np.int64)
+
+
+def _place(line: FloatArray, share: float) -> float:
+    """Return the place among way-points on a straight line, (N, J), of a share of the way to the last one."""
+    whole = line[-1] - line[0]
+    if not whole.any():
+        return 0.0
+    shares = (line - line[0]) @ whole / (whole @ whole)
+    k = int(np.searchsorted(shares, share, side="right")) - 1
+    if k >= len(line) - 1:
+        return float(len(line) - 1)
+    return float(k + (share - shares[k]) / (shares[k + 1] - shares[k]))
+
+
+def _problem(
+    hand: Hand, path: FloatArray, source: CollisionSource, number: int | None, around: PlacedObject | None
+) -> PathProblem:
+    from clench.kernels.geometry.bodies import no_body
+    from clench.kernels.geometry.bvh import build_tree
+    from clench.kernels.geometry.link_meshes import ObjectMesh
+    from clench.kernels.toi.pair_motion import PathProblem
+
+    links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
+    tables = _tables(hand, source)
+    if around is None or number is None:
+        pairs, body, T = tables.between, no_body(), np.eye(4)
+        none = build_tree(np.empty((0, 3)), np.empty((0, 3)))
+        solid = ObjectMesh(none, np.empty(0, dtype=np.uint8), True, np.empty((0, 3)))
+    else:
+        packed, T = around.bodies[number], around.T_palm_object
+        pairs, body, solid = tables.with_object if number else tables.all, packed.bodies, object_mesh(packed)
+    pads = np.array([hand.links[m].pad_indentation if r < 0 else 0.0 for m, r in pairs.tolist()], dtype=np.float64)
+    return PathProblem(
+        frames=hand_frames(hand),
+        links=links,
+        meshes=meshes,
+        mesh=tables.mesh,
+        lineage=tables.lineage,
+        reach=tables.reach,
+        pairs=pairs,
+        allowed=pads,
+        object=body,
+        solid=solid,
+        T_palm_object=np.ascontiguousarray(np.asarray(T, dtype=np.float64)[:3]),
+        path=path,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Tables:
+    """Hold what is the same for every path of a hand; see `PathProblem`. `between` are the pairs without the object."""
+
+    mesh: NDArray[np.int64]
+    lineage: NDArray[np.int64]
+    reach: FloatArray
+    all: NDArray[np.int64]
+    between: NDArray[np.int64]
+    with_object: NDArray[np.int64]
+
+
+@kept_by_identity(_KEPT_HANDS)
+def _tables(hand: Hand, source: CollisionSource) -> _Tables:
+    links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
+    allowed = set(hand.allowed_pairs_for(source))
+    count = len(hand.links)
+    mesh = np.full(count, -1, dtype=np.int64)
+    mesh[meshes.link] = np.arange(len(meshes.link))
+    lineage = np.eye(count, dtype=np.int64)
+    for i, link in enumerate(hand.links):
+        if link.parent >= 0:
+            lineage[i] |= lineage[link.parent]
+    solid = [i for i in hand.solid_links if links.root[i] >= 0]
+    between = [(m, r) for m in solid for r in solid if r < m and (r, m) not in allowed]
+    with_object = [(m, -1) for m in solid]
+    return _Tables(
+        mesh,
+        lineage,
+        _reach(hand, links, lineage),
+        *(np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in ([*between, *with_object], between, with_object)),
+    )
+
+
+def _reach(hand: Hand, bodies: BodyArrays, lineage: NDArray[np.int64]) -> FloatArray:
+    """Return bounds on the distance of every link's points from every joint's axis, shape (L, J).
+
+    A point of a link is never farther from a joint's anchor than along the links between them. The way from a link's
+    origin to the next one goes through the anchor of the joint between, because both parts keep their length.
+    """
+    links, joints = hand.links, hand.joints
+    up = np.zeros((len(links), 2))  # from a link's origin to its own anchor, and from there to its parent's origin
+    for i, link in enumerate(links):
+        anchor = joints[link.joint].anchor if link.joint >= 0 else np.zeros(3)
+        up[i] = np.linalg.norm(anchor), np.linalg.norm((link.T_parent_link @ np.append(anchor, 1.0))[:3])
+    reach = np.zeros((len(links), len(joints)))
+    for m in range(len(links)):
+        if bodies.root[m] < 0:
+            continue
+        ball = bodies.node[bodies.root[m]]
+        own = float(np.linalg.norm(ball[:3]) + ball[3])
+        for i, link in enumerate(links):
+            if link.joint < 0:
+                continue
+            # All origins on the way from link m to link i, and from there to the anchor of its joint.
+            above_m = np.flatnonzero(lineage[m] & ~lineage[i] & 1)
+            above_i = np.flatnonzero(lineage[i] & ~lineage[m] & 1)
+            way = float(up[above_m].sum() + up[above_i].sum())
+            reach[m, link.joint] = own + (way + up[i, 0] if lineage[m, i] else way - up[i, 0])
+    return reach

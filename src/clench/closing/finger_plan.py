@@ -1,0 +1,374 @@
+"""Plan how a finger closes at one posture: groups, families of planes, link outlines (docs/method.md sections 1-2).
+
+A plan depends on the hand and the posture alone; nothing in it knows the object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from clench.core.errors import HandError
+from clench.core.pose import FloatArray, invert
+from clench.core.tolerances import PARALLEL_ANGLE
+from clench.models.hand.hand import Finger, Hand, JointRole
+from clench.models.shapes import CollisionSource
+
+from .curl_planes import family_frame, plane_offsets, refined
+from .outlines import RoundedOutline, cut_shape, extent
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedJoint:
+    """Describe a closing joint in its plan.
+
+    Args:
+        joint: index in the hand. family, group: indices in the plan.
+        pivot: in its family's (x, z) at the open posture [m], shape (2,).
+        turn: +1 when its model angle grows with a turn from x towards z, else -1.
+        rate: turn per unit of the group's travel [-].
+        start, stop: travel of the group between which it moves [rad].
+    """
+
+    joint: int
+    family: int
+    group: int
+    pivot: FloatArray
+    turn: float
+    rate: float
+    start: float
+    stop: float
+
+
+@dataclass(frozen=True, eq=False)
+class LinkOutline:
+    """Place one rounded outline: which link it is cut from, and which of the plan's joints moves it.
+
+    Args:
+        link: index in the hand. joint: index in the plan's joints. outline: relative to that joint's pivot.
+    """
+
+    link: int
+    joint: int
+    outline: RoundedOutline
+
+
+@dataclass(frozen=True, eq=False)
+class CurlFamily:
+    """Hold the parallel curl planes that consecutive joints share.
+
+    Args:
+        T_palm_family: at the open posture, shape (4, 4); y is normal to the planes.
+        offsets: of the planes along y [m], shape (P,).
+        outlines: per plane, the outlines of every link that the family's joints move.
+        reach: no moved point gets farther from the family's origin in the plane [m].
+    """
+
+    T_palm_family: FloatArray
+    offsets: FloatArray
+    outlines: tuple[tuple[LinkOutline, ...], ...]
+    reach: float
+
+    def pivot_in_palm(self, pivot: FloatArray) -> FloatArray:
+        """Return a pivot of its joints in the palm frame at the open posture [m], shape (3,)."""
+        T = self.T_palm_family
+        return np.asarray(T[:3, 3] + T[:3, 0] * pivot[0] + T[:3, 2] * pivot[1])
+
+
+@dataclass(frozen=True, eq=False)
+class FingerPlan:
+    """Hold everything about closing one finger from one open posture.
+
+    Args:
+        finger: the finger. posture: open angles of all joints of the hand [rad], shape (J,).
+        joints: closing joints, palm side first. leaders: leader of each group (index in the hand).
+        lengths: travel of each group to its limit [rad]. families: see `CurlFamily`.
+        speeds: of each group where all move at once, relative to each other. breaks: whether later joints of a group
+            go on when those before them are blocked.
+        length: of the finger [m].
+    """
+
+    finger: Finger
+    posture: FloatArray
+    joints: tuple[PlannedJoint, ...]
+    leaders: tuple[int, ...]
+    lengths: tuple[float, ...]
+    speeds: tuple[float, ...]
+    breaks: tuple[bool, ...]
+    families: tuple[CurlFamily, ...]
+    length: float
+
+    def lies_in_planes(self, again: bool) -> bool:
+        """Say whether only joints of one family ever move at once, those before them resting: then planes tell all.
+
+        Args:
+            again: all joints move at once, or in several rounds.
+        """
+        homes: dict[int, set[int]] = {}
+        for p in self.joints:
+            homes.setdefault(0 if again else p.group, set()).add(p.family)
+        return all(len(families) == 1 for families in homes.values())
+
+    def turned(self, hand: Hand, turn: FloatArray) -> FloatArray:
+        """Return the angles of all joints of the hand when the plan's joints have turned, shape (J,) [rad]."""
+        q = self.posture.copy()
+        for p, s in zip(self.joints, turn, strict=True):
+            joint = hand.joints[p.joint]
+            q[p.joint] = min(max(q[p.joint] + p.turn * s, joint.lower), joint.upper)
+        return q
+
+    def angles(self, hand: Hand, travel: FloatArray) -> FloatArray:
+        """Return the angles of all joints of the hand when the groups have travelled, shape (J,) [rad]."""
+        q = self.posture.copy()
+        for leader, s in zip(self.leaders, travel, strict=True):
+            joint = hand.joints[leader]
+            q[leader] = min(max(q[leader] + joint.direction * s, joint.lower), joint.upper)
+        return hand.coupled(q)
+
+
+def plan_finger(
+    hand: Hand,
+    finger: Finger,
+    posture: FloatArray,
+    planes: int,
+    source: CollisionSource,
+    speeds: Mapping[str, float] | None = None,
+) -> FingerPlan:
+    """Plan a finger's closing from an open posture.
+
+    Args:
+        hand: the hand. finger: one of its fingers.
+        posture: angles of all joints [rad], couplings hold, shape (J,).
+        planes: number of curl planes. source: geometry of the links.
+        speeds: by name of a free joint, where all move at once; those not named have speed 1.
+
+    Raises:
+        HandError: a coupling that the method does not cover.
+    """
+    poses = hand.link_poses(posture)
+    closing = closing_joints(hand, finger)
+    leaders = _leaders(hand, closing)
+    mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
+    axes = {j: poses[mover[j]][:3, :3] @ hand.joints[j].axis * hand.joints[j].direction for j in closing}
+    anchors = {j: (poses[mover[j]] @ np.append(hand.joints[j].anchor, 1.0))[:3] for j in closing}
+    split = _families(closing, axes)
+    moved_by = last_closing_joint(hand, finger, closing)
+    frames = [_frame(hand, closing, f, axes, anchors, poses, moved_by, source) for f in split]
+    joints = []
+    for f, members in enumerate(split):
+        to_family = invert(frames[f])
+        for j in members:
+            local = to_family @ np.append(anchors[j], 1.0)
+            model_axis = axes[j] * hand.joints[j].direction
+            turn = -1.0 if model_axis @ frames[f][:3, 1] > 0.0 else 1.0
+            joints.append((j, f, local[[0, 2]], turn))
+    planned = tuple(_planned(hand, posture, leaders, j, f, pivot, turn) for j, f, pivot, turn in joints)
+    order = list(dict.fromkeys(leaders[j] for j in closing))
+    lengths = tuple(_travel(hand, posture, leader) for leader in order)
+    families = _cut_families(hand, planned, frames, split, poses, moved_by, planes, source)
+    return FingerPlan(
+        finger,
+        posture,
+        planned,
+        tuple(order),
+        lengths,
+        tuple((speeds or {}).get(hand.joints[leader].name, 1.0) for leader in order),
+        tuple(any(c.breakaway and c.leader == leader for c in hand.couplings) for leader in order),
+        families,
+        max(f.reach for f in families),
+    )
+
+
+def closing_joints(hand: Hand, finger: Finger) -> list[int]:
+    """Return the joints that closing moves, palm side first: free ones and those that follow them.
+
+    Raises:
+        HandError: a posture joint that follows a closing one, or coupling between fingers.
+    """
+    closing = [j for j in finger.joints if hand.joints[j].role is JointRole.CLOSING and _is_free(hand, finger, j)]
+    for c in hand.couplings:
+        follower = hand.joints[c.follower]
+        if c.leader in closing and c.follower in finger.joints and c.follower not in closing:
+            raise HandError(
+                f"{hand.name}: posture joint '{follower.name}' follows closing joint '{hand.joints[c.leader].name}'; "
+                "a joint that moves while the finger closes has to be a closing joint."
+            )
+    return closing
+
+
+def _is_free(hand: Hand, finger: Finger, joint: int) -> bool:
+    """Say whether a closing joint moves on its own or with a closing joint of its own finger."""
+    for c in hand.couplings:
+        if c.follower == joint:
+            leader = hand.joints[c.leader]
+            if c.leader in finger.joints and leader.role is JointRole.CLOSING:
+                return True
+            if leader.role is JointRole.CLOSING:
+                raise HandError(
+                    f"{hand.name}: joint '{hand.joints[joint].name}' of finger '{finger.name}' follows "
+                    f"'{leader.name}' of another finger; coupling between fingers is not supported."
+                )
+            return False
+    return True
+
+
+def _leaders(hand: Hand, closing: list[int]) -> dict[int, int]:
+    leaders = {j: j for j in closing}
+    leaders.update({c.follower: c.leader for c in hand.couplings if c.follower in leaders})
+    return leaders
+
+
+def _families(closing: list[int], axes: dict[int, FloatArray]) -> list[list[int]]:
+    """Split closing joints into runs of parallel axes."""
+    families: list[list[int]] = []
+    for j in closing:
+        if families and np.linalg.norm(np.cross(axes[families[-1][0]], axes[j])) <= PARALLEL_ANGLE:
+            families[-1].append(j)
+        else:
+            families.append([j])
+    return families
+
+
+def last_closing_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[int, int]:
+    """Return, for every link of the finger that closing moves, the last closing joint before it."""
+    result: dict[int, int] = {}
+    for i in finger.links:
+        k = i
+        while k >= 0:
+            if hand.links[k].joint in closing:
+                result[i] = hand.links[k].joint
+                break
+            k = hand.links[k].parent
+    return result
+
+
+def resting_links(hand: Hand, plan: FingerPlan) -> tuple[int, ...]:
+    """Return the finger's links that no closing joint moves."""
+    closing = {p.joint for p in plan.joints}
+    moved: set[int] = set()
+    for i in plan.finger.links:
+        if hand.links[i].joint in closing or hand.links[i].parent in moved:
+            moved.add(i)
+    return tuple(i for i in plan.finger.links if i not in moved)
+
+
+def _frame(
+    hand: Hand,
+    closing: list[int],
+    members: list[int],
+    axes: dict[int, FloatArray],
+    anchors: dict[int, FloatArray],
+    poses: FloatArray,
+    moved_by: dict[int, int],
+    source: CollisionSource,
+) -> FloatArray:
+    first = members[0]
+    axis, origin = axes[first], anchors[first]
+    after = closing.index(first) + 1
+    towards = anchors[closing[after]] if after < len(closing) else origin
+    across = towards - origin - axis * ((towards - origin) @ axis)
+    if np.linalg.norm(across) < 1e-6:
+        towards = _farthest(hand, origin, axis, poses, [i for i in moved_by if moved_by[i] in members], source)
+    return family_frame(axis, origin, towards)
+
+
+def _farthest(
+    hand: Hand, origin: FloatArray, axis: FloatArray, poses: FloatArray, links: list[int], source: CollisionSource
+) -> FloatArray:
+    best, result = -1.0, origin
+    for i in links:
+        for shape in hand.links[i].shapes[source]:
+            points = shape.to_mesh(1e-3).vertices @ poses[i][:3, :3].T + poses[i][:3, 3]
+            away = points - origin
+            distance = np.linalg.norm(away - np.outer(away @ axis, axis), axis=1)
+            k = int(np.argmax(distance))
+            if distance[k] > best:
+                best, result = float(distance[k]), points[k]
+    return result
+
+
+def _travel(hand: Hand, posture: FloatArray, leader: int) -> float:
+    joint = hand.joints[leader]
+    limit = joint.upper if joint.direction > 0 else joint.lower
+    return max(float(joint.direction * (limit - posture[leader])), 0.0)
+
+
+def _planned(
+    hand: Hand, posture: FloatArray, leaders: dict[int, int], j: int, family: int, pivot: FloatArray, turn: float
+) -> PlannedJoint:
+    """Return a joint's motion: followers move while their coupled angle is inside their limits."""
+    order = list(dict.fromkeys(leaders.values()))
+    leader = leaders[j]
+    direction = hand.joints[leader].direction
+    length = _travel(hand, posture, leader)
+    group = order.index(leader)
+    if leader == j:
+        return PlannedJoint(j, family, group, pivot, turn, turn * direction, 0.0, length)
+    coupling = next(c for c in hand.couplings if c.follower == j)
+    at_open = coupling.ratio * posture[leader] + coupling.offset
+    speed = coupling.ratio * direction
+    lower, upper = hand.joints[j].lower, hand.joints[j].upper
+    if speed == 0.0:
+        return PlannedJoint(j, family, group, pivot, turn, 0.0, 0.0, 0.0)
+    window = sorted([(lower - at_open) / speed, (upper - at_open) / speed])
+    start, stop = max(window[0], 0.0), min(window[1], length)
+    return PlannedJoint(j, family, group, pivot, turn, turn * speed, start, max(stop, start))
+
+
+def _cut_families(
+    hand: Hand,
+    joints: tuple[PlannedJoint, ...],
+    frames: list[FloatArray],
+    split: list[list[int]],
+    poses: FloatArray,
+    moved_by: dict[int, int],
+    planes: int,
+    source: CollisionSource,
+) -> tuple[CurlFamily, ...]:
+    """Lay the planes of every family and cut the links that its joints, or later ones, move."""
+    position = {p.joint: i for i, p in enumerate(joints)}
+    placed = []
+    for f in range(len(split)):
+        to_family = invert(frames[f])
+        links = [(i, to_family @ poses[i]) for i in moved_by if joints[position[moved_by[i]]].family >= f]
+        extents = _extents(hand, links, source)
+        placed.append((links, plane_offsets(extents, planes)))
+    most = max(len(offsets) for _, offsets in placed)
+    families = []
+    for f, (links, offsets) in enumerate(placed):
+        offsets = refined(offsets, most)
+        last = position[split[f][-1]]
+        cut = []
+        for offset in offsets:
+            row = []
+            for i, T in links:
+                joint = min(position[moved_by[i]], last)
+                for shape in hand.links[i].shapes[source]:
+                    outline = cut_shape(shape, T, float(offset))
+                    if outline is not None:
+                        row.append(LinkOutline(i, joint, outline.about(joints[joint].pivot)))
+            cut.append(tuple(row))
+        own = [p for p in joints if p.family == f]
+        families.append(CurlFamily(frames[f], offsets, tuple(cut), _reach(own, position, cut)))
+    return tuple(families)
+
+
+def _extents(hand: Hand, links: list[tuple[int, FloatArray]], source: CollisionSource) -> list[tuple[float, float]]:
+    extents = [extent(shape, T) for i, T in links for shape in hand.links[i].shapes[source]]
+    return extents or [(0.0, 0.0)]
+
+
+def _reach(own: list[PlannedJoint], position: dict[int, int], cut: list[tuple[LinkOutline, ...]]) -> float:
+    arm = 0.0
+    arms = {}
+    for before, p in zip([None, *own], own, strict=False):
+        arm += float(np.linalg.norm(p.pivot - (before.pivot if before else 0.0)))
+        arms[position[p.joint]] = arm
+    reach = 0.0
+    for row in cut:
+        for o in row:
+            far = float(np.linalg.norm(o.outline.vertices, axis=1).max()) + o.outline.radius
+            reach = max(reach, arms[o.joint] + far)
+    return reach

@@ -1,0 +1,189 @@
+"""Run the kernels of a solve at many poses of the object, in threads; a single solve is a batch of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.core.pose import FloatArray
+
+from .packed_problem import PackedProblem
+from .threads import share_out
+
+if TYPE_CHECKING:
+    from clench.kernels.closing.layout import ClosingArrays
+    from clench.kernels.closing.meeting_layout import Meetings
+    from clench.kernels.closing.solve_layout import Closed, Solved
+
+
+Arrays = TypeVar("Arrays")
+
+
+class Answers(NamedTuple):
+    """What the kernels computed for N poses: how the fingers closed, and the answer."""
+
+    closed: Closed
+    solved: Solved
+
+    def at(self, part: slice) -> Answers:
+        """Return the answers of some poses, as views."""
+        closed, solved = (_rows(arrays, part) for arrays in self)
+        return Answers(closed, solved)
+
+
+#: Chooses an item for every finger at a pose that is closed: the number of the pose, its answers, and the items and
+#: whether links lie inside each other at their start, which it returns.
+Chooser = Callable[[int, Answers], tuple[list[int], bool]]
+
+
+def solve_packed(
+    problem: PackedProblem,
+    T_palm_object: FloatArray,
+    *,
+    choose: Chooser | None = None,
+    threads: int = 1,
+    on_device: bool = False,
+) -> Answers:
+    """Solve for every pose of the object; the answer is the same for any number of threads.
+
+    Args:
+        problem: the rest. T_palm_object: where the object is, shape (N, 3, 4).
+        choose: chooses the items; None leaves the choice to the kernels. threads: how many are used.
+        on_device: fingers close on a CUDA device; the other stages run on the CPU.
+    """
+    from clench.kernels.closing.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
+
+    count = len(T_palm_object)
+    answers = empty_answers(problem, count)
+    if on_device:
+        _close_on_device(problem, T_palm_object, answers.closed)
+    first = BLOCK if on_device else CLOSE | BLOCK
+    # A few more parts than threads, as poses that touch nothing are quick.
+    ends = np.linspace(0, count, (1 if threads == 1 else max(min(count, 4 * threads), 1)) + 1).astype(int).tolist()
+
+    def run(span: tuple[int, int]) -> None:
+        some, T = answers.at(slice(*span)), T_palm_object[slice(*span)]
+        if choose is None:
+            run_stages(problem, T, some, first | CHOOSE | FINISH)
+            return
+        run_stages(problem, T, some, first)
+        for n in range(span[1] - span[0]):
+            items, nested = choose(span[0] + n, some.at(slice(n, n + 1)))
+            some.solved.chosen[n], some.closed.nested[n] = items, nested
+        run_stages(problem, T, some, FINISH)
+
+    share_out(run, pairwise(ends), threads)
+    return answers
+
+
+def close_items(problem: PackedProblem, T_palm_object: FloatArray) -> Closed:
+    """Close the items of a plan at one pose of the object, (3, 4), without the other fingers, and choose nothing."""
+    from clench.kernels.closing.solve_layout import BLOCK, CLOSE
+
+    answers = empty_answers(problem, 1)
+    run_stages(problem, T_palm_object[None], answers, CLOSE | BLOCK)
+    return answers.closed
+
+
+def run_stages(problem: PackedProblem, T_palm_object: FloatArray, answers: Answers, stages: int) -> None:
+    """Run stages for a range of poses, with arenas that grow until they are large enough."""
+    from clench.kernels.closing.solve_poses import solve_poses
+
+    closed = answers.closed
+    closed.overflow[:] = 1
+    while True:
+        with problem.arena() as arena:
+            solve_poses(problem.kept, T_palm_object, arena, closed, answers.solved, stages)
+        wanted = int(closed.overflow.max(initial=0))
+        if not wanted:
+            return
+        problem.capacity.grow(wanted)
+
+
+def _close_on_device(problem: PackedProblem, T_palm_object: FloatArray, closed: Closed) -> None:
+    from clench.kernels.closing.cuda_closing import close_on_device
+
+    while True:
+        with problem.arena() as arena:
+            close_on_device(problem.arrays, T_palm_object, getattr(arena, "content", arena), closed)
+        wanted = int(closed.overflow.max(initial=0))
+        if not wanted:
+            return
+        problem.capacity.grow(wanted)
+
+
+def empty_answers(problem: PackedProblem, count: int) -> Answers:
+    """Return the arrays that a solve of so many poses writes."""
+    from clench.kernels.closing.contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS
+    from clench.kernels.closing.solve_layout import Closed, Solved
+
+    arrays, most = problem.arrays, problem.most_contacts
+    entries, joints = arrays.frames.posture.shape
+    fingers = len(arrays.command.thumb)
+    closed = Closed(
+        free=_closing_arrays(problem, (count, len(arrays.items.entry))),
+        crossed=_whole((count, entries)),
+        blocked=_whole((count, entries)),
+        nested=np.full(count, int(arrays.command.nested), dtype=np.int64),
+        final=_closing_arrays(problem, (count, fingers)),
+        anew=_whole((count, fingers)),
+        overlapping=_whole((count, fingers)),
+        met=_meetings(problem, count),
+        overflow=_whole((count,)),
+    )
+    solved = Solved(
+        angles=np.zeros((count, joints)),
+        status=_whole((count,)),
+        certified=_whole((count,)),
+        fingers=_whole((count, fingers)),
+        chosen=_whole((count, fingers)),
+        contacts=_whole((count, fingers)),
+        number=_whole((count, fingers, most, TOUCH_INTEGERS)),
+        value=np.zeros((count, fingers, most, TOUCH_FLOATS)),
+    )
+    return Answers(closed, solved)
+
+
+def _closing_arrays(problem: PackedProblem, shape: tuple[int, int]) -> ClosingArrays:
+    from clench.kernels.closing.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
+
+    hand, contacts = problem.arrays.hand, problem.most_contacts
+    return ClosingArrays(
+        travel=np.zeros((*shape, len(hand.chain.group_length))),
+        turn=np.zeros((*shape, len(hand.chain.rate))),
+        contacts=_whole(shape),
+        hit=_whole((*shape, contacts, HIT_INTEGERS)),
+        point=np.zeros((*shape, contacts, HIT_FLOATS)),
+        pose=np.zeros((*shape, len(hand.family_pose), 3, 4)),
+        overflow=_whole(shape),
+        overlap=np.full(shape, -1, dtype=np.int64),
+        skipped=_whole(shape),
+    )
+
+
+def _meetings(problem: PackedProblem, count: int) -> Meetings:
+    """Return room for all meetings of links: two links meet once at most."""
+    from clench.kernels.closing.meeting_layout import Meetings
+
+    most = len(problem.arrays.fingers.link) ** 2 // 2
+    return Meetings(_whole((count, 1)), _whole((count, most, 6)), np.zeros((count, most, 8)))
+
+
+def _whole(shape: tuple[int, ...]) -> NDArray[np.int64]:
+    return np.zeros(shape, dtype=np.int64)
+
+
+def _rows(arrays: Any, part: slice | int) -> Any:
+    """Return rows of nested arrays, as views."""
+    columns: list[Any] = [_rows(a, part) if isinstance(a, tuple) else a[part] for a in arrays]
+    return type(arrays)(*columns)
+
+
+def row_of(arrays: Arrays, n: int) -> Arrays:
+    """Return the arrays of one pose, of arrays with the poses first."""
+    row: Arrays = _rows(arrays, n)
+    return row

@@ -1,0 +1,137 @@
+"""Pack what the exact width needs: the hand's links and the object as bodies, and how the links move (section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from clench.closing.collision.packed_object import ROUND_POLYHEDRA, SWEEP_DEVIATION, PackedObject, shape_elements
+from clench.core.keeping import kept_by_identity
+from clench.core.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.shapes import CollisionSource
+
+from .finger_plan import FingerPlan, closing_joints, last_closing_joint
+
+if TYPE_CHECKING:
+    from clench.kernels.geometry.bodies import BodyArrays
+    from clench.kernels.toi.full_width import ExactArrays
+
+_KEPT_HANDS: Final = 16
+
+
+class HandBodies(NamedTuple):
+    """Hold what exact sweeps need of a hand at any posture; L links.
+
+    Args:
+        links: every link that can touch as a body, in its own frame.
+        within: whether a moving link (row) may not overlap a resting one, of the same finger or fixed, (L, L).
+        across: the same, with links of different fingers, (L, L).
+    """
+
+    links: BodyArrays
+    within: np.ndarray
+    across: np.ndarray
+
+
+def hand_bodies(hand: Hand, source: CollisionSource, start: FloatArray | None = None) -> HandBodies:
+    """Return a hand's links as bodies, and which of them may not overlap in a motion from a posture.
+
+    Args:
+        hand: the hand. source: geometry of its links. start: angles of all joints [rad], shape (J,);
+            None is the open posture.
+    """
+    q = hand.open_angles() if start is None else start
+    return _bodies(hand, source, hand.allowed_pairs_from(source, q))
+
+
+@kept_by_identity(_KEPT_HANDS)
+def _bodies(hand: Hand, source: CollisionSource, allowed: tuple[tuple[int, int], ...]) -> HandBodies:
+    across = _across(hand, allowed)
+    return HandBodies(link_bodies(hand, source), _within(hand, across), across)
+
+
+@kept_by_identity(_KEPT_HANDS)
+def link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
+    """Return every link of a hand that can touch as a body, in its own frame; made once per hand and source."""
+    from clench.kernels.geometry.bodies import join_elements, pack_bodies
+
+    solid = set(hand.solid_links)
+    parts = [
+        join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
+        for i, link in enumerate(hand.links)
+    ]
+    return pack_bodies(parts)
+
+
+def _across(hand: Hand, allowed: tuple[tuple[int, int], ...]) -> np.ndarray:
+    checked = np.ones((len(hand.links),) * 2, dtype=np.int64)
+    np.fill_diagonal(checked, 0)
+    for a, b in allowed:
+        checked[a, b] = checked[b, a] = 0
+    return checked
+
+
+def _within(hand: Hand, across: np.ndarray) -> np.ndarray:
+    checked = across.copy()
+    for one in hand.fingers:
+        for other in hand.fingers:
+            if one is not other:
+                checked[np.ix_(one.links, other.links)] = 0
+    return checked
+
+
+def pack_exact(hand: Hand, plans: Sequence[FingerPlan], wanted: Sequence[bool], bodies: HandBodies) -> ExactArrays:
+    """Pack the links of the plans' fingers and how their joints move them; the object is left out.
+
+    Args:
+        hand: the hand. plans: one per entry. wanted: per item. bodies: see `hand_bodies`.
+    """
+    from clench.kernels.geometry.bodies import no_body
+    from clench.kernels.toi.full_width import ExactArrays
+
+    first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
+    movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
+    axes = [_axis(plan, k) for plan in plans for k in range(len(plan.joints))]
+    poses = [hand.link_poses(plan.posture)[:, :3] for plan in plans]
+    rows = [(link, joint, pose[link]) for found, pose in zip(movers, poses, strict=True) for link, joint in found]
+    return ExactArrays(
+        joint_first=first.astype(np.int64),
+        wanted=np.array(wanted, dtype=np.int64),
+        links=bodies.links,
+        object=no_body(),
+        mover_first=np.cumsum([0, *(len(found) for found in movers)]).astype(np.int64),
+        mover_link=np.array([row[0] for row in rows], dtype=np.int64),
+        mover_joint=np.array([row[1] for row in rows], dtype=np.int64),
+        mover_pose=np.array([row[2] for row in rows], dtype=np.float64).reshape(-1, 3, 4),
+        axis=np.array([axis for axis, _ in axes]).reshape(-1, 3),
+        anchor=np.array([anchor for _, anchor in axes]).reshape(-1, 3),
+        link_pose=np.ascontiguousarray(poses),
+        checked=bodies.within,
+    )
+
+
+def _movers(hand: Hand, plan: FingerPlan, first: int) -> list[tuple[int, int]]:
+    """Return the moving links and the last joint before each, numbered from `first`; palm side first."""
+    position = {p.joint: first + k for k, p in enumerate(plan.joints)}
+    moved = last_closing_joint(hand, plan.finger, closing_joints(hand, plan.finger))
+    return sorted(((link, position[joint]) for link, joint in moved.items()), key=lambda row: (row[1], row[0]))
+
+
+def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
+    """Return axis and anchor of a joint in the palm frame at the open posture; a positive turn takes x towards z."""
+    joint = plan.joints[k]
+    family = plan.families[joint.family]
+    return -family.T_palm_family[:3, 1], family.pivot_in_palm(joint.pivot)
+
+
+@kept_by_identity(_KEPT_HANDS)
+def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:
+    """Return how far the surfaces that are swept may lie inside the true ones [m]: 0 but for cylinders, ellipsoids."""
+    shapes = [s for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())]
+    return sum(
+        max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)
+        for sizes in ([(s.kind, s.size) for s in shapes], packed.round_sizes)
+    )

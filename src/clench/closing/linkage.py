@@ -1,0 +1,80 @@
+"""Pack a hand's kinematics and its links' meshes for the kernels; once per hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from clench.core.keeping import kept_by_identity
+from clench.core.pose import FloatArray
+from clench.models.hand.hand import Hand
+
+from .finger_plan import FingerPlan
+
+if TYPE_CHECKING:
+    from clench.kernels.geometry.link_frames import FrameArrays
+
+_KEPT_HANDS: Final = 16
+
+
+def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
+    """Return the kinematics of a hand with the plans of its fingers, one entry each."""
+    return hand_frames(hand)._replace(
+        posture=np.array([plan.posture for plan in plans], dtype=np.float64),
+        group_leader=_whole([leader for plan in plans for leader in plan.leaders]),
+        chain_joint=_whole([p.joint for plan in plans for p in plan.joints]),
+        chain_turn=np.array([p.turn for plan in plans for p in plan.joints], dtype=np.float64),
+    )
+
+
+def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
+    """Return `T_palm_link` of every link at a posture [rad], as the kernels place them, shape (L, 3, 4)."""
+    from clench.kernels.geometry.link_frames import place_links
+
+    poses = np.empty((len(hand.links), 3, 4))
+    place_links(hand_frames(hand), np.ascontiguousarray(q), poses)
+    return poses
+
+
+def placed_postures(hand: Hand, postures: FloatArray) -> FloatArray:
+    """Do as `placed_links` for many postures, shape (N, J) [rad]; returns (N, L, 3, 4)."""
+    from clench.kernels.geometry.link_frames import place_postures
+
+    poses = np.empty((len(postures), len(hand.links), 3, 4))
+    place_postures(hand_frames(hand), postures, poses)
+    return poses
+
+
+@kept_by_identity(_KEPT_HANDS)
+def hand_frames(hand: Hand) -> FrameArrays:
+    """Return the kinematics of a hand without any entry; made once per hand."""
+    from clench.kernels.geometry.link_frames import FrameArrays
+
+    joints, couplings = hand.joints, hand.couplings
+    return FrameArrays(
+        parent=_whole([link.parent for link in hand.links]),
+        joint=_whole([link.joint for link in hand.links]),
+        T_parent_link=np.array([link.T_parent_link[:3] for link in hand.links], dtype=np.float64),
+        axis=np.array([j.axis for j in joints], dtype=np.float64).reshape(-1, 3),
+        anchor=np.array([j.anchor for j in joints], dtype=np.float64).reshape(-1, 3),
+        reference=np.array([j.reference for j in joints], dtype=np.float64),
+        palm=_whole([hand.palm]),
+        direction=np.array([j.direction for j in joints], dtype=np.float64),
+        lower=np.array([j.lower for j in joints], dtype=np.float64),
+        upper=np.array([j.upper for j in joints], dtype=np.float64),
+        leader=_whole([c.leader for c in couplings]),
+        follower=_whole([c.follower for c in couplings]),
+        ratio=np.array([c.ratio for c in couplings], dtype=np.float64),
+        offset=np.array([c.offset for c in couplings], dtype=np.float64),
+        posture=np.empty((0, len(joints))),
+        group_leader=_whole([]),
+        chain_joint=_whole([]),
+        chain_turn=np.empty(0),
+        breakaway=_whole([c.breakaway for c in couplings]),
+    )
+
+
+def _whole(numbers: Sequence[int]) -> np.ndarray:
+    return np.array(numbers, dtype=np.int64)

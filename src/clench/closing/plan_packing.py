@@ -1,0 +1,126 @@
+"""Pack the plans of several fingers into the arrays that the kernels read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clench.core.pose import FloatArray, invert
+
+from .finger_plan import FingerPlan
+from .outlines import RoundedOutline
+
+if TYPE_CHECKING:
+    from clench.kernels.closing.layout import ChainArrays, HandArrays, OutlineArrays
+
+
+def pack_plans(plans: Sequence[FingerPlan]) -> HandArrays:
+    """Pack plans, one entry each, with every index global; see `HandArrays`."""
+    from clench.kernels.closing.layout import HandArrays
+
+    families = [f for plan in plans for f in plan.families]
+    planes = [len(f.offsets) for f in families]
+    rows = [row for f in families for row in f.outlines]
+    return HandArrays(
+        entry_group=_firsts([len(plan.lengths) for plan in plans]),
+        entry_family=_firsts([len(plan.families) for plan in plans]),
+        chain=_chain(plans),
+        outlines=_outlines(plans),
+        family_pose=np.array([pose for plan in plans for pose in _relative_poses(plan)]).reshape(-1, 3, 4),
+        family_plane=_firsts(planes),
+        plane_offset=np.concatenate([f.offsets for f in families]) if families else np.empty(0),
+        family_reach=np.array([f.reach for f in families]),
+        family_length=np.array([plan.length for plan in plans for _ in plan.families]),
+        plane_outline=_firsts([len(row) for row in rows]),
+    )
+
+
+def _firsts(counts: list[int]) -> np.ndarray:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+
+def _relative_poses(plan: FingerPlan) -> list[FloatArray]:
+    """Return the pose of the first family in the palm, and of each other one on the last pivot before it."""
+    poses = []
+    for f, family in enumerate(plan.families):
+        pose = family.T_palm_family
+        if f:
+            before = plan.families[f - 1].T_palm_family.copy()
+            last = [p for p in plan.joints if p.family == f - 1][-1]
+            before[:3, 3] += before[:3, 0] * last.pivot[0] + before[:3, 2] * last.pivot[1]
+            pose = invert(before) @ pose
+        poses.append(pose[:3])
+    return poses
+
+
+def _chain(plans: Sequence[FingerPlan]) -> ChainArrays:
+    from clench.kernels.closing.layout import ChainArrays
+
+    joints, family_first, group_first = [], 0, 0
+    for plan in plans:
+        before = None
+        for p in plan.joints:
+            same = before is not None and before.family == p.family
+            offset = p.pivot - before.pivot if same and before is not None else p.pivot
+            joints.append((p.family + family_first, p.group + group_first, offset, p.rate, p.start, p.stop))
+            before = p
+        family_first += len(plan.families)
+        group_first += len(plan.lengths)
+    return ChainArrays(
+        joint_family=np.array([j[0] for j in joints], dtype=np.int64),
+        joint_group=np.array([j[1] for j in joints], dtype=np.int64),
+        pivot=np.array([j[2] for j in joints]).reshape(-1, 2),
+        rate=np.array([j[3] for j in joints], dtype=np.float64),
+        start=np.array([j[4] for j in joints], dtype=np.float64),
+        stop=np.array([j[5] for j in joints], dtype=np.float64),
+        group_length=np.array([length for plan in plans for length in plan.lengths], dtype=np.float64),
+        speed=np.array([speed for plan in plans for speed in plan.speeds], dtype=np.float64),
+        breaks=np.array([breaks for plan in plans for breaks in plan.breaks], dtype=np.int64),
+    )
+
+
+def _outlines(plans: Sequence[FingerPlan]) -> OutlineArrays:
+    from clench.kernels.closing.layout import OutlineArrays
+
+    joint, link, outlines = [], [], []
+    joint_first = 0
+    for plan in plans:
+        for family in plan.families:
+            for item in (o for row in family.outlines for o in row):
+                joint.append(item.joint + joint_first)
+                link.append(item.link)
+                outlines.append(item.outline)
+        joint_first += len(plan.joints)
+    stadiums = [enclosing(o) for o in outlines]
+    return OutlineArrays(
+        joint=np.array(joint, dtype=np.int64),
+        link=np.array(link, dtype=np.int64),
+        radius=np.array([o.radius for o in outlines], dtype=np.float64),
+        both=np.array([o.both for o in outlines], dtype=np.int64),
+        stadium=np.array(stadiums).reshape(-1, 5),
+        vertex_first=_firsts([len(o.vertices) for o in outlines]),
+        vertex=np.concatenate([o.vertices for o in outlines]) if outlines else np.empty((0, 2)),
+        side_first=_firsts([len(o.sides) for o in outlines]),
+        side=np.concatenate([o.sides for o in outlines]) if outlines else np.empty((0, 5)),
+    )
+
+
+def enclosing(outline: RoundedOutline) -> FloatArray:
+    """Return a stadium that an outline lies in: its two ends and its radius, (5,); the narrowest along a side."""
+    vertices, radius = outline.vertices, outline.radius
+    if len(vertices) == 1 or not len(outline.sides):
+        middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+        return np.array([*middle, *middle, _widened(np.linalg.norm(vertices - middle, axis=1).max(), radius)])
+    across = outline.sides[:, :2] @ vertices.T
+    narrow = np.argmin(np.ptp(across, axis=1))
+    n, d = outline.sides[narrow, :2], across[narrow]
+    along = np.array([-n[1], n[0]])
+    t, middle = vertices @ along, 0.5 * (d.max() + d.min()) * n
+    return np.array([*(middle + t.min() * along), *(middle + t.max() * along), _widened(0.5 * np.ptp(d), radius)])
+
+
+def _widened(reach: float, radius: float) -> float:
+    """Add an outline's radius to how far its vertices get, and what rounding may take away."""
+    return float(reach + radius) * (1.0 + 1e-9)

@@ -1,0 +1,1 @@
+"""The core: errors, poses, tolerances and files, which every layer may use."""

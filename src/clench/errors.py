@@ -1,0 +1,33 @@
+"""The exceptions that clench raises for malformed input."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from clench.core.lazy_names import lazy_names
+
+if TYPE_CHECKING:
+    from clench.core.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
+    from clench.execution.hardware.driver import DriverError
+
+_HOMES = {
+    "ClenchError": "clench.core.errors",
+    "CommandError": "clench.core.errors",
+    "DriverError": "clench.execution.hardware.driver",
+    "FileError": "clench.core.errors",
+    "HandError": "clench.core.errors",
+    "ObjectError": "clench.core.errors",
+    "UnknownNameError": "clench.core.errors",
+}
+
+__all__ = [
+    "ClenchError",
+    "CommandError",
+    "DriverError",
+    "FileError",
+    "HandError",
+    "ObjectError",
+    "UnknownNameError",
+]
+
+__getattr__, __dir__ = lazy_names(__name__, _HOMES)

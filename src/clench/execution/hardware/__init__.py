@@ -1,0 +1,1 @@
+"""Hardware: real hands, driven through a controller, checked and supervised."""

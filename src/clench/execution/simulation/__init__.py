@@ -1,0 +1,1 @@
+"""Simulation: the hand in MuJoCo, the hold test, films."""

@@ -1,0 +1,191 @@
+"""Film a simulation: a moving picture (GIF or MP4) and stills (PNG), on request."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from clench.core.errors import ClenchError, FileError
+from clench.core.files.json_files import check_folder, check_writable, write_atomically
+from clench.core.opengl import import_mujoco, why_not_drawn
+from clench.core.short_repr import short_repr
+
+from .mujoco_scene import Scene
+
+#: Time between two pictures [s]; a GIF counts hundredths.
+FRAME: Final = 0.04
+_WIDTH, _HEIGHT = 640, 480
+_NO_OPENGL: Final = (
+    "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1 and set MUJOCO_GL=egl."
+)
+#: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
+_DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
+#: How much higher it looks where the palm moves up [m].
+_UP: Final = 0.05
+
+
+@dataclass
+class Film:
+    """Take pictures of a simulation and write them.
+
+    Drawing needs OpenGL: without a screen set MUJOCO_GL=egl before anything of MuJoCo is imported.
+
+    Args:
+        video: a GIF or MP4 file, at the speed of the simulation; MP4 needs `clench[video]`.
+        stills: a folder for pictures of the start, the touch, the squeeze and the end.
+    """
+
+    video: Path | None = None
+    stills: Path | None = None
+    _frames: list[Any] = field(default_factory=list, init=False, repr=False)
+    _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _renderer: Any = field(default=None, init=False, repr=False)
+    _camera: Any = field(default=None, init=False, repr=False)
+    _due: float = field(default=0.0, init=False, repr=False)
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be written.
+
+        Raises:
+            FileError: another kind of file than GIF or MP4, one that is a folder, or in none.
+            ClenchError: MP4 without the library that writes it; an OpenGL that cannot be loaded.
+        """
+        if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
+            raise FileError(self.video, "cannot be written: expected a file name that ends with .gif or .mp4.")
+        if self._is_mp4() and importlib.util.find_spec("imageio_ffmpeg") is None:
+            raise ClenchError("MP4 needs imageio-ffmpeg: pip install 'clench[video]', or choose a .gif file.")
+        if self.video is not None:
+            check_writable(self.video)
+        if self.stills is not None:
+            check_folder(self.stills)
+        problem = why_not_drawn() if self.video or self.stills else None
+        if problem is not None:
+            raise ClenchError(_NO_OPENGL.format(problem))
+
+    def begin(self, scene: Scene, data: Any) -> None:
+        """Point the camera at the hand and the object.
+
+        Raises:
+            ClenchError: there is no OpenGL to draw with.
+        """
+        mujoco = import_mujoco()
+        headless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+        if headless and mujoco.GLContext.__module__ == "mujoco.glfw":
+            # The engine's default, unless told otherwise when it was imported: it needs a screen, and ends the program
+            # where there is none.
+            raise ClenchError(_NO_OPENGL.format("there is no screen"))
+        try:
+            self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
+        except Exception as error:  # whatever the graphics library raises
+            raise ClenchError(_NO_OPENGL.format(error)) from None
+        links = [body for body in scene.link_bodies if body >= 0]
+        places = np.vstack([data.xipos[links], *(_corners(scene.model, data, geom) for geom in scene.object_geoms)])
+        self._camera = mujoco.MjvCamera()
+        self._camera.lookat[:] = 0.5 * (places.min(axis=0) + places.max(axis=0))
+        self._camera.distance = _DISTANCE * max(float(np.ptp(places, axis=0).max()), 0.1)
+        if scene.lift >= 0:
+            self._camera.lookat[2] += _UP
+            self._camera.distance += 2.0 * _UP
+        self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
+        self._frames, self._kept, self._due = [], {}, float(data.time)
+        self.still("start", data)
+
+    def look(self, data: Any) -> None:
+        """Take a picture when one is due."""
+        if self.video is not None and data.time >= self._due - 1e-9:
+            self._frames.append(self._drawn(data))
+            self._due += FRAME
+
+    def go_on(self, data: Any) -> None:
+        """Go on from a state that may be earlier than the last picture."""
+        self._due = float(data.time)
+
+    def still(self, name: str, data: Any) -> None:
+        """Keep a picture."""
+        if self.stills is not None:
+            self._kept[name] = self._drawn(data)
+
+    def finish(self) -> tuple[Path, ...]:
+        """Write what was taken; return the files.
+
+        Raises:
+            FileError: a file cannot be written.
+        """
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+        written = []
+        if self.video is not None and self._frames:
+            film = (_mp4 if self._is_mp4() else _gif)(self._frames)
+            written.append(_written(self.video, film))
+        for number, (name, picture) in enumerate(self._kept.items(), start=1):
+            assert self.stills is not None
+            content = io.BytesIO()
+            picture.save(content, "PNG")
+            written.append(_written(self.stills / f"{number}_{name}.png", content.getvalue()))
+        return tuple(written)
+
+    def _is_mp4(self) -> bool:
+        return self.video is not None and self.video.suffix.lower() == ".mp4"
+
+    def _drawn(self, data: Any) -> Any:
+        from PIL import Image
+
+        self._renderer.update_scene(data, self._camera)
+        return Image.fromarray(self._renderer.render())
+
+
+def _corners(model: Any, data: Any, geom: int) -> Any:
+    """Return the corners of the box around a geom in the world [m], shape (8, 3)."""
+    center, half = model.geom_aabb[geom].reshape(2, 3)
+    signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+    return data.geom_xpos[geom] + (center + signs * half) @ data.geom_xmat[geom].reshape(3, 3).T
+
+
+def _gif(frames: list[Any]) -> bytes:
+    first, *others = frames
+    content = io.BytesIO()
+    first.save(content, "GIF", save_all=True, append_images=others, duration=round(FRAME * 1000), loop=0, optimize=True)
+    return content.getvalue()
+
+
+def _mp4(frames: list[Any]) -> bytes:
+    """Return H.264 that browsers play, the same bytes for the same pictures.
+
+    Raises:
+        ClenchError: ffmpeg cannot be run.
+    """
+    import imageio_ffmpeg
+
+    same = ["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart"]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        try:
+            writer = imageio_ffmpeg.write_frames(str(path), frames[0].size, fps=1.0 / FRAME, output_params=same)
+            writer.send(None)
+            for frame in frames:
+                writer.send(frame.tobytes())
+            writer.close()
+            return path.read_bytes()
+        except (OSError, RuntimeError) as error:
+            why = (str(error).strip() or type(error).__name__).splitlines()[-1]
+            raise ClenchError(f"No video: ffmpeg could not write it ({why.rstrip('.')}).") from None
+
+
+def _written(path: Path, content: bytes) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(path.parent, f"cannot be made a folder ({error.strerror or error}).") from None
+    write_atomically(path, content)
+    return path

@@ -1,0 +1,321 @@
+"""A simulated hand (MuJoCo): opens, closes to the computed angles, and tells what it reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from clench.core.argument_types import check_type
+from clench.core.pose import FloatArray, Pose
+from clench.core.short_repr import described
+from clench.execution.hardware.joint_blocking import simulated_blocker
+from clench.execution.history import ExecutionHistory
+from clench.execution.report import (
+    ContactReached,
+    ExecutionReport,
+    JointReached,
+    NextStepReached,
+    judge_steps,
+    notes_on_steps,
+)
+from clench.execution.trajectory import Trajectory
+from clench.execution.trajectory_checks import check_for_hand
+from clench.models.hand.hand import Hand
+from clench.models.objects.grasp_object import GraspObject
+from clench.solver.preshapes.named_angles import posture
+from clench.solver.solution import Contact, FingerStatus, GraspSolution
+
+from .filming import Film
+from .hold import Hold, HoldReport
+from .mujoco_scene import TIMESTEP, Scene, body_pose, build_scene
+from .piece_hold import hold_as_collided
+from .simulated_actuators import Drive, check_drive, sentences
+from .stepping import Stepper
+from .touch_watch import TouchWatch
+
+#: How long the hand stands still after the motion [s], so that the servos settle.
+SETTLING = 0.4
+#: How often the posture is noted [s].
+WATCH_INTERVAL = 0.02
+
+
+class SimulatedHand:
+    """Move a hand in simulation, with the palm fixed and the object held in place.
+
+    The simulated object is made of convex pieces and its contacts are a little soft, so angles and contacts are reached
+    up to tolerances, which the report names.
+
+    Args:
+        hand: the hand.
+        obj: the object; the solution says where it is.
+        angle_tolerance: largest difference to the computed angles that counts as reached [rad].
+        contact_tolerance: largest distance that counts as touching [m].
+        show_progress: show a bar while convex pieces are computed.
+        hold: once the touch is reached, do it again with a free object, squeeze it as planned, and pull or lift it;
+            without it the object stays where it is.
+        drive: what moves its joints, in the hold test, too: "servo" or "model", see `Drive`.
+        film: takes pictures: of the hold test where there is one, else of closing.
+        on_step: called with time [s], joint angles [rad] in model order, shape (J,), every 20 ms and at the end.
+    """
+
+    name = "simulated"
+
+    def __init__(
+        self,
+        hand: Hand,
+        obj: GraspObject,
+        *,
+        angle_tolerance: float = 0.02,
+        contact_tolerance: float = 0.001,
+        show_progress: bool = False,
+        hold: Hold | None = None,
+        drive: Drive | str = Drive.SERVO,
+        film: Film | None = None,
+        on_step: Callable[[float, FloatArray], None] | None = None,
+    ) -> None:
+        check_type(hand, Hand, "hand")
+        check_type(obj, GraspObject, "obj")
+        self._hand = hand
+        self.obj = obj
+        self.angle_tolerance = angle_tolerance
+        self.contact_tolerance = contact_tolerance
+        self.show_progress = show_progress
+        self.hold = hold
+        self.drive = check_drive(drive)
+        self.film = film
+        self.on_step = on_step
+
+    def __repr__(self) -> str:
+        return described(self, hand=self.hand.name, obj=self.obj.name, hold=self.hold, drive=self.drive)
+
+    @property
+    def hand(self) -> Hand:
+        """The hand that it moves."""
+        return self._hand
+
+    def execute(self, solution: GraspSolution, trajectory: Trajectory) -> ExecutionReport:
+        """Open, follow the trajectory, stand still for a moment, compare with the solution; test the hold if asked.
+
+        Raises:
+            HandError: the hand cannot be simulated. ObjectError: the object cannot. CommandError: the solution or
+                the trajectory does not fit the hand.
+        """
+        check_for_hand(trajectory, solution, self.hand)
+        computed = posture(solution.joint_angles, self.hand, "joint_angles")
+        obj = self.obj.posed(solution.object_pose)
+        start = trajectory.positions[0]
+        scene = build_scene(
+            self.hand, obj, solution.hand_pose, start, drive=self.drive, show_progress=self.show_progress
+        )
+        watch = TouchWatch(scene, self.hand, self.film if self.hold is None else None)
+        samples = _Samples(scene, trajectory.joints, self.on_step)
+        data = self._run(scene, trajectory, watch, samples)
+        reached = np.array(data.qpos[scene.qpos])
+        joints = {
+            name: JointReached(float(c), float(r))
+            for name, c, r in zip(self.hand.joint_names, computed, reached, strict=True)
+        }
+        T_palm_link = self.hand.link_poses(computed)
+        contacts = tuple(
+            self._contact(scene, data, c, solution.hand_pose, T_palm_link) for c in solution.contacts if not c.passed
+        )
+        touched = tuple(
+            link.name
+            for i, link in enumerate(self.hand.links)
+            if nearest(scene, data, i, self.contact_tolerance)[0] <= self.contact_tolerance
+        )
+        error = float(np.abs(reached - computed).max(initial=0.0))
+        success, reason = self._judge(solution, joints, contacts, partial(simulated_blocker, scene, data, self.hand))
+        held: HoldReport | None = None
+        steps: tuple[NextStepReached, ...] = ()
+        if success and self.hold is not None:
+            held, steps = self._held(solution, obj, trajectory, self.hold)
+            success, reason = held.held, f"{reason} {held.reason}"
+        elif success and solution.next_steps:
+            stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
+            steps = stepper.in_place(scene, data, trajectory.positions[-1], watch.film, samples.look)
+        samples.end(data)
+        if success:
+            success, reason = judge_steps(success, reason, steps)
+        return ExecutionReport(
+            actuator=self.name,
+            success=success,
+            reason=reason,
+            joints=joints,
+            contacts=contacts,
+            touched_links=touched,
+            first_touch=watch.first,
+            duration=float(data.time),
+            largest_angle_error=error,
+            angle_tolerance=self.angle_tolerance,
+            contact_tolerance=self.contact_tolerance,
+            notes=(
+                *_notes(scene, solution),
+                *sentences(scene.drives.driven, self.drive),
+                *self._notes_on_hold(held),
+                *notes_on_steps(solution, steps),
+            ),
+            driven_by=scene.drives.driven.by,
+            history=samples.history(),
+            hold=held,
+            next_steps=steps,
+        )
+
+    def _held(
+        self, solution: GraspSolution, obj: GraspObject, trajectory: Trajectory, hold: Hold
+    ) -> tuple[HoldReport, tuple[NextStepReached, ...]]:
+        steps: list[NextStepReached] = []
+        stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
+        report = hold_as_collided(
+            solution,
+            self.hand,
+            obj,
+            hold,
+            trajectory,
+            drive=self.drive,
+            film=self.film,
+            show_progress=self.show_progress,
+            then=lambda held: steps.extend(stepper.after_hold(held, hold, self.film)),
+        )
+        return report, tuple(steps)
+
+    def _notes_on_hold(self, held: HoldReport | None) -> tuple[str, ...]:
+        if self.hold is None:
+            return ()
+        if held is None:
+            return ("Holding was not tested: the touch was not reached.",)
+        notes = ["Angles and contacts are of a run with the object held in place; for the hold test it was free."]
+        if not held.pulls:
+            notes = ["Angles and contacts are of a run with the object held in place, alone."]
+            notes += ["There are no pictures: the hold test was not carried out."] * (self.film is not None)
+        if not held.planned:
+            notes.append(f"The squeeze is not one that holds: {held.plan}")
+        return tuple(notes)
+
+    def _run(self, scene: Scene, trajectory: Trajectory, watch: TouchWatch, samples: _Samples) -> Any:
+        """Simulate the motion to the touch; return the state there."""
+        import mujoco
+
+        data = mujoco.MjData(scene.model)
+        data.qpos[scene.qpos] = trajectory.positions[0]
+        data.ctrl[:] = scene.drives.command(trajectory.positions[0])
+        mujoco.mj_forward(scene.model, data)
+        if watch.film is not None:
+            watch.film.begin(scene, data)
+        for _ in range(int(np.ceil((trajectory.duration + SETTLING) / TIMESTEP)) + 1):
+            told = trajectory.at(data.time)
+            samples.look(data, told)
+            data.ctrl[:] = scene.drives.command(told)
+            mujoco.mj_step(scene.model, data)
+            watch.look(data)
+        mujoco.mj_forward(scene.model, data)
+        watch.look(data)
+        watch.still("touch", data)
+        return data
+
+    def _contact(
+        self, scene: Scene, data: Any, contact: Contact, hand_pose: Pose, T_palm_link: FloatArray
+    ) -> ContactReached:
+        link = self.hand.link_index(contact.link)
+        gap, position = nearest(scene, data, link, np.inf)
+        T_world_computed = hand_pose.matrix @ T_palm_link[link]
+        p_link = np.linalg.inv(T_world_computed) @ np.append(contact.position, 1.0)
+        moved = (body_pose(data, scene.link_bodies[link]) @ p_link)[:3]
+        return ContactReached(
+            finger=contact.finger,
+            link=contact.link,
+            computed=np.array(contact.position),
+            position=position,
+            gap=gap,
+            displacement=float(np.linalg.norm(moved - contact.position)),
+            touches=gap <= self.contact_tolerance,
+        )
+
+    def _judge(
+        self,
+        solution: GraspSolution,
+        joints: dict[str, JointReached],
+        contacts: tuple[ContactReached, ...],
+        blocker: Callable[[str], str],
+    ) -> tuple[bool, str]:
+        touching = {c.finger for c in contacts if c.touches}
+        wanted = [n for n, f in solution.fingers.items() if f.status is FingerStatus.TOUCH]
+        absent = [name for name in wanted if name not in touching]
+        worst = max(joints, key=lambda name: abs(joints[name].error))
+        error = abs(joints[worst].error)
+        if error > self.angle_tolerance:
+            far = f"joint '{worst}' is {error:.3g} rad from its computed angle"
+            return False, f"Not reached: {far}; tolerance {self.angle_tolerance:g} rad. {blocker(worst)}".rstrip()
+        if absent:
+            return False, f"Finger '{absent[0]}' does not touch; tolerance {self.contact_tolerance:g} m."
+        return True, f"Every joint is within {error:.2g} rad of its computed angle, and {len(wanted)} fingers touch."
+
+
+@dataclass
+class _Samples:
+    """Note what was told and measured every `WATCH_INTERVAL`, and show it to whoever watches."""
+
+    scene: Scene
+    joints: tuple[str, ...]
+    on_step: Callable[[float, FloatArray], None] | None
+    times: list[float] = field(default_factory=list)
+    told: list[FloatArray] = field(default_factory=list)
+    measured: list[FloatArray] = field(default_factory=list)
+    steps: int = 0
+
+    def look(self, data: Any, told: FloatArray) -> None:
+        """Note the state when it is time to."""
+        if self.steps % round(WATCH_INTERVAL / TIMESTEP) == 0:
+            self.end(data)
+            self.times.append(float(data.time))
+            self.told.append(told)
+            self.measured.append(np.array(data.qpos[self.scene.qpos]))
+        self.steps += 1
+
+    def end(self, data: Any) -> None:
+        """Show the state."""
+        if self.on_step is not None:
+            self.on_step(float(data.time), np.array(data.qpos[self.scene.qpos]))
+
+    def history(self) -> ExecutionHistory:
+        """Return what was noted."""
+        return ExecutionHistory(self.joints, np.array(self.times), np.array(self.told), np.array(self.measured))
+
+
+def nearest(scene: Scene, data: Any, link: int, within: float) -> tuple[float, FloatArray]:
+    """Return the distance of a link to the object [m], negative for overlap, and the place [m], shape (3,).
+
+    The distance is infinite when the link has no geometry or is farther away than `within` [m].
+    """
+    import mujoco
+
+    model, best, place = scene.model, np.inf, np.zeros(3)
+    ends = np.zeros(6)
+    others = np.array(scene.object_geoms, dtype=np.int64)
+    for geom in scene.link_geoms[link]:
+        apart = np.linalg.norm(data.geom_xpos[others] - data.geom_xpos[geom], axis=1)
+        bound = apart - model.geom_rbound[others] - model.geom_rbound[geom]
+        for k in np.argsort(bound):
+            reach = min(best, within)
+            if bound[k] > reach:
+                break
+            distance = mujoco.mj_geomDistance(model, data, geom, int(others[k]), min(reach, 10.0) + 1e-6, ends)
+            if distance < min(best, within + 1e-6):
+                best, place = float(distance), (ends[:3] + ends[3:]) / 2.0
+    return best, place
+
+
+def _notes(scene: Scene, solution: GraspSolution) -> tuple[str, ...]:
+    notes = ["Contacts in the simulation are a little soft: links may overlap the object by some micrometres."]
+    if scene.approximated:
+        names = ", ".join(f"'{name}'" for name in scene.approximated)
+        notes.append(f"The simulated shape of {names} is made of convex pieces, which are near the true surface only.")
+    if solution.collision_source != "engine":
+        notes.append(
+            f"The solution is for the hand's '{solution.collision_source}' geometry, the simulation collides 'engine'."
+        )
+    return tuple(notes)

@@ -1,1 +1,0 @@
-"""The method, one file per step: planes, sections, contacts, candidates, feasibility, choice."""

@@ -1,0 +1,1 @@
+"""Closing: one finger, all fingers, and the one entry of every solve."""

@@ -1,0 +1,138 @@
+"""Planes between the convex hulls of two bodies, found through the points that lie farthest along a direction."""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.geometry.core_distance import separation
+from clench.kernels.geometry.obb import slab_top
+from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.toi.toi_work import SweepWork
+
+from .layout import Floats, Ints
+
+#: Directions that are tried at most.
+TRIES = 16
+#: A plane is good enough when it keeps this share of the hulls' distance apart [-].
+GOOD = 0.9
+#: Hulls nearer than this are not kept apart [m].
+TOUCHING = 1e-12
+
+
+@inner_kernel
+def farthest_point(
+    bodies: BodyArrays, m: int, T: Floats, nx: float, ny: float, nz: float, stack: Ints
+) -> tuple[float, float, float, float]:
+    """Return how far a body reaches along a unit vector, and a point of it there, both in the frame of its pose."""
+    x, y, z = (
+        T[0, 0] * nx + T[1, 0] * ny + T[2, 0] * nz,
+        T[0, 1] * nx + T[1, 1] * ny + T[2, 1] * nz,
+        T[0, 2] * nx + T[1, 2] * ny + T[2, 2] * nz,
+    )
+    best, found, w = -math.inf, 0, 0.0
+    stack[0, 0], waiting = bodies.root[m], 1
+    while waiting > 0:
+        waiting -= 1
+        n = stack[waiting, 0]
+        if bodies.count[n] == 0:
+            one, other = n + 1, bodies.right[n]
+            top, second = slab_top(bodies.slab[one], x, y, z), slab_top(bodies.slab[other], x, y, z)
+            if top > second:
+                one, other, top, second = other, one, second, top
+            # The one that reaches farther is looked at next.
+            if top > best:
+                stack[waiting, 0] = one
+                waiting += 1
+            if second > best:
+                stack[waiting, 0] = other
+                waiting += 1
+            continue
+        for e in range(bodies.first[n], bodies.first[n] + bodies.count[n]):
+            for k in range(bodies.corners[e]):
+                v = bodies.elements[e, k]
+                p = bodies.vertices[v]
+                top = x * p[0] + y * p[1] + z * p[2] + bodies.radius[e]
+                if top > best:
+                    best, found, w = top, v, bodies.radius[e]
+    p = bodies.vertices[found]
+    px, py, pz = p[0] + w * x, p[1] + w * y, p[2] + w * z
+    return (
+        best + nx * T[0, 3] + ny * T[1, 3] + nz * T[2, 3],
+        T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3],
+        T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz + T[1, 3],
+        T[2, 0] * px + T[2, 1] * py + T[2, 2] * pz + T[2, 3],
+    )
+
+
+@inner_kernel
+def plane_between(bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: float, sweep: SweepWork) -> float:
+    """Return how far body `m` lies beyond body `r` along a unit vector [m]; their poses are in `sweep`.
+
+    The difference of the two points there is left in the last row of `sweep.placed`.
+    """
+    low, ax, ay, az = farthest_point(bodies, m, sweep.moving, -nx, -ny, -nz, sweep.stack)
+    top, bx, by, bz = farthest_point(bodies, r, sweep.resting, nx, ny, nz, sweep.stack)
+    sweep.placed[7, 0], sweep.placed[7, 1], sweep.placed[7, 2] = ax - bx, ay - by, az - bz
+    return -low - top
+
+
+@inner_kernel
+def nearest_with(k: int, corners: int, sweep: SweepWork) -> tuple[float, float, float, float]:
+    """Return distance and direction from the origin to the first rows of `sweep.placed`, with the last for row `k`."""
+    core, placed = sweep.core, sweep.placed
+    for c in range(3):
+        sweep.fixed[0, c] = 0.0
+        for i in range(corners):
+            core[i, c] = placed[7 if i == k else i, c]
+    d, nx, ny, nz, _, _, _, _, _ = separation(core, corners, sweep.fixed, 1)
+    return d, nx, ny, nz
+
+
+@inner_kernel
+def take_corner(size: int, sweep: SweepWork) -> tuple[int, float, float, float, float]:
+    """Take the last row of `sweep.placed` into the triangle of its first rows, so that it lies nearest to the origin.
+
+    Args:
+        size: corners of the triangle so far; the last row takes the place of one of three.
+
+    Returns:
+        corners of the triangle, its distance from the origin and the direction to it.
+    """
+    placed, k, corners = sweep.placed, size, size + 1
+    if size < 3:
+        d, x, y, z = nearest_with(size, corners, sweep)
+    else:
+        corners, d, x, y, z = 3, math.inf, 0.0, 0.0, 0.0
+        for i in range(3):
+            found, nx, ny, nz = nearest_with(i, 3, sweep)
+            if found < d:
+                k, d, x, y, z = i, found, nx, ny, nz
+    if k < 3:
+        for c in range(3):
+            placed[k, c] = placed[7, c]
+    return corners, d, x, y, z
+
+
+@inner_kernel
+def find_plane(
+    bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: float, sweep: SweepWork
+) -> tuple[float, float, float, float]:
+    """Return how far a plane keeps two bodies apart, and its unit normal, from body `r` to `m`.
+
+    The first direction that is tried is given; those that follow lead to the triangle, among differences of points of
+    the two hulls, that is nearest to the origin (Gilbert, Johnson and Keerthi). Where hulls overlap, what is returned
+    is not positive.
+    """
+    best, bx, by, bz = -math.inf, nx, ny, nz
+    size, away = 0, math.inf
+    for _ in range(TRIES):
+        margin = plane_between(bodies, m, r, nx, ny, nz, sweep)
+        if margin > best:
+            best, bx, by, bz = margin, nx, ny, nz
+        if best >= GOOD * away:
+            break
+        size, away, nx, ny, nz = take_corner(size, sweep)
+        if away <= TOUCHING:
+            break
+    return best, bx, by, bz

@@ -1,0 +1,139 @@
+"""Close the chosen items again, one finger after another, each with the others in its way (section 5)."""
+
+from __future__ import annotations
+
+from clench.kernels.geometry.link_frames import put_links
+from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.toi.full_width import ExactArrays
+
+from .bundles import among, clear_answer, with_lengths
+from .close_item import close_item
+from .layout import SUNK, ClosingArrays, Floats, HandArrays, Ints
+from .picking import put_item_angles, take_joints
+from .solve_layout import ProblemArrays, Workspace
+
+
+@inner_allocating_kernel
+def close_in_turn(
+    problem: ProblemArrays,
+    T_palm_object: Floats,
+    space: Workspace,
+    final: ClosingArrays,
+    blocked: Ints,
+    anew: Ints,
+) -> int:
+    """Close fingers anew that meet another one, each with the earlier ones where they are by then.
+
+    A finger's set stands once the sets before it do. Sets of a single plane, and those of fingers that overlap the
+    object before they move, stay as they are.
+
+    Args:
+        final: answers of the picked items, which are overwritten. blocked: see `Closed`. anew: written where a finger
+            closes anew, (F,).
+
+    Returns:
+        the capacity of the arenas that is wanted, or 0.
+    """
+    hand, target, nothing, command = problem.hand, problem.target, problem.nothing, problem.command
+    first = 0
+    while True:
+        place_fingers(problem, space, final)
+        others = among(problem.exact, space.swept, nothing.bodies, space.placed, problem.apart)
+        f = first_meeting(
+            problem, with_lengths(hand, space.length), others, T_palm_object, space, final, blocked, first
+        )
+        if f < 0:
+            return 0
+        shared = space.arena.shared
+        everything = among(problem.exact, space.swept, target.bodies, space.placed, problem.across)
+        clear_answer(final, f)
+        close_item(
+            hand,
+            everything,
+            target,
+            T_palm_object,
+            shared,
+            space.arena.own,
+            space.picked,
+            f,
+            command.times,
+            False,
+            space.work,
+            space.sweep,
+            final,
+        )
+        if final.overflow[f] > 0:
+            return int(final.overflow[f])
+        anew[f], first = 1, f + 1
+
+
+@inner_kernel
+def place_fingers(problem: ProblemArrays, space: Workspace, final: ClosingArrays) -> None:
+    """Write where all links are when a finger begins to close, those before it closed already, and how far all go."""
+    command, frames, q, angles = problem.command, problem.frames, space.q, space.angles
+    for j in range(q.shape[0]):
+        q[j] = command.start[j]
+    for f in range(final.contacts.shape[0]):
+        entry = space.picked.entry[f]
+        for j in range(q.shape[0]):
+            angles[j] = q[j]
+        for k in range(command.joints.shape[1]):
+            if command.joints[entry, k] >= 0:
+                angles[command.joints[entry, k]] = frames.posture[entry, command.joints[entry, k]]
+        put_links(frames, angles, space.poses, space.placed[entry])
+        for g in range(problem.hand.entry_group[entry], problem.hand.entry_group[entry + 1]):
+            space.length[g] = final.travel[f, g]
+        put_item_angles(problem, entry, final.travel[f], final.turn[f], angles)
+        take_joints(command, entry, angles, q)
+
+
+@inner_kernel
+def first_meeting(
+    problem: ProblemArrays,
+    hand: HandArrays,
+    exact: ExactArrays,
+    T_palm_object: Floats,
+    space: Workspace,
+    final: ClosingArrays,
+    blocked: Ints,
+    first: int,
+) -> int:
+    """Return the first finger from `first` on that meets another finger's links on the path to its set, or -1.
+
+    Fingers that close in several rounds, or whose joints break away, do not follow one path: they always close again.
+    """
+    nothing, spare, picked = problem.nothing, space.spare, space.picked
+    for f in range(first, picked.entry.shape[0]):
+        entry = picked.entry[f]
+        if blocked[entry] or not space.swept[f] or final.overlap[f] <= SUNK:
+            continue
+        if problem.command.times > 1 or breaks_away(hand, entry):
+            return f
+        clear_answer(spare, f)
+        close_item(
+            hand,
+            exact,
+            nothing,
+            T_palm_object,
+            space.arena.no_shared,
+            space.arena.no_own,
+            picked,
+            f,
+            1,
+            False,
+            space.work,
+            space.sweep,
+            spare,
+        )
+        if spare.contacts[f] > 0 or spare.skipped[f] > 0:
+            return f
+    return -1
+
+
+@inner_kernel
+def breaks_away(hand: HandArrays, entry: int) -> bool:
+    """Say whether joints of an entry go on when those before them are blocked."""
+    breaks = False
+    for g in range(hand.entry_group[entry], hand.entry_group[entry + 1]):
+        breaks = breaks or hand.chain.breaks[g] != 0
+    return breaks

@@ -1,0 +1,229 @@
+"""How far two links go on that are near each other: their nearest elements, and planes between elements."""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.geometry.core_distance import separation
+from clench.kernels.geometry.vectors import Vector
+from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.toi.core_motion import plane_gap
+from clench.kernels.toi.full_width import ExactArrays
+from clench.kernels.toi.separating_planes import span
+from clench.kernels.toi.toi_work import (
+    SweepWork,
+    ball_gap,
+    is_wider,
+    push_roots,
+    put_core,
+    put_nearest_last,
+    split_pair,
+)
+
+from .finger_motion import approach_along, next_change, place_link, speed_of
+from .layout import Ints
+from .meeting_layout import FingerLinks, MeetingWork
+
+#: Gap at which links meet [m].
+TOUCH = 1e-11
+#: How many lengths of a step are tried with one plane.
+LENGTHS = 4
+#: Elements count on a step that are nearer than so many times the gap of their links [-].
+AROUND = 8.0
+#: A direction along which links approach each other by less than this share of their speed counts as that [-].
+FLAT = 1e-2
+
+
+@inner_kernel
+def put_sides(n: Vector, sweep: SweepWork) -> None:
+    """Write a unit vector in the frames of two bodies, and where these are along it, to `sweep.plane`."""
+    plane = sweep.plane
+    for c in range(3):
+        plane[c] = n[0] * sweep.moving[0, c] + n[1] * sweep.moving[1, c] + n[2] * sweep.moving[2, c]
+        plane[4 + c] = n[0] * sweep.resting[0, c] + n[1] * sweep.resting[1, c] + n[2] * sweep.resting[2, c]
+    plane[3] = n[0] * sweep.moving[0, 3] + n[1] * sweep.moving[1, 3] + n[2] * sweep.moving[2, 3]
+    plane[7] = n[0] * sweep.resting[0, 3] + n[1] * sweep.resting[1, 3] + n[2] * sweep.resting[2, 3]
+
+
+@inner_kernel
+def are_apart(links: BodyArrays, a: int, b: int, gap: float, along: float, sweep: SweepWork) -> bool:
+    """Say whether two items are that far apart, as balls tell, or so far along the vector of `put_sides`."""
+    if ball_gap(links, a, links, b, sweep) >= gap:
+        return True
+    plane = sweep.plane
+    low = span(links, a, plane[0], plane[1], plane[2])[0] + plane[3]
+    return bool(low - span(links, b, plane[4], plane[5], plane[6])[1] - plane[7] >= along)
+
+
+@inner_kernel
+def elements_gap(links: BodyArrays, i: int, k: int, sweep: SweepWork) -> tuple[float, Vector, Vector]:
+    """Return the gap of two elements, the direction to the first and the closest point of the second."""
+    put_core(links, i, sweep.moving, sweep.core)
+    put_core(links, k, sweep.resting, sweep.fixed)
+    d, nx, ny, nz, _, _, x, y, z = separation(sweep.core, links.corners[i], sweep.fixed, links.corners[k])
+    w = links.radius[k]
+    return d - w - links.radius[i], (nx, ny, nz), (x + w * nx, y + w * ny, z + w * nz)
+
+
+@inner_kernel
+def links_gap(links: BodyArrays, m: int, r: int, bound: float, n: Vector, near: Ints, sweep: SweepWork) -> float:
+    """Return the gap of two links below a bound, else the bound; their poses are in `sweep`.
+
+    Args:
+        n: a direction along which most of their parts lie apart.
+        near: two elements that are near each other, or -1; those that are nearest are written.
+    """
+    stack, best = sweep.stack, bound
+    if near[0] >= 0:
+        gap, there, _ = elements_gap(links, near[0], near[1], sweep)
+        if gap < best:
+            best, n = gap, there
+    put_sides(n, sweep)
+    waiting = push_roots(links, m, links, r, stack)
+    while waiting > 0:
+        waiting -= 1
+        a, b = stack[waiting, 0], stack[waiting, 1]
+        if are_apart(links, a, b, best, best, sweep):
+            continue
+        if a < 0 and b < 0:
+            gap, n, _ = elements_gap(links, -1 - a, -1 - b, sweep)
+            if gap < best:
+                best, near[0], near[1] = gap, -1 - a, -1 - b
+                put_sides(n, sweep)
+            continue
+        height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
+        put_nearest_last(links, links, stack, waiting, height, sweep)
+        waiting = height
+    return best
+
+
+@inner_kernel
+def lowest_on(step: float, margin: float, left: float, bend: float) -> float:
+    """Return a bound from below on how far two parts are apart along a direction anywhere on a step.
+
+    Args:
+        margin, left: how far they are where it begins and ends. bend: how fast the rate may change at which that
+            changes. The lowest curve through both ends is a parabola.
+    """
+    if bend <= 0.0:
+        return min(margin, left)
+    low = 0.5 * step - (left - margin) / (bend * step)
+    if low <= 0.0 or low >= step:
+        return min(margin, left)
+    return margin - 0.5 * bend * low * low
+
+
+@inner_kernel
+def shorter_step(step: float, margin: float, left: float, bend: float) -> float:
+    """Return a step that may be safe where a longer one is not; see `lowest_on`."""
+    slope = max((margin - left) / step, 0.0)
+    shorter = 2.0 * margin / (slope + math.sqrt(slope * slope + 0.5 * bend * margin))
+    return min(0.999 * shorter, 0.7 * step)
+
+
+@inner_kernel
+def step_by_elements(
+    exact: ExactArrays,
+    fingers: FingerLinks,
+    entries: tuple[int, int],
+    rows: tuple[int, int],
+    gap: float,
+    n: Vector,
+    near: Ints,
+    at: float,
+    end: float,
+    room: MeetingWork,
+    sweep: SweepWork,
+) -> float:
+    """Return how far two links go on from a place of the motion, as planes between their elements tell.
+
+    Elements that are farther apart than links approach each other on the step do not count.
+
+    Args:
+        entries, rows: of the links, which stand in `sweep`. gap: of the links [m].
+        n, near: unit vector between their nearest elements, and these. at: the place. end: of their motion.
+    """
+    links, stack = exact.links, sweep.stack
+    until = next_change(exact, fingers, entries[0], rows[0], at, end, room)
+    until = next_change(exact, fingers, entries[1], rows[1], at, until, room)
+    speed = speed_of(exact, fingers, entries[0], rows[0], at, room)
+    speed += speed_of(exact, fingers, entries[1], rows[1], at, room)
+    _, across, _ = approach_along(exact, fingers, entries, rows, n, at, until, room)
+    least = gap / speed
+    step = min(until - at, AROUND * gap / max(across, FLAT * speed))
+    if step <= least:
+        return least
+    put_ahead(exact, fingers, entries, rows, at + step, room)
+    # The nearest elements tell most.
+    step = step_of_elements(exact, fingers, entries, rows, near[0], near[1], at, until, step, room, sweep)
+    put_sides(n, sweep)
+    waiting = push_roots(links, fingers.link[rows[0]], links, fingers.link[rows[1]], stack)
+    while waiting > 0 and step > least:
+        waiting -= 1
+        a, b = stack[waiting, 0], stack[waiting, 1]
+        if are_apart(links, a, b, speed * step, across * step, sweep):
+            continue
+        if a < 0 and b < 0:
+            step = step_of_elements(exact, fingers, entries, rows, -1 - a, -1 - b, at, until, step, room, sweep)
+            continue
+        height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
+        put_nearest_last(links, links, stack, waiting, height, sweep)
+        waiting = height
+    return max(step, least)
+
+
+@inner_kernel
+def put_ahead(
+    exact: ExactArrays,
+    fingers: FingerLinks,
+    entries: tuple[int, int],
+    rows: tuple[int, int],
+    at: float,
+    room: MeetingWork,
+) -> None:
+    """Write the poses of two links at a place of the motion to `room.ahead`."""
+    place_link(exact, fingers, entries[0], rows[0], at, room, room.ahead[0])
+    place_link(exact, fingers, entries[1], rows[1], at, room, room.ahead[1])
+
+
+@inner_kernel
+def step_of_elements(
+    exact: ExactArrays,
+    fingers: FingerLinks,
+    entries: tuple[int, int],
+    rows: tuple[int, int],
+    i: int,
+    k: int,
+    at: float,
+    until: float,
+    step: float,
+    room: MeetingWork,
+    sweep: SweepWork,
+) -> float:
+    """Return how far of a step, to which `room.ahead` belongs, a plane is seen to keep two elements apart.
+
+    Args:
+        i, k: the elements. until: up to where every joint turns evenly.
+    """
+    links, ahead = exact.links, sweep.placed
+    ka, kb, w = links.corners[i], links.corners[k], links.radius[i] + links.radius[k]
+    gap, n, _ = elements_gap(links, i, k, sweep)
+    _, speed, bend = approach_along(exact, fingers, entries, rows, n, at, until, room)
+    level = min(0.5 * gap, 0.5 * TOUCH)
+    if speed * step < gap - level:
+        return step
+    least = max(gap - level, 0.0) / speed
+    for _ in range(LENGTHS):
+        if step <= least:
+            return step
+        put_core(links, i, room.ahead[0], ahead)
+        put_core(links, k, room.ahead[1], ahead[4:])
+        left = plane_gap(ahead, ka, ahead[4:], kb, n[0], n[1], n[2]) - w
+        if lowest_on(step, gap, left, bend) > level:
+            return step
+        step = max(shorter_step(step, gap - level, left - level, bend), least)
+        put_ahead(exact, fingers, entries, rows, at + step, room)
+    if step > least:
+        put_ahead(exact, fingers, entries, rows, at + least, room)
+    return least

@@ -1,0 +1,62 @@
+"""Take the chosen item of every finger, and pose the hand as these items say."""
+
+from __future__ import annotations
+
+from clench.kernels.geometry.link_frames import put_closed
+from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.sections.plane_pose import copy_pose
+
+from .layout import ClosingArrays, Floats, Ints
+from .solve_layout import CommandArrays, ProblemArrays, Workspace
+
+
+@inner_kernel
+def pick_items(
+    problem: ProblemArrays, free: ClosingArrays, chosen: Ints, space: Workspace, final: ClosingArrays
+) -> None:
+    """Copy the chosen items to `space.picked`, and their answers to `final`."""
+    items, picked = problem.items, space.picked
+    for f in range(chosen.shape[0]):
+        i = chosen[f]
+        picked.entry[f], picked.low[f], picked.high[f] = items.entry[i], items.low[i], items.high[i]
+        space.swept[f] = problem.exact.wanted[i]
+        copy_row(items.until[i], picked.until[f])
+        copy_answer(free, i, final, f)
+
+
+@inner_kernel
+def copy_answer(given: ClosingArrays, i: int, out: ClosingArrays, f: int) -> None:
+    """Copy the answer of one item."""
+    copy_row(given.travel[i], out.travel[f])
+    copy_row(given.turn[i], out.turn[f])
+    for n in range(given.contacts[i]):
+        for k in range(given.hit.shape[2]):
+            out.hit[f, n, k] = given.hit[i, n, k]
+        copy_row(given.point[i, n], out.point[f, n])
+    for k in range(given.pose.shape[1]):
+        copy_pose(given.pose[i, k], out.pose[f, k])
+    out.contacts[f], out.overflow[f] = given.contacts[i], given.overflow[i]
+    out.overlap[f], out.skipped[f] = given.overlap[i], given.skipped[i]
+
+
+@inner_kernel
+def copy_row(given: Floats, out: Floats) -> None:
+    """Copy numbers, (K,)."""
+    for k in range(given.shape[0]):
+        out[k] = given[k]
+
+
+@inner_kernel
+def put_item_angles(problem: ProblemArrays, entry: int, travel: Floats, turn: Floats, q: Floats) -> None:
+    """Write all joints' angles when an entry has closed; see `FingerPlan.angles` and `FingerPlan.turned`."""
+    hand = problem.hand
+    first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
+    put_closed(problem.frames, hand.chain, entry, first, last, travel, turn, q)
+
+
+@inner_kernel
+def take_joints(command: CommandArrays, entry: int, angles: Floats, q: Floats) -> None:
+    """Copy the angles of a finger's own joints into the posture of the hand."""
+    for k in range(command.joints.shape[1]):
+        if command.joints[entry, k] >= 0:
+            q[command.joints[entry, k]] = angles[command.joints[entry, k]]

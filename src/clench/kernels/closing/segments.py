@@ -1,0 +1,102 @@
+"""What moves next while a finger closes: the path segments of every order (docs/method.md section 4)."""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.runtime.compiling import inner_kernel
+
+from .layout import ChainArrays, Floats, Ints
+
+#: The group of a motion in which all groups move at once.
+ALL = -1
+
+
+@inner_kernel
+def next_bound(chain: ChainArrays, j: int, travel: float) -> float:
+    """Return the travel of its group at which a joint next starts or stops moving, or the group is at its limit."""
+    g = chain.joint_group[j]
+    if travel < chain.start[j]:
+        return min(float(chain.start[j]), float(chain.group_length[g]))
+    if travel < chain.stop[j]:
+        return min(float(chain.stop[j]), float(chain.group_length[g]))
+    return float(chain.group_length[g])
+
+
+@inner_kernel
+def next_segment(
+    chain: ChainArrays,
+    joints: tuple[int, int],
+    group: int,
+    travel: Floats,
+    locked: Ints,
+    until: Floats,
+    along: float,
+    rates: Floats,
+) -> float:
+    """Write how fast every joint moves from here; return for how long it stays so, 0 when nothing moves any more.
+
+    Args:
+        joints: range of the finger's. group: the one that moves, or `ALL`. travel: of every group [rad], (G,).
+        locked: joints that stand still, (J,). until: see `ItemArrays`, (J,). along: the motion so far.
+    """
+    end = math.inf
+    for j in range(joints[0], joints[1]):
+        rates[j] = 0.0
+        g = chain.joint_group[j]
+        s = travel[g]
+        if (group != ALL and g != group) or locked[j] or s >= chain.group_length[g]:
+            continue
+        speed = chain.speed[g] if group == ALL else 1.0
+        end = min(end, (next_bound(chain, j, s) - s) / speed)
+        if until[j] < math.inf:
+            end = min(end, until[j] - along)
+        if chain.start[j] <= s < chain.stop[j]:
+            rates[j] = chain.rate[j] * speed
+    return 0.0 if end == math.inf else end
+
+
+@inner_kernel
+def first_member(chain: ChainArrays, begin: int, joint: int) -> int:
+    """Return the first joint of the finger that is in a joint's group; members need not stand side by side."""
+    first = begin
+    while chain.joint_group[first] != chain.joint_group[joint]:
+        first += 1
+    return first
+
+
+@inner_kernel
+def move_groups(
+    chain: ChainArrays, joints: tuple[int, int], group: int, travel: Floats, locked: Ints, moved: float
+) -> None:
+    """Move every group on that has a joint which is not locked; bounds that are reached are reached exactly."""
+    for first in range(joints[0], joints[1]):
+        g = chain.joint_group[first]
+        if (group != ALL and g != group) or first_member(chain, joints[0], first) != first:
+            continue
+        moves, bound = False, math.inf
+        for j in range(first, joints[1]):
+            if chain.joint_group[j] == g and not locked[j]:
+                moves, bound = True, min(bound, next_bound(chain, j, travel[g]))
+        if moves and travel[g] < chain.group_length[g]:
+            speed = chain.speed[g] if group == ALL else 1.0
+            travel[g] = bound if moved >= (bound - travel[g]) / speed else travel[g] + speed * moved
+
+
+@inner_kernel
+def lock_joints(chain: ChainArrays, joints: tuple[int, int], last: int, locked: Ints) -> None:
+    """Hold the joints up to `last`, and with each all of its group, unless the group's later joints break away."""
+    for j in range(joints[0], last + 1):
+        locked[j] = 1
+        if not chain.breaks[chain.joint_group[j]]:
+            for k in range(joints[0], joints[1]):
+                if chain.joint_group[k] == chain.joint_group[j]:
+                    locked[k] = 1
+
+
+@inner_kernel
+def lock_held(chain: ChainArrays, joints: tuple[int, int], until: Floats, along: float, locked: Ints) -> None:
+    """Hold the joints that are held from outside from here on."""
+    for j in range(joints[0], joints[1]):
+        if until[j] <= along and not locked[j]:
+            lock_joints(chain, joints, j, locked)

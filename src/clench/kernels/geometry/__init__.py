@@ -1,0 +1,1 @@
+"""Geometry: trees of boxes, distances, depths, and where links are."""

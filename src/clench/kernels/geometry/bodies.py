@@ -1,0 +1,190 @@
+"""Rigid bodies for exact sweeps: triangles, segments and points, each with a radius, in trees of balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clench.core.memory import in_parts
+
+from .bvh import MeshTree, build_tree
+from .obb import SLAB, node_slabs
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+#: By how much boxes are grown, more than rounding [m].
+ROUNDING: Final = 1e-9
+
+
+class BodyArrays(NamedTuple):
+    """Hold several bodies, each in its own frame, one tree each; V vertices, T elements, N nodes, B bodies.
+
+    Nodes are in preorder, the left child of `i` is `i + 1`. An element is the convex hull of its vertices, grown by its
+    radius: a triangle of a mesh, the core of a capsule or of a sphere (docs/method.md section 5).
+
+    Args:
+        vertices: [m], (V, 3). elements: vertex indices, (T, 3), repeated for segments and points.
+        corners: number of different vertices, 1 to 3, (T,). radius: [m], (T,).
+        ball: centre and radius of the ball around each element, its own radius included [m], (T, 4).
+        source: number of each element in the caller's list, (T,).
+        node: centre and radius of the ball around each node [m], (N, 4).
+        slab: box of any direction around each node, see `clench.kernels.geometry.obb` [m], (N, 13).
+        first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
+        right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
+        box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
+    """
+
+    vertices: Floats
+    elements: Ints
+    corners: Ints
+    radius: Floats
+    ball: Floats
+    source: Ints
+    node: Floats
+    slab: NDArray[np.float32]
+    first: Ints
+    count: Ints  # type: ignore[assignment]
+    right: Ints
+    root: Ints
+    box: Floats
+
+
+class Elements(NamedTuple):
+    """List the elements of one body: `vertices` (V, 3) [m], `elements` (T, 3), `radius` (T,) [m]."""
+
+    vertices: Floats
+    elements: Ints
+    radius: Floats
+
+
+def join_elements(parts: Sequence[Elements]) -> Elements:
+    """Return the elements of several parts as those of one body, in order."""
+    shift = np.cumsum([0, *(len(p.vertices) for p in parts)])
+    return Elements(
+        np.concatenate([np.empty((0, 3)), *(p.vertices for p in parts)]),
+        np.concatenate([np.empty((0, 3), np.int32), *(p.elements + k for p, k in zip(parts, shift, strict=False))]),
+        np.concatenate([np.empty(0), *(p.radius for p in parts)]),
+    )
+
+
+def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
+    """Build the trees of bodies and put them into one set of arrays; the order of the bodies is kept."""
+    parts, vertices, elements, nodes = [_nothing(0)], 0, 0, 0
+    for body in bodies:
+        part = _nothing(1)
+        if len(body.elements):
+            tree = build_tree(body.vertices, body.elements)
+            part = _body(tree, body.radius[tree.original])
+        inner = part.count == 0
+        parts.append(
+            part._replace(
+                elements=part.elements + vertices,
+                first=part.first + elements,
+                right=np.where(inner, part.right + nodes, -1).astype(np.int32),
+                root=np.where(part.root >= 0, part.root + nodes, -1).astype(np.int32),
+            )
+        )
+        vertices += len(part.vertices)
+        elements += len(part.elements)
+        nodes += len(part.node)
+    return BodyArrays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def pack_triangles(tree: MeshTree) -> BodyArrays:
+    """Return the triangles of a tree as one body, which shares the tree's arrays."""
+    return _body(tree, np.zeros(len(tree.triangles))) if len(tree.triangles) else no_body()
+
+
+def no_body() -> BodyArrays:
+    """Return one body without elements."""
+    return _nothing(1)
+
+
+def _nothing(bodies: int) -> BodyArrays:
+    """Return so many bodies without elements."""
+    whole, box = np.empty(0, np.int32), np.array([0.0, 0.0, 0.0, -np.inf, -np.inf, -np.inf])
+    return BodyArrays(
+        vertices=np.empty((0, 3)),
+        elements=np.empty((0, 3), np.int32),
+        corners=whole,
+        radius=np.empty(0),
+        ball=np.empty((0, 4)),
+        source=whole,
+        node=np.empty((0, 4)),
+        slab=np.empty((0, SLAB), np.float32),
+        first=whole,
+        count=whole,
+        right=whole,
+        root=np.full(bodies, -1, np.int32),
+        box=np.tile(box, (bodies, 1)),
+    )
+
+
+def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
+    """Return one body.
+
+    Args:
+        tree: of its elements. radius: of each of them, in the tree's order [m], (T,).
+    """
+    corners, ball = np.empty(len(radius), dtype=np.int32), np.empty((len(radius), 4))
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for some in in_parts(len(radius)):
+        points, grown = tree.vertices[tree.triangles[some]], radius[some]
+        corners[some], ball[some] = _corners(points), _balls(points, grown)
+        low = np.minimum(low, (points - grown[:, None, None]).min(axis=(0, 1)))
+        high = np.maximum(high, (points + grown[:, None, None]).max(axis=(0, 1)))
+    begin, end, grown = _spans(tree, radius)
+    return BodyArrays(
+        vertices=tree.vertices,
+        elements=tree.triangles,
+        corners=corners,
+        radius=radius,
+        ball=ball,
+        source=tree.original,
+        node=_node_balls(tree, grown),
+        slab=node_slabs(tree, begin, end, grown),
+        first=tree.first,
+        count=tree.count,
+        right=tree.right,
+        root=np.zeros(1, dtype=np.int32),
+        box=np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])[None],
+    )
+
+
+def _corners(points: Floats) -> Ints:
+    """Return how many of the first vertices of each element differ; repeated ones stand last."""
+    same_last = (points[:, 1] == points[:, 2]).all(axis=1)
+    same_all = same_last & (points[:, 0] == points[:, 1]).all(axis=1)
+    return np.where(same_all, 1, np.where(same_last, 2, 3)).astype(np.int32)
+
+
+def _balls(points: Floats, radius: Floats) -> Floats:
+    """Return the ball around each element: its middle is that of the longest side, unless a corner is outside."""
+    sides = np.linalg.norm(points - np.roll(points, -1, axis=1), axis=2)
+    k = np.argmax(sides, axis=1)
+    each = np.arange(len(points))
+    center = 0.5 * (points[each, k] + points[each, (k + 1) % 3])
+    reach = np.linalg.norm(points - center[:, None], axis=2).max(axis=1)
+    return np.column_stack([center, reach * (1.0 + 1e-12) + radius])
+
+
+def _spans(tree: MeshTree, radius: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Return the first element of each node, the one after its last, and the largest radius of them."""
+    # The elements of a node are those from its first leaf to its last one.
+    leaves = np.flatnonzero(tree.count)
+    begin = tree.first[leaves[np.searchsorted(leaves, np.arange(len(tree.low)))]].astype(np.int64)
+    last = leaves[np.searchsorted(leaves, tree.skip) - 1]
+    end = (tree.first[last] + tree.count[last]).astype(np.int64)
+    grown = np.maximum.reduceat(np.append(radius, 0.0), np.column_stack([begin, end]).ravel())[::2]
+    return begin, end, grown
+
+
+def _node_balls(tree: MeshTree, grown: Floats) -> Floats:
+    """Return the ball around the box of each node, grown by the largest radius of its elements."""
+    reach = 0.5 * np.linalg.norm(tree.high - tree.low, axis=1) * (1.0 + 1e-12) + grown
+    return np.column_stack([0.5 * (tree.low + tree.high), reach])

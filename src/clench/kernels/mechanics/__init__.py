@@ -1,0 +1,1 @@
+"""Mechanics: bounds of what grasps resist, and the approach of an open hand."""

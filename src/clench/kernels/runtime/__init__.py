@@ -1,0 +1,1 @@
+"""Runtime: how kernels are compiled, kept on disk, and called."""

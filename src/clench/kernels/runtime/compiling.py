@@ -1,0 +1,108 @@
+"""The decorators of all kernels: strict floating point, cached on disk, without the interpreter's lock."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
+
+from numba import njit
+
+from clench.core import tolerances
+
+from .by_reference import handed
+from .kernel_cache import forgive_unreadable, index_of
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+#: How modules import kernels: beside them, from a folder above, or from this package. A test allows no other way.
+_IMPORTED: Final = re.compile(r"^\s*from (\.+|clench\.kernels\.)(\w[\w.]*) import ", re.MULTILINE)
+
+
+def kernel(function: Kernel) -> Kernel:
+    """Compile a function on its first call; it keeps its signature. It may not allocate.
+
+    Without counts of references, which would be kept for every view of an array: counting takes most of the time
+    of a kernel that reads many rows. What such a kernel reads is alive as long as its caller holds it.
+    """
+    return _compiled(function, _nrt=False)
+
+
+def inner_kernel(function: Kernel) -> Kernel:
+    """Compile a function that only other kernels call: without an entry from Python, it compiles faster.
+
+    A call from Python would end the process without a word; a test holds that there is none.
+    """
+    return _compiled(function, _nrt=False, no_cpython_wrapper=True)
+
+
+def allocating_kernel(function: Kernel) -> Kernel:
+    """Compile a function that allocates. It may not keep an array that a kernel which does not allocate returns."""
+    return _compiled(function, _nrt=True)
+
+
+def inner_allocating_kernel(function: Kernel) -> Kernel:
+    """Compile a function that allocates, and that only other kernels call."""
+    return _compiled(function, _nrt=True, no_cpython_wrapper=True)
+
+
+@cache
+def source_stamp(module: Path) -> bytes:
+    """Return a digest of the sources that a module's kernels are compiled from, and of the numbers in them.
+
+    A kernel on disk is good for as long as this digest is the same. Numba looks at the kernel's own file only, while a
+    kernel contains the kernels that it calls. So the digest covers the modules that the module imports, directly or
+    over others, and these decorators.
+
+    Args:
+        module: file of the module, in any folder.
+    """
+    found, waiting = set[Path](), [module, Path(__file__), Path(tolerances.__file__)]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += _read(path)[1]
+    return hashlib.sha256(b"".join(_read(path)[0] for path in sorted(found))).digest()
+
+
+@cache
+def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """Return the digest of a file, and the files with kernels that it imports."""
+    content = path.read_bytes()
+    files = (_file(path, start, name) for start, name in _IMPORTED.findall(content.decode()))
+    return hashlib.sha256(content).digest(), tuple(files)
+
+
+def _file(path: Path, start: str, name: str) -> Path:
+    """Return the file of a module that a file imports by `from <start><name> import`."""
+    folder = path.parents[len(start) - 1] if start.startswith(".") else Path(__file__).parents[1]
+    return folder.joinpath(*name.split(".")).with_suffix(".py")
+
+
+def is_kept(function: Any) -> bool:
+    """Say whether a kernel is on disk as it is now; true where NUMBA_DISABLE_JIT leaves functions as they are."""
+    return not hasattr(function, "get_call_template") or bool(index_of(function)._load_index())
+
+
+def _compiled(function: Kernel, **options: bool) -> Kernel:
+    """Compile a function on its first call, once for all values of a number.
+
+    Numba would compile it anew for every integer that another kernel writes out in a call.
+    """
+    settings: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+    dispatcher: Any = njit(**settings)(function)
+    if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
+        return cast(Kernel, dispatcher)
+    forgive_unreadable(dispatcher)
+    index_of(dispatcher)._source_stamp = source_stamp(Path(function.__code__.co_filename))
+    choose = dispatcher.get_call_template
+
+    def choose_handed(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        return choose(tuple(map(handed, args)), {name: handed(a) for name, a in kws.items()})
+
+    dispatcher.get_call_template = choose_handed
+    return cast(Kernel, dispatcher)

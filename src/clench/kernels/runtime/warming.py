@@ -1,0 +1,215 @@
+"""Compile the kernels of a solve ahead of it, in two processes at once.
+
+A first solve compiles for minutes, one kernel after another. Half of it is the closing, so a second process compiles
+that into the cache on disk, from where this one loads it. Nothing depends on the second process: what it does
+not deliver is compiled when it is called.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+
+from clench.kernels.closing.close_item import close_item
+from clench.kernels.closing.contact_reading import SurfaceArrays, TouchArrays, read_touches
+from clench.kernels.closing.layout import (
+    ChainArrays,
+    ClosingArrays,
+    HandArrays,
+    ItemArrays,
+    OutlineArrays,
+    RoundArrays,
+    SectionArrays,
+    Work,
+)
+from clench.kernels.closing.meeting_layout import FingerLinks, Meetings, MeetingWork
+from clench.kernels.closing.settling import settle_pair
+from clench.kernels.closing.solve_layout import (
+    Arena,
+    Closed,
+    CommandArrays,
+    ObjectArrays,
+    ProblemArrays,
+    Solved,
+    Workspace,
+)
+from clench.kernels.closing.solve_poses import solve_poses
+from clench.kernels.closing.verdict import judge_pose
+from clench.kernels.geometry.bvh import MeshTree, build_tree
+from clench.kernels.geometry.link_frames import FrameArrays, place_links, relate_poses
+from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, measure_depths
+from clench.kernels.geometry.smallest_gap import smallest_gap
+from clench.kernels.sections.advance import advance
+from clench.kernels.sections.plane_contact import describe_hit, settle_hit
+from clench.kernels.sections.plane_sections import cut_first_families
+from clench.kernels.toi.full_width import planes_only
+from clench.kernels.toi.toi_links import sweep_stage
+from clench.kernels.toi.toi_work import SweepWork
+
+from .by_reference import handed, kept
+from .compiling import is_kept
+
+#: What each process compiles, in this order: first the parts of what both end with.
+HERE: tuple[Any, ...] = (
+    sweep_stage,
+    settle_pair,
+    settle_hit,
+    describe_hit,
+    judge_pose,
+    relate_poses,
+    place_links,
+    measure_depths,
+    find_contained,
+    read_touches,
+    smallest_gap,
+)
+THERE: tuple[Any, ...] = (cut_first_families, advance, close_item, solve_poses)
+
+#: These have an entry from Python, but in a solve other kernels call them.
+_CALLED_BY_KERNELS: tuple[Any, ...] = (cut_first_families, close_item)
+
+#: The second process is given up after this long [s].
+PATIENCE = 300.0
+
+_MODULE = "clench.kernels.runtime.warming"
+_TYPES: dict[str, Any] = {"f": np.float64, "i": np.int64, "s": np.int32, "b": np.uint8}
+
+
+def warm_up() -> None:
+    """Compile what a solve calls where none of it has been compiled before; else do nothing."""
+    if (os.cpu_count() or 1) < 2 or not _is_cold():
+        return
+    quiet = subprocess.DEVNULL
+    try:
+        other = subprocess.Popen([sys.executable, "-m", _MODULE], stdin=quiet, stdout=quiet, stderr=quiet)
+    except OSError:
+        return
+    try:
+        build_tree(np.zeros((1, 3)), np.zeros((1, 3)))
+        compile_ahead(HERE)
+        other.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        pass
+    finally:
+        other.kill()
+        other.wait()
+
+
+def compile_ahead(kernels: Iterable[Any]) -> None:
+    """Compile kernels for the arrays that a solve hands them, or load them from the cache."""
+    values = sample_values()
+    for kernel in kernels:
+        kernel.compile(argument_types(kernel, values))
+
+
+def argument_types(kernel: Any, values: dict[str, Any]) -> tuple[Any, ...]:
+    """Return the types of a kernel's arguments, which its parameters' names tell."""
+    typeof: Any = numba.typeof
+    kinds = (typeof(values[name]) for name in inspect.signature(kernel.py_func).parameters)
+    return tuple(map(handed, kinds) if is_inner(kernel) or kernel in _CALLED_BY_KERNELS else kinds)
+
+
+def is_inner(kernel: Any) -> bool:
+    """Say whether only other kernels call a kernel."""
+    return bool(kernel.targetoptions.get("no_cpython_wrapper"))
+
+
+def sample_values() -> dict[str, Any]:
+    """Return a value of the right type for every parameter of the kernels above, by name; arrays are empty."""
+    chain = ChainArrays(*_arrays("i1 i1 f2 f1 f1 f1 f1 f1 i1"))
+    outlines = OutlineArrays(*_arrays("i1 i1 f1 i1 f2 i1 f2 i1 f2"))
+    hand: tuple[Any, ...] = (*_arrays("i1 i1"), chain, outlines, *_arrays("f3 i1 f1 f1 f1 i1"))
+    sections = SectionArrays(*_arrays("f3 i2 f3 i2 f3 i2 i2 f3"))
+    tree = MeshTree(*_arrays("f2 s2 f2 s1 s1 f2 f2 s1 s1 s1 s1"))
+    values: dict[str, Any] = {
+        "hand": HandArrays(*hand),
+        "rounds": RoundArrays(*_arrays("i1 f2 f3")),
+        "items": ItemArrays(*_arrays("i1 i1 i1 f2")),
+        "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1 i1")),
+        "exact": planes_only(0, 0),
+        "chain": chain,
+        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 i1 i1 i1")),
+        "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
+    }
+    values |= {"links": values["exact"].links, "target": values["exact"].object}
+    values["frames"] = FrameArrays(*_arrays("i1 i1 f3 f2 f2 f1 i1 f1 f1 f1 i1 i1 f1 f1 f2 i1 i1 f1 i1"))
+    owners = _arrays("b1")[0]
+    values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1"), tree, owners])
+    values["solid"] = ObjectMesh(tree, owners, True, _arrays("f2")[0])
+    values["mesh"] = values["solid"]
+    values["surface"] = SurfaceArrays(*[*_arrays("f2 s1"), values["rounds"], *_arrays("s1 s1 i1")])
+    values["touches"] = TouchArrays(*_arrays("i3 f3"))
+    values |= dict.fromkeys(("sections", "shared", "own"), sections)
+    values["tree"] = tree
+    values |= dict.fromkeys(("closed", "together"), True)
+    values |= dict.fromkeys(("family", "start", "base", "low", "high", "times", "group", "plane", "entry", "i", "n"), 0)
+    values |= _solve_values(values)
+    kinds = {
+        "f1": ("turns", "rates", "point", "q"),
+        "f2": ("T_palm_object", "first", "second", "out", "postures"),
+        "i1": ("overlaps", "hit", "which", "blocked"),
+        "f3": ("poses", "placed", "two", "families"),
+    }
+    for kind, names in kinds.items():
+        values |= dict.fromkeys(names, _arrays(kind)[0])
+    return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
+
+
+def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
+    """Return values of what `solve_poses` takes, and of its scratch space."""
+    target = ObjectArrays(values["tree"], values["rounds"], True, values["exact"].object)
+    counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 i1 i1 f1 i1 i1"), 0.0, 0, *[True] * 6, 0, True]
+    parts: list[Any] = [values[name] for name in ("hand", "exact", "items")]
+    parts += [target, target, *(values[name] for name in ("frames", "surface", "mesh", "meshes")), *_arrays("i2 i2")]
+    answers = ClosingArrays(*_arrays("f3 f3 i2 i4 f4 f5 i2 i2 i2"))
+    command, fingers = CommandArrays(*counts), FingerLinks(*_arrays("i1 i1 i1 f2 f1 i2"))
+    parts += [command, fingers]
+    arena, closed = Arena(*[values["sections"]] * 4), [answers, *_arrays("i2 i2 i1"), answers, *_arrays("i2 i2")]
+    closed += [Meetings(*_arrays("i2 i3 f3")), *_arrays("i1")]
+    written: list[Any] = [values["work"], values["sweep"], DepthWork(*_arrays("f1 s1 f3 f2 s2")), values["answer"]]
+    written += [values["items"], *_arrays("i1 f4 f1 f1 f1 f3"), values["touches"], *_arrays("i1")]
+    written.append(meeting := MeetingWork(*_arrays("f2 f1 f1 f1 f1 f1 f2 f2 i2 f1 f2 f1 f3 f1")))
+    return {
+        "obj": target,
+        "problem": kept(ProblemArrays(*parts)),
+        "command": command,
+        "fingers": fingers,
+        "room": meeting,
+        "arena": kept(arena),
+        "space": Workspace(arena, *written),
+        "found": Closed(*closed),
+        "final": values["answer"],
+        "solved": Solved(*_arrays("f2 i1 i1 i2 i2 i2 i4 f4")),
+        "T_palm_objects": _arrays("f3")[0],
+        "stages": 0,
+        "nested": True,
+    }
+
+
+def _arrays(kinds: str) -> list[Any]:
+    """Return empty arrays, each given by a letter for its numbers and how many axes it has."""
+    return [np.empty((0,) * int(kind[1]), dtype=_TYPES[kind[0]]) for kind in kinds.split()]
+
+
+@cache
+def announce() -> None:
+    """Say on standard error that what comes compiles, where it does; once per process."""
+    if _is_cold():
+        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
+
+
+def _is_cold() -> bool:
+    """Say whether the cache on disk lacks the kernel of every solve."""
+    return not is_kept(solve_poses)
+
+
+if __name__ == "__main__":
+    compile_ahead(THERE)

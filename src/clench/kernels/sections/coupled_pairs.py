@@ -1,0 +1,237 @@
+"""All feature pairs of one link outline and one object feature, under several joints (docs/method.md section 4)."""
+
+from __future__ import annotations
+
+import math
+
+from clench.core.tolerances import FOOT_FRACTION
+from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
+from clench.kernels.runtime.compiling import inner_kernel
+
+from .coupled import at_start, bounds, line_on_point, next_root, place, point_on_line, point_on_point
+from .turning_pairs import defer, note
+
+
+@inner_kernel
+def side_foot(chain: Floats, count: int, nx: float, nz: float, qx: float, qz: float, s: float) -> float:
+    """Return where along a moving side with start normal `n` a fixed point is at `s`, from the last pivot."""
+    x, z = place(chain, count - 1, s)
+    turn = chain[count - 1, 0] * s
+    c, d = math.cos(turn), math.sin(turn)
+    mx, mz = c * nx - d * nz, d * nx + c * nz
+    return -mz * (qx - x) + mx * (qz - z)
+
+
+@inner_kernel
+def sweep_vertex_line(
+    chain: Floats,
+    terms: Floats,
+    count: int,
+    vx: float,
+    vz: float,
+    w: float,
+    nx: float,
+    nz: float,
+    h: float,
+    ta: float,
+    tb: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return the first `s` before `best` at which a moving vertex disk meets a fixed segment from its outer side."""
+    chain[count - 1, 1], chain[count - 1, 2] = vx, vz
+    n, constant = point_on_line(chain, count, nx, nz, h + w, terms)
+    first, second = bounds(terms, n)
+    value = at_start(terms, n, constant)
+    if abs(value) - touch > first * best:
+        return best
+    slack = FOOT_FRACTION * (tb - ta)
+    s, sign = 0.0, 1.0 if value >= -touch else -1.0
+    while True:
+        s = next_root(terms, n, constant, s, sign, second, touch, best)
+        if s >= best:
+            return best
+        if sign > 0.0:
+            x, z = place(chain, count, s)
+            if ta - slack <= nx * z - nz * x <= tb + slack:
+                return s
+        sign = -sign
+
+
+@inner_kernel
+def sweep_side_point(
+    chain: Floats,
+    terms: Floats,
+    count: int,
+    nx: float,
+    nz: float,
+    g: float,
+    ta: float,
+    tb: float,
+    qx: float,
+    qz: float,
+    w: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return the first `s` before `best` at which a moving side meets a fixed point from the side's outer side."""
+    n, constant = line_on_point(chain, count, nx, nz, g, qx, qz, w, terms)
+    first, second = bounds(terms, n)
+    value = at_start(terms, n, constant)
+    if abs(value) - touch > first * best:
+        return best
+    slack = FOOT_FRACTION * (tb - ta)
+    s, sign = 0.0, 1.0 if value >= -touch else -1.0
+    while True:
+        s = next_root(terms, n, constant, s, sign, second, touch, best)
+        if s >= best:
+            return best
+        if sign > 0.0 and ta - slack <= side_foot(chain, count, nx, nz, qx, qz, s) <= tb + slack:
+            return s
+        sign = -sign
+
+
+@inner_kernel
+def sweep_vertex_point(
+    chain: Floats,
+    terms: Floats,
+    count: int,
+    vx: float,
+    vz: float,
+    qx: float,
+    qz: float,
+    w: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return the first `s` before `best` at which a moving vertex comes within `w` > 0 of a fixed point."""
+    chain[count - 1, 1], chain[count - 1, 2] = vx, vz
+    n, constant = point_on_point(chain, count, qx, qz, w, terms)
+    first, second = bounds(terms, n)
+    value = at_start(terms, n, constant)
+    if value - touch > first * best or value < -touch:
+        return best
+    return next_root(terms, n, constant, 0.0, 1.0, second, touch, best)
+
+
+@inner_kernel
+def sweep_segment(
+    outline: Outline,
+    i: int,
+    ax: float,
+    az: float,
+    bx: float,
+    bz: float,
+    nx: float,
+    nz: float,
+    closed: bool,
+    touch: float,
+    count: int,
+    speed: float,
+    best: float,
+    vertex: Floats,
+    side: Floats,
+    chain: Floats,
+    terms: Floats,
+    pair: Ints,
+) -> float:
+    """Return the first contact of an outline moved by several joints with segment `i` before `best`.
+
+    The segment is relative to the first pivot; `vertex` and `side` hold the outline about the last one.
+    """
+    w = outline.radius
+    ta, tb = -nz * ax + nx * az, -nz * bx + nx * bz
+    h = nx * ax + nz * az
+    if ta > tb:
+        ta, tb = tb, ta
+    for v in range(outline.v0, outline.v1):
+        vx, vz = vertex[v, 0], vertex[v, 1]
+        found = sweep_vertex_line(chain, terms, count, vx, vz, w, nx, nz, h, ta, tb, touch, best)
+        if w == 0.0 and found * speed <= touch:
+            defer(pair, outline.tip, outline.number, v, i, 0)
+        elif found < best:
+            best = found
+            note(pair, outline.tip, outline.number, v, i, 0, 0)
+        if not closed:
+            found = sweep_vertex_line(chain, terms, count, vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, best)
+            if w == 0.0 and found * speed <= touch:
+                defer(pair, outline.tip, outline.number, v, i, 1)
+            elif found < best:
+                best = found
+                note(pair, outline.tip, outline.number, v, i, 1, 0)
+        if w > 0.0:
+            found = sweep_vertex_point(chain, terms, count, vx, vz, ax, az, w, touch, best)
+            if found < best:
+                best = found
+                note(pair, outline.tip, outline.number, v, i, 2, 0)
+            found = sweep_vertex_point(chain, terms, count, vx, vz, bx, bz, w, touch, best)
+            if found < best:
+                best = found
+                note(pair, outline.tip, outline.number, v, i, 3, 0)
+    best = sweep_sides(outline, i, 0, ax, az, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
+    return sweep_sides(outline, i, 1, bx, bz, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
+
+
+@inner_kernel
+def sweep_sides(
+    outline: Outline,
+    i: int,
+    end: int,
+    qx: float,
+    qz: float,
+    radius: float,
+    disk: int,
+    touch: float,
+    count: int,
+    speed: float,
+    best: float,
+    side: Floats,
+    chain: Floats,
+    terms: Floats,
+    pair: Ints,
+) -> float:
+    """Return the first `s` at which a side of the moving outline meets an object vertex of some radius."""
+    w = outline.radius + radius
+    for k in range(outline.s0, outline.s1):
+        nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
+        found = sweep_side_point(chain, terms, count, nx, nz, g, ta, tb, qx, qz, w, touch, best)
+        if w == 0.0 and found * speed <= touch:
+            defer(pair, KIND_SIDE, outline.number, k, i, end)
+        elif found < best:
+            best = found
+            note(pair, KIND_SIDE, outline.number, k, i, end, disk)
+        if outline.both:
+            found = sweep_side_point(chain, terms, count, -nx, -nz, -g, -tb, -ta, qx, qz, w, touch, best)
+            if w == 0.0 and found * speed <= touch:
+                defer(pair, KIND_SIDE, outline.number, k, i, end + 2)
+            elif found < best:
+                best = found
+                note(pair, KIND_SIDE, outline.number, k, i, end + 2, disk)
+    return best
+
+
+@inner_kernel
+def sweep_disk(
+    outline: Outline,
+    i: int,
+    qx: float,
+    qz: float,
+    radius: float,
+    touch: float,
+    count: int,
+    speed: float,
+    best: float,
+    vertex: Floats,
+    side: Floats,
+    chain: Floats,
+    terms: Floats,
+    pair: Ints,
+) -> float:
+    """Return the first contact of an outline moved by several joints with a disk of the object before `best`."""
+    w = outline.radius + radius
+    for v in range(outline.v0, outline.v1):
+        found = sweep_vertex_point(chain, terms, count, vertex[v, 0], vertex[v, 1], qx, qz, w, touch, best)
+        if found < best:
+            best = found
+            note(pair, outline.tip, outline.number, v, i, 0, 1)
+    return sweep_sides(outline, i, 0, qx, qz, radius, 1, touch, count, speed, best, side, chain, terms, pair)

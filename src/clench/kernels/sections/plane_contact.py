@@ -1,0 +1,222 @@
+"""Where and how a link touches on a curl plane, at the contact and at the final posture (docs/method.md section 4)."""
+
+from __future__ import annotations
+
+import math
+
+from clench.core.tolerances import PASSED_GAP, TOUCH_FRACTION
+from clench.kernels.closing.layout import (
+    HIT_CURVE_X,
+    HIT_CURVE_Z,
+    HIT_FAMILY,
+    HIT_FEATURE,
+    HIT_GAP,
+    HIT_GROUP,
+    HIT_JOINT,
+    HIT_KIND,
+    HIT_NX,
+    HIT_NZ,
+    HIT_OUTLINE,
+    HIT_PLANE,
+    HIT_SOURCE,
+    HIT_WHICH,
+    HIT_X,
+    HIT_Z,
+    KIND_SIDE,
+    ChainArrays,
+    Floats,
+    HandArrays,
+    Ints,
+    Outline,
+    OutlineArrays,
+    SectionArrays,
+    Work,
+)
+from clench.kernels.runtime.compiling import inner_kernel
+
+from .advance import place_joints, put_outline
+from .conics import region_gap, support
+from .outline_gap import core_distance, outline_distance, point_segment
+from .turning import STILL
+
+
+@inner_kernel
+def outline_point(outlines: OutlineArrays, work: Work, o: int, v: int) -> tuple[float, float]:
+    """Return where a vertex of an outline is at the placed joints."""
+    j = outlines.joint[o]
+    x, z = outlines.vertex[v, 0], outlines.vertex[v, 1]
+    c, s = work.place[j, 3], work.place[j, 4]
+    return c * x - s * z + work.place[j, 0], s * x + c * z + work.place[j, 1]
+
+
+@inner_kernel
+def side_normal(outlines: OutlineArrays, work: Work, o: int, side: int, which: int) -> tuple[float, float]:
+    """Return the outward normal of a touching link side at the placed joints; `which` >= 2 is its other face."""
+    j = outlines.joint[o]
+    c, s = work.place[j, 3], work.place[j, 4]
+    if which >= 2:
+        c, s = -c, -s
+    return c * outlines.side[side, 0] - s * outlines.side[side, 1], s * outlines.side[side, 0] + c * outlines.side[
+        side, 1
+    ]
+
+
+@inner_kernel
+def touch_segment(
+    outlines: OutlineArrays, segment: Floats, work: Work
+) -> tuple[float, float, float, float, float, float]:
+    """Return point, object normal and curve normal of a touch on a segment or its ends."""
+    kind, o, feature, which = work.best[0], work.best[1], work.best[2], work.best[4]
+    cx, cz = segment[4], segment[5]
+    end = which & 1
+    ox, oz = segment[2 * end], segment[2 * end + 1]
+    if kind == KIND_SIDE:
+        nx, nz = side_normal(outlines, work, o, feature, which)
+        nx, nz = -nx, -nz
+    else:
+        vx, vz = outline_point(outlines, work, o, feature)
+        if which >= 2:
+            size = math.hypot(vx - ox, vz - oz)
+            nx, nz = (vx - ox) / size, (vz - oz) / size
+        else:
+            nx, nz = (-cx, -cz) if which == 1 else (cx, cz)
+            w = outlines.radius[o]
+            # At a grazing touch the foot is known to the root of the tolerance only: keep the point on the segment.
+            _, ox, oz = point_segment(vx - w * nx, vz - w * nz, segment[0], segment[1], segment[2], segment[3])
+    if cx * nx + cz * nz < 0.0:
+        cx, cz = -cx, -cz
+    return ox, oz, nx, nz, cx, cz
+
+
+@inner_kernel
+def touch_round(
+    outlines: OutlineArrays, sections: SectionArrays, row: int, work: Work
+) -> tuple[float, float, float, float]:
+    """Return point and normal of a touch on a disk or an ellipse of the object."""
+    kind, o, feature = work.best[0], work.best[1], work.best[2]
+    source, which, shape = work.best[3], work.best[4], work.best[5]
+    nx, nz = 0.0, 0.0
+    vx, vz = 0.0, 0.0
+    if kind == KIND_SIDE:
+        nx, nz = side_normal(outlines, work, o, feature, which)
+        nx, nz = -nx, -nz
+    else:
+        vx, vz = outline_point(outlines, work, o, feature)
+    if shape == 1:
+        x, z, radius = sections.disks[row, source]
+        if kind != KIND_SIDE:
+            size = math.hypot(vx - x, vz - z)
+            nx, nz = (vx - x) / size, (vz - z) / size
+        return x + radius * nx, z + radius * nz, nx, nz
+    e = sections.ellipses[row, source]
+    if kind == KIND_SIDE:
+        size, _, t = support(e, nx, nz)
+        y = e[5] * e[5] * (-nx * e[3] + nz * e[2]) / size
+        return e[0] + t * e[2] - y * e[3], e[1] + t * e[3] + y * e[2], nx, nz
+    _, nx, nz, x, z = region_gap(e, vx, vz)
+    return x, z, nx, nz
+
+
+@inner_kernel
+def describe_hit(
+    hand: HandArrays,
+    sections: SectionArrays,
+    base: int,
+    family: int,
+    plane: int,
+    group: int,
+    turns: Floats,
+    work: Work,
+    hit: Ints,
+    point: Floats,
+) -> None:
+    """Write where and how the winner of `advance` touches, at the posture it was stopped in."""
+    place_joints(hand.chain, family, turns, work.place)
+    hit[HIT_PLANE], hit[HIT_GROUP], hit[HIT_FAMILY] = plane, group, family
+    describe_touch(hand, sections, plane - base, work, hit, point)
+
+
+@inner_kernel
+def touch_found(
+    hand: HandArrays, sections: SectionArrays, row: int, work: Work
+) -> tuple[float, float, float, float, float, float]:
+    """Return where the pair in `work.best` touches with the joints where they are placed; see `touch_segment`."""
+    if work.best[5] == 0:
+        return touch_segment(hand.outlines, sections.segments[row, work.best[3]], work)
+    x, z, nx, nz = touch_round(hand.outlines, sections, row, work)
+    return x, z, nx, nz, nx, nz
+
+
+@inner_kernel
+def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Work, hit: Ints, point: Floats) -> None:
+    """Write where and how the pair in `work.best` touches with the joints where they are placed."""
+    source, shape = work.best[3], work.best[5]
+    hit[HIT_OUTLINE], hit[HIT_KIND] = work.best[1], work.best[0]
+    hit[HIT_FEATURE], hit[HIT_WHICH] = work.best[2], work.best[4]
+    if shape == 0:
+        hit[HIT_SOURCE] = sections.sources[row, source]
+    else:
+        hit[HIT_SOURCE] = sections.disk_sources[row, source] if shape == 1 else sections.ellipse_sources[row, source]
+    x, z, nx, nz, cx, cz = touch_found(hand, sections, row, work)
+    point[HIT_X], point[HIT_Z], point[HIT_NX], point[HIT_NZ] = x, z, nx, nz
+    point[HIT_CURVE_X], point[HIT_CURVE_Z] = cx, cz
+
+
+@inner_kernel
+def still_touches(outline: Outline, hit: Ints, point: Floats, work: Work) -> bool:
+    """Say whether the feature that touched a point is still where the touch's normal says, to `PASSED_GAP`."""
+    x, z = point[HIT_X] + outline.radius * point[HIT_NX], point[HIT_Z] + outline.radius * point[HIT_NZ]
+    if hit[HIT_KIND] != KIND_SIDE:
+        vertex = work.vertex[hit[HIT_FEATURE]]
+        return bool(math.hypot(vertex[0] - x, vertex[1] - z) <= PASSED_GAP)
+    side = work.side[hit[HIT_FEATURE]]
+    turned = abs(side[0] * point[HIT_NZ] - side[1] * point[HIT_NX])
+    along, away = side[0] * z - side[1] * x, abs(side[0] * x + side[1] * z - side[2])
+    inside = side[3] - PASSED_GAP <= along <= side[4] + PASSED_GAP
+    return bool(inside and turned <= PASSED_GAP and away <= PASSED_GAP)
+
+
+@inner_kernel
+def holds(chain: ChainArrays, hit: Ints, x: float, z: float, nx: float, nz: float, place: Floats) -> bool:
+    """Say whether a touch with this outward normal holds what a contact stopped: it would not be left by going on."""
+    slope, lever = 0.0, 0.0
+    for j in range(hit[HIT_JOINT] + 1):
+        if chain.joint_group[j] == hit[HIT_GROUP] and chain.joint_family[j] == hit[HIT_FAMILY]:
+            dx, dz = x - place[j, 0], z - place[j, 1]
+            slope += chain.rate[j] * (dx * nz - dz * nx)
+            lever += abs(chain.rate[j]) * math.hypot(dx, dz)
+    return slope <= STILL * lever
+
+
+@inner_kernel
+def settle_hit(
+    hand: HandArrays,
+    start: int,
+    shared: SectionArrays,
+    own: SectionArrays,
+    turns: Floats,
+    hit: Ints,
+    point: Floats,
+    work: Work,
+) -> None:
+    """Evaluate a contact again at the final posture; what later motions carried along gets its new place and pair.
+
+    Where the link only touches something else by now, which does not hold what was stopped, the contact is left behind.
+    """
+    family, plane, o = hit[HIT_FAMILY], hit[HIT_PLANE], hit[HIT_OUTLINE]
+    sections, row = shared, plane
+    if family > start:
+        sections, row = own, plane - hand.family_plane[start]
+    place_joints(hand.chain, family, turns, work.place)
+    outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
+    touch = TOUCH_FRACTION * hand.family_length[family]
+    gap, _, _ = core_distance(outline, point[HIT_X], point[HIT_Z], work)
+    point[HIT_GAP] = gap - outline.radius
+    if abs(point[HIT_GAP]) > touch or not still_touches(outline, hit, point, work):
+        left, point[HIT_GAP] = point[HIT_GAP], outline_distance(outline, sections, row, touch, work)
+        if point[HIT_GAP] <= PASSED_GAP:
+            x, z, nx, nz, _, _ = touch_found(hand, sections, row, work)
+            if holds(hand.chain, hit, x, z, nx, nz, work.place):
+                describe_touch(hand, sections, row, work, hit, point)
+            else:
+                point[HIT_GAP] = left

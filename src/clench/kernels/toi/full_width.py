@@ -1,0 +1,263 @@
+"""The exact width: where the links are, what overlaps, and how a pair touches (docs/method.md section 5)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from clench.kernels.closing.layout import (
+    HIT_FAMILY,
+    HIT_FEATURE,
+    HIT_GAP,
+    HIT_GROUP,
+    HIT_KIND,
+    HIT_OUTLINE,
+    HIT_PLANE,
+    HIT_SOURCE,
+    HIT_WHICH,
+    KIND_SIDE,
+    KIND_TIP,
+    KIND_VERTEX,
+    ChainArrays,
+    Floats,
+    Ints,
+)
+from clench.kernels.geometry.bodies import BodyArrays, pack_bodies
+from clench.kernels.geometry.core_distance import AT_CORNER, edge_count, face_normal, separation
+from clench.kernels.geometry.crossing import across
+from clench.kernels.geometry.link_boxes import boxes_meet
+from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
+from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.sections.plane_pose import copy_pose
+
+from .separating import side
+from .spatial_motion import turned_about
+from .toi_work import SweepWork, bodies_overlap, make_sweep_work, put_core
+
+#: Bodies that a shift by this takes off each other do not overlap [m].
+PRESSED = 1e-8
+
+
+class ExactArrays(NamedTuple):
+    """Hold what the exact sweeps read; L links of the hand, M moving links of all entries, J joints.
+
+    Args:
+        joint_first: first joint of each entry, (E + 1,).
+        wanted: whether each item sweeps exactly, (I,).
+        links: one body per link of the hand, in link frames. object: one body, in the object's frame.
+        mover_first: first moving link of each entry, (E + 1,). mover_link: index in the hand, (M,).
+        mover_joint: last joint that moves it, (M,). mover_pose: `T_palm_link` at the open posture, (M, 3, 4).
+        axis, anchor: of every joint in the palm frame at the open posture [m], (J, 3) each; a positive turn is
+            right-handed about the axis.
+        link_pose: `T_palm_link` of every link at each entry's open posture, (E, L, 3, 4).
+        checked: whether a moving link (row) must not overlap a resting one, (L, L).
+    """
+
+    joint_first: Ints
+    wanted: Ints
+    links: BodyArrays
+    object: BodyArrays
+    mover_first: Ints
+    mover_link: Ints
+    mover_joint: Ints
+    mover_pose: Floats
+    axis: Floats
+    anchor: Floats
+    link_pose: Floats
+    checked: Ints
+
+
+def planes_only(items: int, entries: int) -> ExactArrays:
+    """Return what closes so many items of so many entries on their planes alone."""
+    nothing = pack_bodies([])
+    return ExactArrays(
+        joint_first=np.zeros(entries + 1, np.int64),
+        wanted=np.zeros(items, np.int64),
+        links=nothing,
+        object=nothing,
+        mover_first=np.zeros(entries + 1, np.int64),
+        mover_link=np.zeros(0, np.int64),
+        mover_joint=np.zeros(0, np.int64),
+        mover_pose=np.zeros((0, 3, 4)),
+        axis=np.zeros((0, 3)),
+        anchor=np.zeros((0, 3)),
+        link_pose=np.zeros((entries, 0, 3, 4)),
+        checked=np.zeros((0, 0), np.int64),
+    )
+
+
+@inner_kernel
+def turn_about(axis: Floats, anchor: Floats, turn: float, T: Floats) -> None:
+    """Turn a pose about an axis, in place."""
+    x, y, z = axis[0], axis[1], axis[2]
+    s, v = math.sin(turn), 2.0 * math.sin(0.5 * turn) ** 2
+    for k in range(4):
+        px, py, pz = T[0, k], T[1, k], T[2, k]
+        if k == 3:
+            px, py, pz = px - anchor[0], py - anchor[1], pz - anchor[2]
+        cx, cy, cz = y * pz - z * py, z * px - x * pz, x * py - y * px
+        T[0, k] += s * cx + v * (y * cz - z * cy)
+        T[1, k] += s * cy + v * (z * cx - x * cz)
+        T[2, k] += s * cz + v * (x * cy - y * cx)
+
+
+@inner_kernel
+def pose_movers(exact: ExactArrays, chain: ChainArrays, entry: int, turns: Floats, poses: Floats) -> None:
+    """Write `T_palm_link` of an entry's moving links at the present turns to `poses`, (L, 3, 4)."""
+    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
+        T = poses[exact.mover_link[n]]
+        copy_pose(exact.mover_pose[n], T)
+        for j in range(exact.mover_joint[n], exact.joint_first[entry] - 1, -1):
+            if turns[j] != 0.0:
+                turn_about(exact.axis[j], exact.anchor[j], turns[j], T)
+
+
+@inner_kernel
+def place_axes(exact: ExactArrays, entry: int, turns: Floats, sweep: SweepWork) -> None:
+    """Write the axes and anchors of an entry's joints at the present turns to `sweep`, in the palm frame."""
+    begin, end = exact.joint_first[entry], exact.joint_first[entry + 1]
+    for j in range(begin, end):
+        axis = (exact.axis[j, 0], exact.axis[j, 1], exact.axis[j, 2])
+        at = (exact.anchor[j, 0], exact.anchor[j, 1], exact.anchor[j, 2])
+        for k in range(j - begin):
+            i = j - 1 - k
+            about = (exact.axis[i, 0], exact.axis[i, 1], exact.axis[i, 2])
+            pivot = (exact.anchor[i, 0], exact.anchor[i, 1], exact.anchor[i, 2])
+            axis = turned_about(axis, about, turns[i])
+            at = plus(pivot, turned_about(plus(at, scaled(pivot, -1.0)), about, turns[i]))
+        sweep.axis[j, 0], sweep.axis[j, 1], sweep.axis[j, 2] = axis
+        sweep.anchor[j, 0], sweep.anchor[j, 1], sweep.anchor[j, 2] = at
+
+
+@inner_kernel
+def keep_pair(sweep: SweepWork) -> None:
+    """Keep the pair that was found last as the winner of the stage."""
+    for k in range(4):
+        sweep.winner[k] = sweep.pair[k]
+
+
+@inner_kernel
+def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
+    """Return the last joint of an entry that moves a link; `last` where that is later, or none does."""
+    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
+        if exact.mover_link[n] == link:
+            last = max(last, exact.mover_joint[n])
+    return int(last)
+
+
+@inner_kernel
+def overlap_truly(
+    links: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, sweep: SweepWork
+) -> bool:
+    """Say whether a link crosses another body, and not only presses on it; see `bodies_overlap`.
+
+    What comes to a stop crosses by what rounding and the touch tolerance leave: a shift by `PRESSED` takes it off,
+    across a face or along two edges of the elements that cross. Bodies that lie in each other still cross then.
+
+    Args:
+        sweep: has their poses.
+    """
+    if not bodies_overlap(links, m, resting, r, allowed, flush, sweep):
+        return False
+    i, k = sweep.pair[0], sweep.pair[1]
+    ka, kb = links.corners[i], resting.corners[k]
+    edges, others = edge_count(ka), edge_count(kb)
+    for way in range(2 * (2 + edges * others + 2 * (edges + others))):
+        put_core(links, i, sweep.moving, sweep.core)
+        put_core(resting, k, sweep.resting, sweep.fixed)
+        spans, n = pressed_along(sweep.core, ka, sweep.fixed, kb, way // 2)
+        if not spans:
+            continue
+        step = PRESSED if way % 2 == 0 else -PRESSED
+        x, y, z = sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3]
+        sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3] = plus((x, y, z), scaled(n, step))
+        apart = not bodies_overlap(links, m, resting, r, allowed, flush, sweep)
+        sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3] = x, y, z
+        if apart:
+            return False
+    return True
+
+
+@inner_kernel
+def pressed_along(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bool, Vector]:
+    """Return whether there is a unit direction of a number, and it: across a face of either core, or across two edges.
+
+    Where a face meets an edge that is taken for one: across both, the other core lies beside the face.
+    """
+    faces, edges, others = 2, edge_count(ka), edge_count(kb)
+    if number < faces:
+        return face_across(a, ka, b, kb, number)
+    number -= faces
+    if number < edges * others:
+        spans, m = across(side(a, ka, number // others), side(b, kb, number % others))
+    else:
+        number -= edges * others
+        found, n = face_across(a, ka, b, kb, number // (edges + others))
+        k = number % (edges + others)
+        spans, m = across(side(a, ka, k) if k < edges else side(b, kb, k - edges), n)
+        spans = spans and found
+    return spans, scaled(m, 1.0 / math.sqrt(dot(m, m))) if spans else m
+
+
+@inner_kernel
+def face_across(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bool, Vector]:
+    """Return whether the first (0) or second (1) of two cores is a face, and its unit normal."""
+    if (ka if number == 0 else kb) < 3:
+        return False, (0.0, 0.0, 0.0)
+    nx, ny, nz, size = face_normal(a) if number == 0 else face_normal(b)
+    return size > 0.0, (nx, ny, nz)
+
+
+@allocating_kernel
+def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
+    """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
+
+    Args:
+        exact: the hand and the object. poses: `T_palm_link` of every link, (L, 3, 4). T_palm_object: (3, 4).
+        allowed: how far round bodies may overlap [m].
+    """
+    links = exact.checked.shape[0]
+    sweep = make_sweep_work(0, links)
+    for m in range(links):
+        copy_pose(poses[m], sweep.moving)
+        copy_pose(T_palm_object, sweep.resting)
+        if overlap_truly(exact.links, m, exact.object, 0, allowed, True, sweep):
+            return m, links
+        for r in range(m):
+            if exact.checked[m, r] != 0 and boxes_meet(exact.links.box, poses, m, r):
+                copy_pose(poses[r], sweep.resting)
+                if overlap_truly(exact.links, m, exact.links, r, allowed, False, sweep):
+                    return m, r
+    return -1, -1
+
+
+@inner_kernel
+def describe_pair(
+    exact: ExactArrays,
+    T_palm_object: Floats,
+    met: int,
+    group: int,
+    family: int,
+    sweep: SweepWork,
+    hit: Ints,
+    point: Floats,
+) -> None:
+    """Write how the winning pair touches with the links at `sweep.poses`; the point is in the palm frame."""
+    i, k, m = sweep.winner[0], sweep.winner[1], sweep.winner[2]
+    resting = exact.object if met == exact.checked.shape[0] else exact.links
+    T = T_palm_object if met == exact.checked.shape[0] else sweep.poses[met]
+    put_core(exact.links, i, sweep.poses[m], sweep.core)
+    put_core(resting, k, T, sweep.fixed)
+    d, nx, ny, nz, feature, _, x, y, z = separation(sweep.core, exact.links.corners[i], sweep.fixed, resting.corners[k])
+    w = resting.radius[k]
+    hit[HIT_PLANE], hit[HIT_OUTLINE], hit[HIT_SOURCE], hit[HIT_GROUP], hit[HIT_FAMILY] = -1, m, k, group, family
+    hit[HIT_FEATURE], hit[HIT_WHICH] = i, met
+    if exact.links.radius[i] > 0.0:
+        hit[HIT_KIND] = KIND_TIP if feature == AT_CORNER else KIND_SIDE
+    else:
+        hit[HIT_KIND] = KIND_VERTEX + feature
+    point[0], point[1], point[2] = x + w * nx, y + w * ny, z + w * nz
+    point[3], point[4], point[5] = nx, ny, nz
+    point[HIT_GAP] = d - w - exact.links.radius[i]

@@ -1,0 +1,166 @@
+"""Where a hand that moves along a path first overlaps itself or the object (docs/method.md section 7).
+
+The exact sweep takes a pair of bodies along every segment of the path until the two touch. From there on the pair is
+looked at in steps so short that it cannot overlap by more than `OVERLAP` between two looks, until it is apart again.
+So no overlap that is deeper is missed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.link_meshes import ObjectMesh, depth_of, mesh_of
+from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+
+from .pair_motion import PathProblem, PathWork, free_share, make_path_work, place_pair, put_left, target_of
+from .pair_planes import keep_normal, parted_share
+from .toi_work import ball_gap, body_gap
+
+#: Two bodies may overlap by this much and still count as touching: the tolerance of the proof [m].
+OVERLAP: Final = 1e-5
+#: A look finds an overlap from this depth on [m]. What is left of `OVERLAP` is the least motion between two looks.
+FOUND: Final = 5e-6
+#: The sweep takes a pair up to this gap [m].
+TOUCH: Final = 1e-6
+#: The sweep goes on with a pair whose gap has grown to this [m].
+APART: Final = 1e-4
+#: Bodies that overlapped where the path began are looked at in steps of this motion until they are apart [m].
+EXEMPT_STEP: Final = 2e-4
+#: No pair is looked at more often on one path: bodies that rub against each other all the way are given up.
+MOST_LOOKS: Final = 3_000
+#: The gap between two balls is enough for a step if it is this share of the motion that is left [-].
+BALLS: Final = 0.25
+
+
+@inner_kernel
+def gap_between(problem: PathProblem, m: int, r: int, near: float, work: PathWork) -> float:
+    """Return the gap of a pair in its present place, minus its depth where the pair overlaps; `near` if larger [m].
+
+    The direction between the closest elements is kept as the normal of a plane that may part the pair.
+    """
+    target, b = target_of(problem, r)
+    work.sweep.pair[0] = -1
+    gap = body_gap(problem.links, m, target, b, near, 1.0, work.sweep)
+    for axis in range(3):
+        work.normal[axis] = 0.0
+    if work.sweep.pair[0] >= 0:
+        keep_normal(problem, r, work)
+    depth = depth_between(problem, m, r, work)
+    return -depth if depth > max(0.0, -gap) else gap
+
+
+@inner_kernel
+def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
+    """Return how deep a pair overlaps in its present place [m]; 0 when it is apart."""
+    meshes, k = problem.meshes, problem.mesh[m]
+    limit = 2.0 * meshes.radius[k]
+    if r < 0:
+        return depth_of(meshes, k, work.sweep.moving, problem.solid, work.sweep.resting, limit, work.depth)[0]
+    other = problem.mesh[r]
+    solid = ObjectMesh(
+        mesh_of(meshes, other),
+        meshes.owners[meshes.triangle_first[other] : meshes.triangle_first[other + 1]],
+        meshes.closed[other] != 0,
+        meshes.points[meshes.point_first[other] : meshes.point_first[other + 1]],
+    )
+    return depth_of(meshes, k, work.sweep.moving, solid, work.sweep.resting, limit, work.depth)[0]
+
+
+@inner_kernel
+def step_on(left: Floats, k: int, t: float, motion: float) -> tuple[int, float]:
+    """Return the place at which a pair has moved by `motion` [m] since a place; the last way-point at the latest."""
+    last = left.shape[0] - 1
+    while k < last:
+        own = left[k] - left[k + 1]
+        rest = (1.0 - t) * own
+        if own > 0.0 and motion < rest:
+            return k, t + motion / own
+        motion -= rest
+        k, t = k + 1, 0.0
+    return last, 0.0
+
+
+@inner_kernel
+def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> tuple[int, float]:
+    """Return the place at which a pair that is apart touches next; the last way-point where it does not."""
+    target, b = target_of(problem, r)
+    left, last = work.left, work.left.shape[0] - 1
+    while k < last:
+        place_pair(problem, m, r, k, t, work)
+        balls = ball_gap(problem.links, problem.links.root[m], target, target.root[b], work.sweep)
+        rest = left[k] - t * (left[k] - left[k + 1])
+        if balls > BALLS * rest:
+            k, t = step_on(left, k, t, balls)
+            continue
+        share = free_share(problem, m, r, k, t, TOUCH, work)
+        if share < 1.0:
+            return k, t + max(share, 0.0) * (1.0 - t)
+        k, t = k + 1, 0.0
+    return last, 0.0
+
+
+@inner_kernel
+def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tuple[float, float]:
+    """Return the place at which a pair first overlaps, and how deep [m]; infinite and 0 where it does not.
+
+    The depth is not a number where `MOST_LOOKS` are not enough to prove that the pair stays apart.
+
+    A pair that overlaps where the path begins may stay as deep as it was at any look since, until it is apart.
+
+    Args:
+        until: later places are of no interest.
+    """
+    m, r, pad = problem.pairs[p, 0], problem.pairs[p, 1], problem.allowed[p]
+    put_left(problem, m, r, work)
+    left, last, k, t, exempt, looks = work.left, work.left.shape[0] - 1, 0, 0.0, 0.0, 0
+    for axis in range(3):
+        work.normal[axis] = 0.0
+    while k + t <= until:
+        place_pair(problem, m, r, k, t, work)
+        rest = left[k] - t * (left[k] - left[min(k + 1, last)])
+        if k < last and exempt == 0.0:
+            share = parted_share(problem, m, r, k, OVERLAP, work)
+            if share >= 1.0 - t:
+                k, t = k + 1, 0.0
+                continue
+            if share * (left[k] - left[k + 1]) >= FOUND:
+                t += share
+                continue
+        looks += 1
+        if looks > MOST_LOOKS:
+            return k + t, math.nan
+        gap = gap_between(problem, m, r, APART, work)
+        depth = -gap - pad
+        if k + t == 0.0 and depth > FOUND:
+            exempt = depth
+        if depth > (exempt + OVERLAP if exempt > 0.0 else FOUND):
+            return k + t, depth + pad
+        exempt = min(exempt, depth) if depth > FOUND else 0.0
+        motion = EXEMPT_STEP if exempt > 0.0 else OVERLAP - depth
+        if k == last or (exempt == 0.0 and motion >= rest):
+            break
+        if gap >= APART:
+            k, t = next_touch(problem, m, r, k, t, work)
+            if k == last:
+                break
+        else:
+            k, t = step_on(left, k, t, motion)
+    return math.inf, 0.0
+
+
+@allocating_kernel
+def first_overlap(problem: PathProblem, out: Floats) -> int:
+    """Return the pair that overlaps first on a path, -1 when none does; write place and depth to `out`, (2,).
+
+    The place is the number of the way-point before, plus the share of the way to the next one.
+    """
+    work = make_path_work(problem.path.shape[1], problem.frames.parent.shape[0], problem.path.shape[0])
+    found, until = -1, math.inf
+    for p in range(problem.pairs.shape[0]):
+        place, depth = overlap_of(problem, p, until, work)
+        if place < until:
+            found, until = p, place
+            out[0], out[1] = place, depth
+    return found

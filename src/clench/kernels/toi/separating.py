@@ -1,0 +1,356 @@
+"""Whether two convex cores that touch may move on, and how far (docs/method.md section 3, touching at the start).
+
+They may when a plane separates them now and goes on to do so. Planes that rest are looked at first: those of faces and
+those along two edges. A core that tilts off a corner, or rolls off an edge, takes its plane along; that is probed by
+a step so short that nothing is missed on it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.core_distance import edge_count, face_normal, separation
+from clench.kernels.geometry.vectors import Vector
+from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.sections.coupled import safe_step
+from clench.kernels.sections.turning import is_blocking
+
+from .core_motion import carried_back, corner_motion, move_core, plane_gap, plane_offset, turn_rate, turn_to_plane
+
+#: Below this fraction of the touch tolerance a gap has no direction of its own [-].
+FLAT = 1.0 / 256.0
+#: A pair that overlaps by up to this many touch tolerances at the start touches: docs/method.md section 3 says 1e-9 of
+#: the finger's length [-].
+OVERLAPPING = 10.0
+#: Answers for a touching pair: no plane permits the motion; no plane separates it.
+BLOCKED, OVERLAP = 0.0, -1.0
+#: Edges with a smaller sine between them give no plane; with one below the second it is made square to them [-].
+ALONG, BARELY = 1e-9, 1e-4
+#: A plane across which the cores are known to lie the other way round does not separate them: the cosine [-].
+OPPOSED = -0.5
+#: A plane that separates a touching pair may turn this many times as fast as the moving core [-].
+TILT = 64.0
+
+
+@inner_kernel
+def plane_permits(
+    core: Floats,
+    placed: Floats,
+    corners: int,
+    chain: Floats,
+    count: int,
+    nx: float,
+    ny: float,
+    nz: float,
+    offset: float,
+    s: float,
+    touch: float,
+) -> bool:
+    """Say whether no corner that touches a plane at `s` moves on into it."""
+    for k in range(corners):
+        gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
+        if gap <= touch:
+            slope, curvature, lever, _ = corner_motion(core, k, chain, count, nx, ny, nz, s)
+            if is_blocking(slope, curvature, lever, touch):
+                return False
+    return True
+
+
+@inner_kernel
+def leave_plane(
+    core: Floats,
+    placed: Floats,
+    corners: int,
+    chain: Floats,
+    count: int,
+    nx: float,
+    ny: float,
+    nz: float,
+    offset: float,
+    s: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return for how long after `s` a plane that permits the motion goes on to separate, at most `best`."""
+    step = best
+    rate = abs(chain[count - 1, 0])
+    for k in range(corners):
+        gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
+        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, ny, nz, s)
+        if bound == 0.0:
+            continue
+        if count == 1:
+            limit = step * rate
+            if gap <= touch:
+                # The touch is one root, and half way between the two the point is farthest from the plane.
+                turn = 2.0 * math.atan2(slope / rate, -curvature / (rate * rate))
+                turn = limit if turn <= 0.0 else min(turn, limit)
+            else:
+                turn = turn_to_plane(gap, slope / rate, curvature / (rate * rate), limit)
+            if turn < limit:
+                step = turn / rate
+        elif gap <= touch:
+            least = math.sqrt(2.0 * touch / bound)
+            step = min(step, max(safe_step(max(gap, 0.0), max(slope, 0.0), bound), least))
+        else:
+            step = min(step, safe_step(gap, slope, bound))
+    return step
+
+
+@inner_kernel
+def lies_in_plane(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float, touch: float) -> bool:
+    """Say whether two cores lie in one plane with normal n, so that it separates them whichever way it looks."""
+    return -plane_gap(a, ka, b, kb, nx, ny, nz) <= touch and -plane_gap(b, kb, a, ka, nx, ny, nz) <= touch
+
+
+@inner_kernel
+def looks_along(face: Floats, nx: float, ny: float, nz: float) -> bool:
+    """Say whether a moving face looks along n, so that its body lies on the side from which n points."""
+    mx, my, mz, _ = face_normal(face)
+    return nx * mx + ny * my + nz * mz > 0.0
+
+
+@inner_kernel
+def separates(
+    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, nx: float, ny: float, nz: float, touch: float
+) -> bool:
+    """Say whether a plane across n keeps a touching pair apart.
+
+    A plane in which both lie does so only with the body of the moving one on its own side.
+    """
+    if plane_gap(placed, ka, fixed, kb, nx, ny, nz) - w < -OVERLAPPING * touch:
+        return False
+    if ka < 3 or w > 0.0 or not looks_along(placed, nx, ny, nz):
+        return True
+    return not lies_in_plane(placed, ka, fixed, kb, nx, ny, nz, touch)
+
+
+@inner_kernel
+def try_direction(
+    core: Floats,
+    placed: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    w: float,
+    chain: Floats,
+    count: int,
+    nx: float,
+    ny: float,
+    nz: float,
+    known: Vector,
+    s: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return how far a touching pair may move on from `s` if a plane across n separates it and permits the motion.
+
+    `BLOCKED` when the plane does not permit it, `OVERLAP` when it does not even separate.
+
+    Args:
+        known: unit direction from the resting to the moving core; zeros where they are too close to have one.
+    """
+    if nx * known[0] + ny * known[1] + nz * known[2] < OPPOSED:
+        return OVERLAP
+    if not separates(placed, ka, fixed, kb, w, nx, ny, nz, touch):
+        return OVERLAP
+    offset = plane_offset(fixed, kb, nx, ny, nz) + w
+    if not plane_permits(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch):
+        return BLOCKED
+    return leave_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch, best)
+
+
+@inner_kernel
+def try_across(
+    core: Floats,
+    placed: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    u: Vector,
+    v: Vector,
+    known: Vector,
+    chain: Floats,
+    count: int,
+    s: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return the better answer of `try_direction` for the two directions across u and v (none where parallel)."""
+    nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    square, uu = nx * nx + ny * ny + nz * nz, u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    scale = uu * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    if square <= ALONG * ALONG * scale:
+        return OVERLAP
+    if square <= BARELY * BARELY * scale:
+        # Rounding leaves a part along the edges, over whose length the plane would cut into what it keeps apart.
+        along = (nx * u[0] + ny * u[1] + nz * u[2]) / uu
+        nx, ny, nz = nx - along * u[0], ny - along * u[1], nz - along * u[2]
+        square = nx * nx + ny * ny + nz * nz
+    size = math.sqrt(square)
+    nx, ny, nz = nx / size, ny / size, nz / size
+    one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
+    other = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, -nx, -ny, -nz, known, s, touch, best)
+    return max(one, other)
+
+
+@inner_kernel
+def side(core: Floats, corners: int, k: int) -> Vector:
+    """Return a core's edge from corner `k` on."""
+    j = (k + 1) % corners
+    return core[j, 0] - core[k, 0], core[j, 1] - core[k, 1], core[j, 2] - core[k, 2]
+
+
+@inner_kernel
+def leave_touch(
+    core: Floats,
+    placed: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    known: Vector,
+    chain: Floats,
+    count: int,
+    s: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return how far a sharp pair that touches at `s` may move on from planes that rest; see `try_direction`.
+
+    The planes to look at are those of the faces, those along two edges, and, for cores in one plane, those across a
+    face along an edge.
+    """
+    found = OVERLAP
+    for i in range(ka if ka > 1 else 0):
+        for k in range(kb if kb > 1 else 0):
+            u, v = side(placed, ka, i), side(fixed, kb, k)
+            found = max(found, try_across(core, placed, ka, fixed, kb, u, v, known, chain, count, s, touch, best))
+    for face in range(2):
+        nx, ny, nz, size = 0.0, 0.0, 0.0, 0.0
+        if face == 0 and kb == 3:
+            nx, ny, nz, size = face_normal(fixed)
+        if face == 1 and ka == 3:
+            nx, ny, nz, size = face_normal(placed)
+        if size > 0.0:
+            n = (nx, ny, nz)
+            for _ in range(2):
+                nx, ny, nz = -nx, -ny, -nz
+                one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
+                found = max(found, one)
+            for k in range(ka if ka > 1 else 0):
+                u = side(placed, ka, k)
+                found = max(found, try_across(core, placed, ka, fixed, kb, n, u, known, chain, count, s, touch, best))
+            for k in range(kb if kb > 1 else 0):
+                v = side(fixed, kb, k)
+                found = max(found, try_across(core, placed, ka, fixed, kb, n, v, known, chain, count, s, touch, best))
+    return found
+
+
+@inner_kernel
+def starts_apart(
+    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Vector, back: Vector, turn: float, touch: float
+) -> bool:
+    """Say whether a plane separates a touching pair from which one across m is reached by a turn of that size.
+
+    Tried are m itself, m on its way with the moving core, and the planes along two edges.
+
+    Args:
+        m: unit direction across the plane that separates the pair after the step. back: what it was before the step if
+            it goes along with the moving core. turn: of that core on the step, at most [rad].
+    """
+    if separates(placed, ka, fixed, kb, w, m[0], m[1], m[2], touch):
+        return True
+    if separates(placed, ka, fixed, kb, w, back[0], back[1], back[2], touch):
+        return True
+    for i in range(edge_count(ka)):
+        for k in range(edge_count(kb)):
+            u, v = side(placed, ka, i), side(fixed, kb, k)
+            nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+            size = math.sqrt(nx * nx + ny * ny + nz * nz)
+            if size == 0.0:
+                continue
+            if nx * m[0] + ny * m[1] + nz * m[2] < 0.0:
+                size = -size
+            nx, ny, nz = nx / size, ny / size, nz / size
+            away = (nx - m[0]) ** 2 + (ny - m[1]) ** 2 + (nz - m[2]) ** 2
+            if away <= (TILT * turn) ** 2 and separates(placed, ka, fixed, kb, w, nx, ny, nz, touch):
+                return True
+    return False
+
+
+@inner_kernel
+def probe(
+    core: Floats,
+    placed: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    w: float,
+    known: Vector,
+    chain: Floats,
+    count: int,
+    s: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return a short step after which a touching pair is apart and on which it does not overlap, or `BLOCKED`.
+
+    Between two planes, one that separates the pair now and one that does after the step, a plane that turns evenly
+    separates it on the way, up to the bends of the corners' paths: the step keeps those below the touch tolerance.
+
+    Args:
+        placed: (6, 3); the first rows have the moving core at `s`, the others are scratch space.
+    """
+    rate, speed, bend = turn_rate(chain, count), 0.0, 0.0
+    for k in range(ka):
+        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, 0.0, s)
+        speed, bend = max(speed, lever), max(bend, bound)
+    bend += 2.0 * TILT * rate * speed
+    if bend == 0.0:
+        return BLOCKED
+    step = min(math.sqrt(8.0 * touch / bend), best)
+    ahead = placed[3:]
+    move_core(core, ka, chain, count, s + step, ahead)
+    d, mx, my, mz, _, _, _, _, _ = separation(ahead, ka, fixed, kb)
+    if d - w <= FLAT * touch or plane_gap(ahead, ka, fixed, kb, mx, my, mz) - w <= 0.5 * FLAT * touch:
+        return BLOCKED
+    if mx * known[0] + my * known[1] + mz * known[2] < OPPOSED:
+        return BLOCKED
+    m = (mx, my, mz)
+    back = carried_back(m, chain, count, s, step)
+    return step if starts_apart(placed, ka, fixed, kb, w, m, back, rate * step, touch) else BLOCKED
+
+
+@inner_kernel
+def move_on(
+    core: Floats,
+    placed: Floats,
+    ka: int,
+    fixed: Floats,
+    kb: int,
+    w: float,
+    nx: float,
+    ny: float,
+    nz: float,
+    chain: Floats,
+    count: int,
+    s: float,
+    touch: float,
+    best: float,
+) -> float:
+    """Return how far a pair that touches at `s` may move on, at most `best`; `BLOCKED` or `OVERLAP` where it may not.
+
+    Args:
+        core, placed: the moving core relative to the last pivot, and where it is at `s` (and scratch space), (6, 3).
+        n: unit direction from the resting to the moving core; zeros where they are too close to have one, and w = 0.
+        The others as for `sweep_pair`.
+    """
+    known = (nx, ny, nz)
+    if w > 0.0:
+        free = try_direction(core, placed, ka, fixed, kb, w, chain, count, nx, ny, nz, known, s, touch, best)
+    else:
+        free = leave_touch(core, placed, ka, fixed, kb, known, chain, count, s, touch, best)
+    if free == BLOCKED:
+        free = probe(core, placed, ka, fixed, kb, w, known, chain, count, s, touch, best)
+    return free

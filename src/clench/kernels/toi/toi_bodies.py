@@ -1,0 +1,227 @@
+"""First contact of a moving body with a resting one, through their trees (docs/method.md section 5, exact width)."""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.geometry.box_walk import put_box, walk_rectangle, walk_to_box
+from clench.kernels.geometry.obb import RECTANGLE, put_slab_face
+from clench.kernels.runtime.compiling import inner_kernel
+
+from .pair_queue import take_first, take_in
+from .separating_planes import keep_plane, lay_plane, lies_within, passes_beside, stays_beyond
+from .spatial_motion import is_spatial
+from .toi_bounds import ball_entry, measure_of, walk_ball, walk_core
+from .toi_pairs import sweep_pair
+from .toi_work import QUEUE, SweepWork, is_looser, push_roots, put_ball, put_item, split_pair
+
+#: How coarsely the sweep of a node is settled, as a fraction of how thick it is, and of how wide [-].
+COARSE, WIDE = 0.1, 0.02
+#: No item.
+NONE = -(2**40)
+
+
+@inner_kernel
+def earliest_meeting(
+    moving: BodyArrays,
+    a: int,
+    resting: BodyArrays,
+    b: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    begin: float,
+    limit: float,
+    work: SweepWork,
+) -> float:
+    """Return a bound on when the balls of two items come within `touch`: a `turn_measure`, for several joints a travel.
+
+    Args:
+        begin: a travel before which they do not. limit: later ones are of no interest, in the measure of what is
+            returned. The rest as in `sweep_body`.
+    """
+    reach = put_ball(moving, a, work.moving, work.core[0]) + put_ball(resting, b, work.resting, work.fixed[0]) + touch
+    if count > 1:
+        return float(walk_ball(work.core, work.fixed, reach, chain, count, begin, limit, work.placed))
+    square = reach * reach - (work.core[0, 1] - work.fixed[0, 1]) ** 2
+    if square < 0.0:
+        return math.inf
+    # Mirrored where the joint turns from z to x.
+    sense = 1.0 if chain[0, 0] > 0.0 else -1.0
+    return ball_entry(work.core[0, 0], sense * work.core[0, 2], work.fixed[0, 0], sense * work.fixed[0, 2], square)
+
+
+@inner_kernel
+def keep_earliest(
+    moving: BodyArrays,
+    resting: BodyArrays,
+    low: int,
+    high: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    begin: float,
+    floor: float,
+    limit: float,
+    beyond: int,
+    work: SweepWork,
+) -> int:
+    """Order the pairs on the stack from `low` on, the earliest on top, without those that meet later than `limit`.
+
+    Args:
+        beyond: a moving item that stays beyond the plane of `work`, or `NONE`. The rest as in `earliest_meeting`.
+
+    Returns:
+        the stack's new height.
+    """
+    stack, keys, kept, spatial = work.stack, work.keys, low, is_spatial(chain)
+    for k in range(low, high):
+        a, b = stack[k, 0], stack[k, 1]
+        if a == beyond and lies_within(resting, b, work):
+            continue
+        if not spatial and passes_beside(moving, a, resting, b, work):
+            continue
+        key = earliest_meeting(moving, a, resting, b, chain, count, touch, begin, limit, work)
+        key = max(key, floor)
+        if key >= limit and key > 0.0:
+            continue
+        n = kept
+        while n > low and keys[n - 1] < key:
+            keys[n], stack[n, 0], stack[n, 1] = keys[n - 1], stack[n - 1, 0], stack[n - 1, 1]
+            n -= 1
+        keys[n], stack[n, 0], stack[n, 1] = key, a, b
+        work.since[kept], stack[kept, 2] = begin, 0
+        kept += 1
+    return kept
+
+
+@inner_kernel
+def put_moving(moving: BodyArrays, a: int, T: Floats, out: Floats) -> tuple[int, float]:
+    """Write the core of a moving item, of a flat node a rectangle; return its corners and its radius."""
+    if a >= 0:
+        return put_slab_face(moving.slab[a], T, out)
+    return put_item(moving, a, T, out)
+
+
+@inner_kernel
+def walk_item(
+    ka: int,
+    wa: float,
+    a: int,
+    resting: BodyArrays,
+    b: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    since: float,
+    best: float,
+    work: SweepWork,
+) -> float:
+    """Return a travel up to which a pair of items, of which one is a node at least, is farther apart than `touch`.
+
+    It is infinite where it is until `best`.
+
+    Args:
+        ka, wa: corners and radius of the moving item `a`, which is in `work`. since: a travel before which it is known.
+    """
+    near = touch + (COARSE * wa if a >= 0 else 0.0)
+    if b < 0:
+        kb, wb = put_item(resting, b, work.resting, work.fixed)
+        if ka == RECTANGLE:
+            return float(
+                walk_rectangle(
+                    work.core, work.fixed, kb, work.box, wa + wb + touch, chain, count, near, since, best, work.placed
+                )
+            )
+        return float(
+            walk_core(work.core, ka, work.fixed, kb, wa + wb + touch, chain, count, near, since, best, work.placed)
+        )
+    grown, box = put_box(resting.slab[b], work.resting, work.box), work.box
+    near += COARSE * (box[4, 2] + grown) + WIDE * box[4, 0]
+    w = wa + grown + touch
+    return float(walk_to_box(work.core, ka, box, w, chain, count, near, since, best, work.placed))
+
+
+@inner_kernel
+def measure(s: float, chain: Floats, count: int) -> float:
+    """Return a travel as `earliest_meeting` tells it."""
+    return s if count > 1 else float(measure_of(abs(chain[0, 0]) * s))
+
+
+@inner_kernel
+def sweep_body(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    best: float,
+    work: SweepWork,
+) -> float:
+    """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
+
+    Pairs of items are looked at in the order in which they can meet, as far as balls, and boxes after those, tell. A
+    pair is left out when that is not before `best`; when the items pass beside each other; or when a plane keeps them
+    apart, as one does everywhere on a convex body: that between the elements that met last, before that one by which
+    two never met. Elements that are left are swept.
+
+    Args:
+        chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
+        work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
+    """
+    stack, keys, laid, met, beyond, apart = work.stack, work.keys, False, False, NONE, 0.0
+    limit = measure(best, chain, count)
+    queue, height = 0, push_roots(moving, m, resting, r, stack[QUEUE:]) + QUEUE
+    height = keep_earliest(moving, resting, QUEUE, height, chain, count, touch, 0.0, 0.0, limit, NONE, work)
+    while queue > 0 or height > QUEUE:
+        if height > QUEUE:
+            height = row = height - 1
+        else:
+            queue = row = take_first(work, queue)
+        if keys[row] >= limit and keys[row] > 0.0:
+            continue
+        a, b, since = stack[row, 0], stack[row, 1], work.since[row]
+        ka, wa = put_moving(moving, a, work.moving, work.core)
+        within = laid and lies_within(resting, b, work)
+        if within and (a != beyond or since < apart):
+            beyond, apart = a if stays_beyond(ka, wa, chain, count, since, best, work) else NONE, since
+        if within and a == beyond:
+            continue
+        if a >= 0 or b >= 0:
+            if stack[row, 2] == 0:
+                s = walk_item(ka, wa, a, resting, b, chain, count, touch, since, best, work)
+                if s == math.inf or (within and s > since and stays_beyond(ka, wa, chain, count, s, best, work)):
+                    continue
+                stack[row, 2], work.since[row], keys[row] = 1, s, max(keys[row], measure(s, chain, count))
+                # What others come before waits.
+                if row < QUEUE and queue > 0 and keys[0] < keys[row]:
+                    queue = take_in(work, queue, row)
+                    continue
+            since, floor, low = work.since[row], keys[row], height
+            known = beyond if since >= apart else NONE
+            height = split_pair(moving, a, resting, b, is_looser(moving, a, resting, b), stack, low)
+            height = keep_earliest(moving, resting, low, height, chain, count, touch, since, floor, limit, known, work)
+            while low == QUEUE and queue < QUEUE and height > QUEUE:
+                height -= 1
+                queue = take_in(work, queue, height)
+            continue
+        if since > 0.0 and since >= best:
+            continue
+        kb, wb = put_item(resting, b, work.resting, work.fixed)
+        found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, since, best, work.placed)
+        if found >= best:
+            if best > 0.0 and not met and keep_plane(kb, wb, touch, work):
+                laid, beyond = True, NONE
+            continue
+        best = found
+        work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
+        if best < 0.0:
+            return best
+        limit = measure(best, chain, count)
+        lay_plane(ka, wa, kb, wb, work)
+        laid, met, beyond = True, True, NONE
+    return best

@@ -1,0 +1,292 @@
+"""The exact width of one path segment: moving links against object and resting links (docs/method.md section 5).
+
+A link that joints of one family move turns about parallel axes, in the family's frame. One that joints of several
+families move at once is seen in the palm frame, with a chain that has an axis per joint.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clench.core.tolerances import SWEEP_FRACTION
+from clench.kernels.closing.layout import ChainArrays, Floats, Work
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.sections.advance import fill_chain, place_joints
+from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
+
+from .full_width import ExactArrays, keep_pair, last_mover, place_axes, pose_movers
+from .separating_planes import lanes_apart
+from .toi_bodies import sweep_body
+from .toi_work import SweepWork
+
+
+@inner_kernel
+def sweep_turning(
+    links: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    T_palm_resting: Floats,
+    T_palm_family: Floats,
+    first: int,
+    joint: int,
+    rates: Floats,
+    touch: float,
+    best: float,
+    work: Work,
+    sweep: SweepWork,
+) -> float:
+    """Return what `sweep_link` does where the active joints are of one family."""
+    place, moving, other = work.place, sweep.moving, sweep.resting
+    count, last, _, _ = fill_chain(joint, first, rates, place, work)
+    compose_inverse(T_palm_family, sweep.poses[m], moving)
+    compose_inverse(T_palm_family, T_palm_resting, other)
+    # Told before from what `put_lanes` wrote, but for segments in which other families move as well.
+    if lanes_apart(lane_of(links.box[m], moving, 0.0, 1.0, 0.0), lane_of(resting.box[r], other, 0.0, 1.0, 0.0)):
+        return best
+    moving[0, 3], moving[2, 3] = moving[0, 3] - place[last, 0], moving[2, 3] - place[last, 1]
+    other[0, 3], other[2, 3] = other[0, 3] - place[first, 0], other[2, 3] - place[first, 1]
+    return sweep_body(links, m, resting, r, work.chain, count, touch, best, sweep)
+
+
+@inner_kernel
+def fill_spatial(first: int, joint: int, rates: Floats, sweep: SweepWork) -> tuple[int, int]:
+    """Write the chain of active joints up to `joint`; return its length and its last joint."""
+    count, last = 0, first
+    for j in range(first, joint + 1):
+        if rates[j] != 0.0:
+            row = sweep.spatial[count]
+            row[0] = rates[j]
+            for k in range(3):
+                row[1 + k] = sweep.axis[j, k]
+                if count > 0:
+                    sweep.spatial[count - 1, 4 + k] = sweep.anchor[j, k] - sweep.anchor[last, k]
+            count, last = count + 1, j
+    return count, last
+
+
+@inner_kernel
+def sweep_spatially(
+    links: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    T_palm_resting: Floats,
+    first: int,
+    joint: int,
+    rates: Floats,
+    touch: float,
+    best: float,
+    sweep: SweepWork,
+) -> float:
+    """Return what `sweep_link` does where the active joints are of several families."""
+    count, last = fill_spatial(first, joint, rates, sweep)
+    copy_pose(sweep.poses[m], sweep.moving)
+    copy_pose(T_palm_resting, sweep.resting)
+    for k in range(3):
+        sweep.moving[k, 3] -= sweep.anchor[last, k]
+        sweep.resting[k, 3] -= sweep.anchor[first, k]
+    return sweep_body(links, m, resting, r, sweep.spatial, count, touch, best, sweep)
+
+
+@inner_kernel
+def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the extent of a body's box along an axis; NaN, which parts nothing, where there is no box."""
+    middle, half = x * T[0, 3] + y * T[1, 3] + z * T[2, 3], 0.0
+    for k in range(3):
+        along = x * T[0, k] + y * T[1, k] + z * T[2, k]
+        middle += along * box[k]
+        half += abs(along) * box[3 + k]
+    return middle - half, middle + half
+
+
+@inner_kernel
+def sweep_link(
+    exact: ExactArrays,
+    chain: ChainArrays,
+    families: Floats,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    T_palm_resting: Floats,
+    first: int,
+    joint: int,
+    rates: Floats,
+    touch: float,
+    best: float,
+    work: Work,
+    sweep: SweepWork,
+) -> float:
+    """Return the first contact of one moving link with one resting body before `best`; see `sweep_body`.
+
+    Args:
+        first, joint: first active joint, and the last one that moves the link. T_palm_resting: where the body is.
+        The rest as in `sweep_stage`, which has placed joints, axes and links.
+    """
+    if resting.root[r] < 0:
+        return best
+    last = joint
+    while rates[last] == 0.0:
+        last -= 1
+    family, links = chain.joint_family[first], exact.links
+    if chain.joint_family[last] == family:
+        T = families[family]
+        return sweep_turning(links, m, resting, r, T_palm_resting, T, first, joint, rates, touch, best, work, sweep)
+    return sweep_spatially(links, m, resting, r, T_palm_resting, first, joint, rates, touch, best, sweep)
+
+
+@inner_kernel
+def first_after(exact: ExactArrays, entry: int, link: int, first: int, rates: Floats) -> int:
+    """Return the first active joint that does not move a link, or how many joints there are."""
+    j = last_mover(exact, entry, link, first - 1) + 1
+    while j < rates.shape[0] and rates[j] == 0.0:
+        j += 1
+    return j
+
+
+@inner_kernel
+def put_lanes(
+    exact: ExactArrays,
+    entry: int,
+    T_palm_family: Floats,
+    T_palm_object: Floats,
+    several: bool,
+    first: int,
+    rates: Floats,
+    sweep: SweepWork,
+) -> None:
+    """Write `lane` and `after` of every link at `sweep.poses`; where `several` families move there are no lanes."""
+    links, lane = exact.checked.shape[0], sweep.lane
+    x, y, z = T_palm_family[0, 1], T_palm_family[1, 1], T_palm_family[2, 1]
+    for r in range(links):
+        sweep.after[r] = first_after(exact, entry, r, first, rates)
+    for r in range(links + 1):
+        if several:
+            lane[r, 0], lane[r, 1] = -math.inf, math.inf
+        elif r < links:
+            lane[r, 0], lane[r, 1] = lane_of(exact.links.box[r], sweep.poses[r], x, y, z)
+        else:
+            lane[r, 0], lane[r, 1] = lane_of(exact.object.box[0], T_palm_object, x, y, z)
+
+
+@inner_kernel
+def sweep_links(
+    exact: ExactArrays,
+    chain: ChainArrays,
+    entry: int,
+    families: Floats,
+    m: int,
+    first: int,
+    joint: int,
+    rates: Floats,
+    touch: float,
+    best: float,
+    work: Work,
+    sweep: SweepWork,
+) -> tuple[float, int]:
+    """Return the first contact of a moving link with other links of the hand before `best`, and that link or -1.
+
+    Args:
+        m: the moving link. first, joint: first active joint, and the last one that moves it; see `sweep_link`.
+    """
+    met, lane = -1, sweep.lane
+    for r in range(exact.checked.shape[0]):
+        if exact.checked[m, r] == 0:
+            continue
+        # Seen from a link that moves as well, only the joints after its own turn.
+        after = sweep.after[r]
+        if after > joint or lanes_apart((lane[m, 0], lane[m, 1]), (lane[r, 0], lane[r, 1])):
+            continue
+        found = sweep_link(
+            exact, chain, families, m, exact.links, r, sweep.poses[r], after, joint, rates, touch, best, work, sweep
+        )
+        if found < 0.0:
+            sweep.skipped[0] += 1
+        elif found < best:
+            best, met = found, r
+            keep_pair(sweep)
+    return best, met
+
+
+@inner_kernel
+def sweep_stage(
+    exact: ExactArrays,
+    chain: ChainArrays,
+    entry: int,
+    families: Floats,
+    T_palm_object: Floats,
+    length: float,
+    turns: Floats,
+    rates: Floats,
+    best: float,
+    work: Work,
+    sweep: SweepWork,
+) -> tuple[float, int]:
+    """Return how far a path segment goes before a moving link meets anything it must not overlap, at most `best`.
+
+    Args:
+        exact, chain: the hand. entry: of the item. families: `T_palm_family` of those with active joints, (F, 3, 4).
+        T_palm_object: (3, 4). length: of the finger [m]. turns: of every joint [rad], (J,). rates: (J,).
+
+    Returns:
+        the travel; what is met: -1 nothing, L the object, else a link of the hand. `sweep.winner` and `sweep.poses`,
+        which has every link where it is at the start of the segment, describe it. A link that overlaps the object
+        already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
+    """
+    first = 0
+    while first < rates.shape[0] and rates[first] == 0.0:
+        first += 1
+    if first == rates.shape[0]:
+        return best, -1
+    touch = SWEEP_FRACTION * length
+    met, links, lane = -1, exact.checked.shape[0], sweep.lane
+    several = place_active(exact, chain, entry, first, turns, rates, work, sweep)
+    pose_movers(exact, chain, entry, turns, sweep.poses)
+    put_lanes(exact, entry, families[chain.joint_family[first]], T_palm_object, several, first, rates, sweep)
+    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
+        m, joint = exact.mover_link[n], exact.mover_joint[n]
+        if joint < first or exact.links.root[m] < 0:
+            continue
+        found = best
+        if not lanes_apart((lane[m, 0], lane[m, 1]), (lane[links, 0], lane[links, 1])):
+            found = sweep_link(
+                exact, chain, families, m, exact.object, 0, T_palm_object, first, joint, rates, touch, best, work, sweep
+            )
+        if found < best:
+            best, met = found, links
+            keep_pair(sweep)
+            if best < 0.0:
+                return best, met
+        best, other = sweep_links(exact, chain, entry, families, m, first, joint, rates, touch, best, work, sweep)
+        if other >= 0:
+            met = other
+    return best, met
+
+
+@inner_kernel
+def place_active(
+    exact: ExactArrays,
+    chain: ChainArrays,
+    entry: int,
+    first: int,
+    turns: Floats,
+    rates: Floats,
+    work: Work,
+    sweep: SweepWork,
+) -> bool:
+    """Place the joints of every family that has active ones in its frame, and in the palm's where they are several.
+
+    Returns:
+        whether several families have active joints.
+    """
+    before, several = -1, False
+    for j in range(first, rates.shape[0]):
+        family = chain.joint_family[j]
+        if rates[j] != 0.0 and family != before:
+            place_joints(chain, family, turns, work.place)
+            several = before >= 0
+            before = family
+    if several:
+        place_axes(exact, entry, turns, sweep)
+    return several

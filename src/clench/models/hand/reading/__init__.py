@@ -1,0 +1,1 @@
+"""Reading: from the files of a hand to links, joints and shapes."""

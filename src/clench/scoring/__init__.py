@@ -1,0 +1,1 @@
+"""Scoring: criteria, their calibration, and the choice among sets."""

@@ -1,0 +1,1 @@
+"""Analysis of a solution: quality, squeeze, sensitivity, errors of the pose, records and examples."""

@@ -1,0 +1,1 @@
+"""Many poses: batches, streams and the tracker."""

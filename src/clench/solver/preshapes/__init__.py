@@ -1,0 +1,1 @@
+"""Preshapes: the postures of a hand from which clench chooses."""
