@@ -244,7 +244,7 @@ def test_the_other_checks_see_what_they_look_for() -> None:
 
 
 #: Compiled without counts of references.
-PLAIN_KERNELS = {"kernel", "inner_kernel"}
+PLAIN_KERNELS = {"kernel", "entry_kernel"}
 
 
 Kernel = tuple[Path, ast.FunctionDef]
@@ -276,7 +276,7 @@ def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
         "Separation",
         "Outline",
     }
-    plain, counting = kernels(*PLAIN_KERNELS), kernels("allocating_kernel", "inner_allocating_kernel")
+    plain, counting = kernels(*PLAIN_KERNELS), kernels("kernel(allocates=True)", "entry_kernel(allocates=True)")
     assert len(plain) > 100
 
     def with_arrays(functions: dict[str, Kernel]) -> set[str]:
@@ -287,7 +287,7 @@ def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
     rows, arrays = with_arrays(plain), with_arrays(counting)
     assert "mesh_of" in rows
     assert "make_work" in arrays
-    inner = kernels("inner_kernel")
+    inner = kernels("kernel")
     wrong = [f"{shown(plain[name][0])}: {name} returns arrays, and Python can call it" for name in rows - set(inner)]
     for functions, barred in ((plain, arrays), (counting, rows)):
         for name, (path, node) in functions.items():
@@ -306,8 +306,8 @@ def test_no_two_test_files_have_one_name() -> None:
 
 
 def test_python_never_imports_a_kernel_without_an_entry() -> None:
-    # A call of such a kernel from Python ends the process without a message.
-    inner = set(kernels("inner_kernel", "inner_allocating_kernel"))
+    # A call of such a kernel from Python raises.
+    inner = set(kernels("kernel", "kernel(allocates=True)"))
     assert "close_group" in inner
     callers = [path for path in SOURCES if path not in KERNEL_FILES]
     wrong = []
@@ -343,7 +343,7 @@ def test_kernels_that_allocate_are_marked() -> None:
 
 def test_a_kernel_that_allocates_unmarked_is_found() -> None:
     assert makers_of_arrays("@kernel\ndef f(a):\n    return np.zeros(3)\n") == ["f"]
-    assert not makers_of_arrays("@allocating_kernel\ndef f(a):\n    return np.zeros(3)\n")
+    assert not makers_of_arrays("@kernel(allocates=True)\ndef f(a):\n    return np.zeros(3)\n")
 
 
 def test_import_is_light_and_quick() -> None:

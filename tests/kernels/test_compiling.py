@@ -2,13 +2,16 @@
 
 import ast
 import importlib.util
+import pickle
 import shutil
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 from benchmarks.peers.kernels import stepped_closing
+from clench.kernels.closing import close_item
 from clench.kernels.runtime import compiling, warming
 
 KERNELS = Path(compiling.__file__).parents[1]
@@ -109,3 +112,19 @@ def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expe
     # Only numbers of `tolerances` are compiled in; `memory` is called by functions that Python runs.
     allowed = {"clench.core", "clench.core.tolerances", "clench.core.memory"}
     assert {module for module in outside if not module.startswith("clench.kernels.")} <= allowed
+
+
+def test_a_kernel_without_an_entry_refuses_a_call_from_python() -> None:
+    with pytest.raises(TypeError, match="close_group: expected a call from a kernel"):
+        close_item.close_group(1.0)
+
+
+def test_an_index_of_another_version_on_disk_is_no_index(tmp_path, monkeypatch) -> None:
+    index = compiling.index_of(warming.solve_poses)
+    stamp = pickle.dumps((index._source_stamp, {})).replace(b".", b"")
+    path = tmp_path / "old.nbi"
+    path.write_bytes(pickle.dumps(numba.__version__) + b"cclench.kernels.no_such_module\nArrays\n." + stamp)
+    monkeypatch.setattr(index, "_index_path", str(path))
+    assert index._load_index() == {}
+    path.unlink()
+    assert index._load_index() == {}

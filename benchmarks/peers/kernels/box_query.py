@@ -11,7 +11,7 @@ from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import Elements
 from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.geometry.core_distance import crosses, separation
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
@@ -48,7 +48,7 @@ class Query(NamedTuple):
     stack: Ints
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_query() -> Query:
     """Allocate the scratch space of queries."""
     return Query(np.empty((3, 4)), np.empty((3, 3)), np.empty((3, 3)), np.empty((PAIRS, 2), dtype=np.int64))
@@ -95,7 +95,7 @@ def _boxes(points: Floats, radius: Floats, first: Any, count: Any, right: Any) -
     return lows - 1e-12, highs + 1e-12
 
 
-@inner_kernel
+@kernel
 def within(one: BoxTrees, m: int, other: BoxTrees, r: int, bound: float, query: Query) -> bool:
     """Say whether two solids cross or come nearer than a bound [m]; `query.pose` places the first in the second."""
     stack, waiting = query.stack, 0
@@ -126,13 +126,13 @@ def within(one: BoxTrees, m: int, other: BoxTrees, r: int, bound: float, query: 
     return found
 
 
-@inner_kernel
+@kernel
 def larger(a: Floats, b: Floats) -> bool:
     """Say whether a box has the longer diagonal."""
     return bool(a[0] ** 2 + a[1] ** 2 + a[2] ** 2 > b[0] ** 2 + b[1] ** 2 + b[2] ** 2)
 
 
-@inner_kernel
+@kernel
 def boxes_apart(one: BoxTrees, a: int, other: BoxTrees, b: int, bound: float, query: Query) -> bool:
     """Say whether a face of either box keeps two nodes apart by more than a bound."""
     T, spread, p, q = query.pose, query.spread, one.middle[a], other.middle[b]
@@ -152,7 +152,7 @@ def boxes_apart(one: BoxTrees, a: int, other: BoxTrees, b: int, bound: float, qu
     return bool(apart)
 
 
-@inner_kernel
+@kernel
 def leaves_meet(one: BoxTrees, a: int, other: BoxTrees, b: int, bound: float, query: Query) -> bool:
     """Say whether any elements of two leaves cross or come nearer than a bound."""
     found = False

@@ -12,7 +12,7 @@ import numpy as np
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.link_frames import FrameArrays, couple, put_link
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import compose_inverse
 
 from .box_query import BoxTrees, Query, make_query, within
@@ -73,7 +73,7 @@ class _State(NamedTuple):
     target_pose: Floats
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def close_in_steps(
     rule: int,
     hand: SteppedHand,
@@ -115,7 +115,7 @@ def close_in_steps(
             step_one(hand, target, state, d, step, fine)
 
 
-@inner_kernel
+@kernel
 def step_all(hand: SteppedHand, target: BoxTrees, state: _State, step: float, tolerance: float, most: int) -> None:
     """Move everything at once; halve a step that collides until the gap is small, and stop what touches."""
     for _ in range(most):
@@ -144,7 +144,7 @@ def step_all(hand: SteppedHand, target: BoxTrees, state: _State, step: float, to
         accept(hand, state)
 
 
-@inner_kernel
+@kernel
 def step_each(hand: SteppedHand, target: BoxTrees, state: _State, step: float) -> bool:
     """Move every degree of freedom that still moves by one step; say whether any does."""
     moved = False
@@ -160,7 +160,7 @@ def step_each(hand: SteppedHand, target: BoxTrees, state: _State, step: float) -
     return moved
 
 
-@inner_kernel
+@kernel
 def step_once_more(hand: SteppedHand, target: BoxTrees, state: _State, step: float) -> None:
     """Try one more step with everything that stands at a contact."""
     for d in range(hand.free.shape[0]):
@@ -170,7 +170,7 @@ def step_once_more(hand: SteppedHand, target: BoxTrees, state: _State, step: flo
                 accept(hand, state)
 
 
-@inner_kernel
+@kernel
 def step_one(hand: SteppedHand, target: BoxTrees, state: _State, d: int, step: float, fine: float) -> None:
     """Move one degree of freedom in steps until it hits, then from the step before in fine ones."""
     while state.stops[d] == MOVING:
@@ -186,7 +186,7 @@ def step_one(hand: SteppedHand, target: BoxTrees, state: _State, d: int, step: f
             state.stops[d] = AT_CONTACT
 
 
-@inner_kernel
+@kernel
 def move_all(hand: SteppedHand, state: _State, step: float) -> None:
     """Write the posture one step on of everything that moves to `trial`."""
     copy_posture(state.q, state.trial)
@@ -196,7 +196,7 @@ def move_all(hand: SteppedHand, state: _State, step: float) -> None:
     couple(hand.frames, state.trial)
 
 
-@inner_kernel
+@kernel
 def move_one(hand: SteppedHand, state: _State, d: int, step: float) -> None:
     """Write the posture one step of one degree of freedom on to `trial`."""
     copy_posture(state.q, state.trial)
@@ -204,7 +204,7 @@ def move_one(hand: SteppedHand, state: _State, d: int, step: float) -> None:
     couple(hand.frames, state.trial)
 
 
-@inner_kernel
+@kernel
 def stepped(hand: SteppedHand, q: Floats, d: int, step: float) -> float:
     """Return an angle one step on, at most at its limit."""
     left = (hand.end[d] - q[hand.free[d]]) * hand.rate[d]
@@ -213,14 +213,14 @@ def stepped(hand: SteppedHand, q: Floats, d: int, step: float) -> float:
     return float(q[hand.free[d]] + hand.rate[d] * step)
 
 
-@inner_kernel
+@kernel
 def copy_posture(q: Floats, out: Floats) -> None:
     """Write a posture elsewhere."""
     for j in range(q.shape[0]):
         out[j] = q[j]
 
 
-@inner_kernel
+@kernel
 def accept(hand: SteppedHand, state: _State) -> None:
     """Go to the posture that was tried, and note what is at its limit."""
     copy_posture(state.trial, state.q)
@@ -229,7 +229,7 @@ def accept(hand: SteppedHand, state: _State) -> None:
             state.stops[d] = AT_LIMIT
 
 
-@inner_kernel
+@kernel
 def is_moving(hand: SteppedHand, state: _State, m: int) -> bool:
     """Say whether a link is moved by anything that moves."""
     found = False
@@ -240,7 +240,7 @@ def is_moving(hand: SteppedHand, state: _State, m: int) -> bool:
     return found
 
 
-@inner_kernel
+@kernel
 def any_hit(hand: SteppedHand, target: BoxTrees, state: _State) -> bool:
     """Say whether any moving link collides at the posture that is tried."""
     put_links(hand, state.trial, state, -1)
@@ -252,7 +252,7 @@ def any_hit(hand: SteppedHand, target: BoxTrees, state: _State) -> bool:
     return found
 
 
-@inner_kernel
+@kernel
 def any_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) -> bool:
     """Say whether any moving link is nearer than a bound at the posture that is tried."""
     found = False
@@ -263,7 +263,7 @@ def any_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) -
     return found
 
 
-@inner_kernel
+@kernel
 def hits(hand: SteppedHand, target: BoxTrees, state: _State, d: int) -> bool:
     """Say whether a link that a degree of freedom moves collides at the posture that is tried."""
     put_links(hand, state.trial, state, hand.finger[d])
@@ -275,7 +275,7 @@ def hits(hand: SteppedHand, target: BoxTrees, state: _State, d: int) -> bool:
     return found
 
 
-@inner_kernel
+@kernel
 def stop_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) -> bool:
     """Stop whatever moves a link that is nearer than a bound; say whether there is such a link."""
     found = False
@@ -286,7 +286,7 @@ def stop_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) 
     return found
 
 
-@inner_kernel
+@kernel
 def stop_hit(hand: SteppedHand, target: BoxTrees, state: _State, step: float) -> None:
     """Stop whatever moves a link that collides one step on, where no gap can be found before it."""
     move_all(hand, state, step)
@@ -296,7 +296,7 @@ def stop_hit(hand: SteppedHand, target: BoxTrees, state: _State, step: float) ->
             stop_link(hand, state, m)
 
 
-@inner_kernel
+@kernel
 def stop_link(hand: SteppedHand, state: _State, m: int) -> None:
     """Stop whatever moves a link."""
     for d in range(hand.free.shape[0]):
@@ -304,7 +304,7 @@ def stop_link(hand: SteppedHand, state: _State, m: int) -> None:
             state.stops[d] = AT_CONTACT
 
 
-@inner_kernel
+@kernel
 def hit_of(hand: SteppedHand, target: BoxTrees, state: _State, m: int) -> bool:
     """Say whether one link collides: one query."""
     hit = meets(hand, target, state, m, 0.0)
@@ -312,7 +312,7 @@ def hit_of(hand: SteppedHand, target: BoxTrees, state: _State, m: int) -> bool:
     return hit
 
 
-@inner_kernel
+@kernel
 def near_of(hand: SteppedHand, target: BoxTrees, state: _State, m: int, bound: float) -> bool:
     """Say whether one link that does not collide is nearer than a bound: one query."""
     near = meets(hand, target, state, m, bound)
@@ -320,14 +320,14 @@ def near_of(hand: SteppedHand, target: BoxTrees, state: _State, m: int, bound: f
     return near
 
 
-@inner_kernel
+@kernel
 def meets(hand: SteppedHand, target: BoxTrees, state: _State, m: int, bound: float) -> bool:
     """Say whether a link crosses the target or is nearer than a bound."""
     compose_inverse(state.target_pose, state.poses[m], state.query.pose)
     return bool(within(hand.links, m, target, 0, bound, state.query))
 
 
-@inner_kernel
+@kernel
 def note(state: _State, m: int, kind: int, answer: bool) -> None:
     """Count a query, and keep it while there is room."""
     row = state.tally[COLLISIONS] + state.tally[DISTANCES]
@@ -338,7 +338,7 @@ def note(state: _State, m: int, kind: int, answer: bool) -> None:
         state.log.queries[row, 2] = 1 if answer else 0
 
 
-@inner_kernel
+@kernel
 def put_links(hand: SteppedHand, q: Floats, state: _State, finger: int) -> None:
     """Write the poses of the links of a finger in the frame of the root; of all fingers for -1."""
     state.tally[POSTURES] += 1

@@ -23,7 +23,7 @@ from .hand_plan import HandPlan
 
 if TYPE_CHECKING:
     from clench.kernels.closing.layout import ClosingArrays
-    from clench.kernels.closing.meeting_layout import Meetings
+    from clench.kernels.meetings.meeting_layout import Meetings
 
 #: The kind of a touch of two links' surfaces that lie on no plane.
 _FACE: Final = 5

@@ -12,13 +12,13 @@ from .hand_plan import HandPlan
 from .link_bodies import HandBodies
 
 if TYPE_CHECKING:
-    from clench.kernels.closing.meeting_layout import FingerLinks
+    from clench.kernels.meetings.meeting_layout import FingerLinks
     from clench.kernels.toi.full_width import ExactArrays
 
 
 def pack_finger_links(plan: HandPlan) -> FingerLinks:
     """Return the links of a plan's fingers that can touch; none where fingers close one after another."""
-    from clench.kernels.closing.meeting_layout import FingerLinks
+    from clench.kernels.meetings.meeting_layout import FingerLinks
 
     exact, bodies = plan.exact, plan.bodies
     first, links, joints, arms, tilts = [0], [], [], [], []

@@ -16,8 +16,8 @@ from .threads import share_out
 
 if TYPE_CHECKING:
     from clench.kernels.closing.layout import ClosingArrays
-    from clench.kernels.closing.meeting_layout import Meetings
     from clench.kernels.closing.solve_layout import Closed, Solved
+    from clench.kernels.meetings.meeting_layout import Meetings
 
 
 Arrays = TypeVar("Arrays")
@@ -167,7 +167,7 @@ def _closing_arrays(problem: PackedProblem, shape: tuple[int, int]) -> ClosingAr
 
 def _meetings(problem: PackedProblem, count: int) -> Meetings:
     """Return room for all meetings of links: two links meet once at most."""
-    from clench.kernels.closing.meeting_layout import Meetings
+    from clench.kernels.meetings.meeting_layout import Meetings
 
     most = len(problem.arrays.fingers.link) ** 2 // 2
     return Meetings(_whole((count, 1)), _whole((count, most, 6)), np.zeros((count, most, 8)))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.runtime.by_reference import whole
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import ExactArrays
 
 from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
     """Return the answers of all items at one pose."""
     return ClosingArrays(
@@ -26,7 +26,7 @@ def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
     )
 
 
-@inner_kernel
+@kernel
 def clear_answer(answer: ClosingArrays, i: int) -> None:
     """Make an item's answer what the closing starts from."""
     answer.travel[i] = 0.0
@@ -35,7 +35,7 @@ def clear_answer(answer: ClosingArrays, i: int) -> None:
     answer.overlap[i] = -1
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def among(exact: ExactArrays, wanted: Ints, obj: BodyArrays, link_pose: Floats, checked: Ints) -> ExactArrays:
     """Return what sweeps read, for other items and another object, with links elsewhere and others to be checked."""
     return ExactArrays(
@@ -54,7 +54,7 @@ def among(exact: ExactArrays, wanted: Ints, obj: BodyArrays, link_pose: Floats, 
     )
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
     """Return fingers whose groups have other limits."""
     c = hand.chain

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.core.tolerances import PASSED_GAP
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .contact_reading import TOUCH_GAP, TOUCH_GRASPABLE, TOUCH_LINK, TouchArrays, read_touch
 from .layout import SUNK, ClosingArrays, Floats, Ints, ItemArrays
@@ -16,7 +16,7 @@ from .solve_layout import ProblemArrays, Workspace
 SAME_TOTAL = 1e-9
 
 
-@inner_kernel
+@kernel
 def choose_sets(
     problem: ProblemArrays, T_palm_object: Floats, free: ClosingArrays, space: Workspace, chosen: Ints
 ) -> None:
@@ -38,7 +38,7 @@ def choose_sets(
             chosen[f], rank, best = i, above, total
 
 
-@inner_kernel
+@kernel
 def read_item(
     problem: ProblemArrays,
     items: ItemArrays,
@@ -64,13 +64,13 @@ def read_item(
     return int(holding_links(touches, i, answer.contacts[i]))
 
 
-@inner_kernel
+@kernel
 def holds(touches: TouchArrays, i: int, n: int) -> bool:
     """Say whether a touch is one with what is to be grasped, and still there."""
     return bool(touches.number[i, n, TOUCH_GRASPABLE] != 0 and not touches.value[i, n, TOUCH_GAP] > PASSED_GAP)
 
 
-@inner_kernel
+@kernel
 def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
     """Return how many links touch what is to be grasped."""
     count = 0
@@ -85,7 +85,7 @@ def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
     return count
 
 
-@inner_kernel
+@kernel
 def set_total(problem: ProblemArrays, entry: int, links: int, answer: ClosingArrays, i: int, q: Floats) -> float:
     """Return the weighted sum of a set's criteria, in steps; see `clench.scoring.finger_criteria`. Overwrite `q`."""
     hand, frames, command = problem.hand, problem.frames, problem.command

@@ -8,7 +8,7 @@ joints are at rest.
 from __future__ import annotations
 
 from clench.core.tolerances import TOUCH_FRACTION
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.advance import advance
 from clench.kernels.sections.later_planes import enter_family, is_held
 from clench.kernels.sections.plane_contact import describe_hit, settle_hit
@@ -36,7 +36,7 @@ from .settling import settle
 from .solve_layout import ObjectArrays
 
 
-@inner_kernel
+@kernel
 def close_group(
     hand: HandArrays,
     exact: ExactArrays,
@@ -119,7 +119,7 @@ def close_group(
             )
 
 
-@inner_kernel
+@kernel
 def entry_joints(hand: HandArrays, entry: int) -> tuple[int, int]:
     """Return the range of an entry's joints."""
     first, groups = 0, hand.chain.joint_group
@@ -131,7 +131,7 @@ def entry_joints(hand: HandArrays, entry: int) -> tuple[int, int]:
     return first, last
 
 
-@inner_kernel
+@kernel
 def moving_joint(hand: HandArrays, exact: ExactArrays, entry: int, met: int, work: Work, sweep: SweepWork) -> int:
     """Return the last joint that moves the link which touches: by the exact sweep where `met` says so, else a plane."""
     if met < 0:
@@ -139,7 +139,7 @@ def moving_joint(hand: HandArrays, exact: ExactArrays, entry: int, met: int, wor
     return last_mover(exact, entry, sweep.winner[2], exact.joint_first[entry])
 
 
-@inner_kernel
+@kernel
 def group_family(hand: HandArrays, group: int) -> int:
     """Return the family of a group's joints."""
     for j in range(hand.chain.joint_group.shape[0]):
@@ -148,13 +148,13 @@ def group_family(hand: HandArrays, group: int) -> int:
     return -1
 
 
-@inner_kernel
+@kernel
 def stops_same(chain: ChainArrays, hit: Ints, group: int, joint: int) -> bool:
     """Say whether a contact stops what another one stops: a group, or its joints up to one that later ones leave."""
     return hit[HIT_GROUP] == group and (not chain.breaks[group] or hit[HIT_JOINT] == joint)
 
 
-@inner_kernel
+@kernel
 def write_contact(
     hand: HandArrays,
     exact: ExactArrays,
@@ -195,7 +195,7 @@ def write_contact(
     describe_pair(exact, T_palm_object, met, group, family, sweep, hit, point)
 
 
-@kernel
+@entry_kernel
 def close_item(
     hand: HandArrays,
     exact: ExactArrays,
@@ -241,7 +241,7 @@ def close_item(
     settle(hand, exact, T_palm_object, hand.entry_family[entry], shared, own, items, i, work, sweep, answer)
 
 
-@inner_kernel
+@kernel
 def close_groups(
     hand: HandArrays,
     exact: ExactArrays,

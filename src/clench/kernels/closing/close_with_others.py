@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from clench.kernels.closing.at_once import close_at_once
 from clench.kernels.closing.bundles import among
 from clench.kernels.closing.in_turn import close_in_turn
 from clench.kernels.closing.layout import ClosingArrays, Floats
-from clench.kernels.closing.meeting_layout import Meetings
 from clench.kernels.closing.solve_layout import Closed, ProblemArrays, Workspace
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.meetings.at_once import close_at_once
+from clench.kernels.meetings.meeting_layout import Meetings
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_sections import cut_first_families, needs_planes
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def close_with_others(
     problem: ProblemArrays,
     T_palm_object: Floats,
@@ -67,7 +67,7 @@ def close_with_others(
     )
 
 
-@inner_kernel
+@kernel
 def put_swept(space: Workspace) -> int:
     """Write the fingers that are swept exactly to `space.rows`; return how many there are."""
     count = 0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.kernels.geometry.link_frames import FrameArrays, place_links, put_angles, put_closed
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import back
 from clench.kernels.sections.round_section import CAPSULE, CYLINDER, ELLIPSOID
 
@@ -71,7 +71,7 @@ class SurfaceArrays(NamedTuple):
     graspable: Ints
 
 
-@inner_kernel
+@kernel
 def put_round_normal(rounds: RoundArrays, i: int, T_palm_object: Floats, position: Floats, out: Floats) -> None:
     """Write the outward unit normal of a round shape at a point of its surface, both in the palm frame."""
     pose, size, kind = rounds.pose[i], rounds.size[i], rounds.kind[i]
@@ -91,7 +91,7 @@ def put_round_normal(rounds: RoundArrays, i: int, T_palm_object: Floats, positio
     out[0], out[1], out[2] = turned(T_palm_object, x, y, z)
 
 
-@inner_kernel
+@kernel
 def turned(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Turn a direction as a pose does, (3, 4)."""
     return (
@@ -101,7 +101,7 @@ def turned(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float
     )
 
 
-@inner_kernel
+@kernel
 def is_carried(hand: HandArrays, entry: int, family: int, travel: Floats) -> bool:
     """Say whether joints of families after a touch's own have moved."""
     for j in range(hand.chain.joint_family.shape[0]):
@@ -111,7 +111,7 @@ def is_carried(hand: HandArrays, entry: int, family: int, travel: Floats) -> boo
     return False
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def carried(
     hand: HandArrays, frames: FrameArrays, entry: int, link: int, family: int, travel: Floats, position: Floats
 ) -> float:
@@ -140,7 +140,7 @@ def carried(
     return math.sqrt(away)
 
 
-@inner_kernel
+@kernel
 def read_plane_touch(
     hand: HandArrays,
     frames: FrameArrays,
@@ -179,7 +179,7 @@ def read_plane_touch(
     value[TOUCH_OFFSET] = offset
 
 
-@inner_kernel
+@kernel
 def read_exact_touch(
     surface: SurfaceArrays, links: int, hit: Ints, point: Floats, pose: Floats, number: Ints, value: Floats
 ) -> None:
@@ -199,7 +199,7 @@ def read_exact_touch(
     value[TOUCH_SIDE] = value[TOUCH_CURVE] if hit[HIT_KIND] == KIND_SIDE else math.nan
 
 
-@inner_kernel
+@kernel
 def read_touch(
     hand: HandArrays,
     frames: FrameArrays,
@@ -226,7 +226,7 @@ def read_touch(
     number[TOUCH_GRASPABLE] = surface.graspable[body] if body >= 0 else 0
 
 
-@kernel
+@entry_kernel
 def read_touches(
     hand: HandArrays,
     frames: FrameArrays,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_sections import cut_first_families, needs_planes
 from clench.kernels.sections.section_overlap import look_for_overlaps
 
@@ -13,7 +13,7 @@ from .solve_layout import ProblemArrays, Workspace
 from .start_overlap import CROSSED, start_overlap
 
 
-@inner_kernel
+@kernel
 def close_free(
     problem: ProblemArrays, T_palm_object: Floats, space: Workspace, answer: ClosingArrays, crossed: Ints
 ) -> int:
@@ -60,7 +60,7 @@ def close_free(
     return int(overflow)
 
 
-@inner_kernel
+@kernel
 def find_blocked(
     problem: ProblemArrays,
     T_palm_object: Floats,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clench.kernels.geometry.link_frames import put_links
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import ExactArrays
 
 from .bundles import among, clear_answer, with_lengths
@@ -13,7 +13,7 @@ from .picking import put_item_angles, take_joints
 from .solve_layout import ProblemArrays, Workspace
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def close_in_turn(
     problem: ProblemArrays,
     T_palm_object: Floats,
@@ -67,7 +67,7 @@ def close_in_turn(
         anew[f], first = 1, f + 1
 
 
-@inner_kernel
+@kernel
 def place_fingers(problem: ProblemArrays, space: Workspace, final: ClosingArrays) -> None:
     """Write where all links are when a finger begins to close, those before it closed already, and how far all go."""
     command, frames, q, angles = problem.command, problem.frames, space.q, space.angles
@@ -87,7 +87,7 @@ def place_fingers(problem: ProblemArrays, space: Workspace, final: ClosingArrays
         take_joints(command, entry, angles, q)
 
 
-@inner_kernel
+@kernel
 def first_meeting(
     problem: ProblemArrays,
     hand: HandArrays,
@@ -130,7 +130,7 @@ def first_meeting(
     return -1
 
 
-@inner_kernel
+@kernel
 def breaks_away(hand: HandArrays, entry: int) -> bool:
     """Say whether joints of an entry go on when those before them are blocked."""
     breaks = False

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from clench.kernels.geometry.link_frames import put_closed
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
 
 from .layout import ClosingArrays, Floats, Ints
 from .solve_layout import CommandArrays, ProblemArrays, Workspace
 
 
-@inner_kernel
+@kernel
 def pick_items(
     problem: ProblemArrays, free: ClosingArrays, chosen: Ints, space: Workspace, final: ClosingArrays
 ) -> None:
@@ -24,7 +24,7 @@ def pick_items(
         copy_answer(free, i, final, f)
 
 
-@inner_kernel
+@kernel
 def copy_answer(given: ClosingArrays, i: int, out: ClosingArrays, f: int) -> None:
     """Copy the answer of one item."""
     copy_row(given.travel[i], out.travel[f])
@@ -39,14 +39,14 @@ def copy_answer(given: ClosingArrays, i: int, out: ClosingArrays, f: int) -> Non
     out.overlap[f], out.skipped[f] = given.overlap[i], given.skipped[i]
 
 
-@inner_kernel
+@kernel
 def copy_row(given: Floats, out: Floats) -> None:
     """Copy numbers, (K,)."""
     for k in range(given.shape[0]):
         out[k] = given[k]
 
 
-@inner_kernel
+@kernel
 def put_item_angles(problem: ProblemArrays, entry: int, travel: Floats, turn: Floats, q: Floats) -> None:
     """Write all joints' angles when an entry has closed; see `FingerPlan.angles` and `FingerPlan.turned`."""
     hand = problem.hand
@@ -54,7 +54,7 @@ def put_item_angles(problem: ProblemArrays, entry: int, travel: Floats, turn: Fl
     put_closed(problem.frames, hand.chain, entry, first, last, travel, turn, q)
 
 
-@inner_kernel
+@kernel
 def take_joints(command: CommandArrays, entry: int, angles: Floats, q: Floats) -> None:
     """Copy the angles of a finger's own joints into the posture of the hand."""
     for k in range(command.joints.shape[1]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .layout import ChainArrays, Floats, Ints
 
@@ -12,7 +12,7 @@ from .layout import ChainArrays, Floats, Ints
 ALL = -1
 
 
-@inner_kernel
+@kernel
 def next_bound(chain: ChainArrays, j: int, travel: float) -> float:
     """Return the travel of its group at which a joint next starts or stops moving, or the group is at its limit."""
     g = chain.joint_group[j]
@@ -23,7 +23,7 @@ def next_bound(chain: ChainArrays, j: int, travel: float) -> float:
     return float(chain.group_length[g])
 
 
-@inner_kernel
+@kernel
 def next_segment(
     chain: ChainArrays,
     joints: tuple[int, int],
@@ -56,7 +56,7 @@ def next_segment(
     return 0.0 if end == math.inf else end
 
 
-@inner_kernel
+@kernel
 def first_member(chain: ChainArrays, begin: int, joint: int) -> int:
     """Return the first joint of the finger that is in a joint's group; members need not stand side by side."""
     first = begin
@@ -65,7 +65,7 @@ def first_member(chain: ChainArrays, begin: int, joint: int) -> int:
     return first
 
 
-@inner_kernel
+@kernel
 def move_groups(
     chain: ChainArrays, joints: tuple[int, int], group: int, travel: Floats, locked: Ints, moved: float
 ) -> None:
@@ -83,7 +83,7 @@ def move_groups(
             travel[g] = bound if moved >= (bound - travel[g]) / speed else travel[g] + speed * moved
 
 
-@inner_kernel
+@kernel
 def lock_joints(chain: ChainArrays, joints: tuple[int, int], last: int, locked: Ints) -> None:
     """Hold the joints up to `last`, and with each all of its group, unless the group's later joints break away."""
     for j in range(joints[0], last + 1):
@@ -94,7 +94,7 @@ def lock_joints(chain: ChainArrays, joints: tuple[int, int], last: int, locked: 
                     locked[k] = 1
 
 
-@inner_kernel
+@kernel
 def lock_held(chain: ChainArrays, joints: tuple[int, int], until: Floats, along: float, locked: Ints) -> None:
     """Hold the joints that are held from outside from here on."""
     for j in range(joints[0], joints[1]):

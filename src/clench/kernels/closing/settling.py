@@ -7,7 +7,7 @@ import math
 from clench.core.tolerances import PASSED_GAP, TOUCH_FRACTION
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector, cross, dot
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_contact import settle_hit
 from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.sections.turning import STILL
@@ -35,7 +35,7 @@ from .layout import (
 )
 
 
-@inner_kernel
+@kernel
 def settle(
     hand: HandArrays,
     exact: ExactArrays,
@@ -65,7 +65,7 @@ def settle(
             settle_carried(exact, hand, entry, turns, T_palm_object, hit, point, sweep)
 
 
-@inner_kernel
+@kernel
 def later_turned(hand: HandArrays, entry: int, family: int, turns: Floats) -> bool:
     """Say whether joints of families after a contact's own have turned: its plane does not tell where it is by now."""
     for j in range(turns.shape[0]):
@@ -74,7 +74,7 @@ def later_turned(hand: HandArrays, entry: int, family: int, turns: Floats) -> bo
     return False
 
 
-@inner_kernel
+@kernel
 def closest_pair(exact: ExactArrays, T_palm_object: Floats, m: int, met: int, bound: float, sweep: SweepWork) -> float:
     """Find the elements of a link and of what it met that are closest at `sweep.poses`; return their gap."""
     on_object = met == exact.checked.shape[0]
@@ -84,7 +84,7 @@ def closest_pair(exact: ExactArrays, T_palm_object: Floats, m: int, met: int, bo
     return body_gap(exact.links, m, resting, r, bound, 1.0, sweep)
 
 
-@inner_kernel
+@kernel
 def settle_carried(
     exact: ExactArrays,
     hand: HandArrays,
@@ -109,7 +109,7 @@ def settle_carried(
         describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
 
 
-@inner_kernel
+@kernel
 def closest_element(exact: ExactArrays, T_palm_object: Floats, m: int, k: int, sweep: SweepWork) -> int:
     """Return the element of a link at `sweep.poses` that is closest to an element of the object."""
     links, target = exact.links, exact.object
@@ -124,7 +124,7 @@ def closest_element(exact: ExactArrays, T_palm_object: Floats, m: int, k: int, s
     return closest
 
 
-@inner_kernel
+@kernel
 def settle_pair(
     exact: ExactArrays,
     chain: ChainArrays,
@@ -156,7 +156,7 @@ def settle_pair(
             describe_pair(exact, T_palm_object, met, hit[HIT_GROUP], hit[HIT_FAMILY], sweep, hit, point)
 
 
-@inner_kernel
+@kernel
 def holds_exactly(
     exact: ExactArrays,
     chain: ChainArrays,

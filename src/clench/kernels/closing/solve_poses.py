@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from clench.kernels.geometry.link_meshes import make_depth_work
+from clench.kernels.meetings.meeting_layout import make_meeting_work
 from clench.kernels.runtime.by_reference import whole
-from clench.kernels.runtime.compiling import allocating_kernel, inner_allocating_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.advance import make_work
 from clench.kernels.toi.toi_work import make_sweep_work
 
@@ -16,13 +17,12 @@ from .close_with_others import close_with_others
 from .contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays
 from .free_closing import close_free, find_blocked
 from .layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays, Floats, ItemArrays
-from .meeting_layout import make_meeting_work
 from .picking import pick_items
 from .solve_layout import BLOCK, CHOOSE, CLOSE, FINISH, Arena, Closed, ProblemArrays, Solved, Workspace
 from .verdict import judge_pose
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def solve_poses(
     problem: ProblemArrays, T_palm_objects: Floats, arena: Arena, found: Closed, solved: Solved, stages: int
 ) -> None:
@@ -56,7 +56,7 @@ def solve_poses(
         found.overflow[n] = overflow
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_workspace(problem: ProblemArrays, arena: Arena, found: Closed, solved: Solved) -> Workspace:
     """Allocate the scratch space of a solve."""
     hand, command, frames = problem.hand, problem.command, problem.frames
@@ -84,7 +84,7 @@ def make_workspace(problem: ProblemArrays, arena: Arena, found: Closed, solved: 
     )
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_answer(items: int, groups: int, joints: int, contacts: int, families: int) -> ClosingArrays:
     """Allocate the answers of some items."""
     counts = np.zeros(items, dtype=np.int64)

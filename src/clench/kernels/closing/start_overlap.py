@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, depth_of, may_hold_part
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .layout import Floats, Ints
 
@@ -14,7 +14,7 @@ FREE, RESTING_LINK, ANY_LINK = 0, 1, 2
 CROSSED = 3
 
 
-@inner_kernel
+@kernel
 def any_deep(
     meshes: LinkMeshArrays, wanted: Ints, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, work: DepthWork
 ) -> bool:
@@ -29,7 +29,7 @@ def any_deep(
     return False
 
 
-@inner_kernel
+@kernel
 def start_overlap(
     link_pose: Floats,
     meshes: LinkMeshArrays,

@@ -5,14 +5,14 @@ from __future__ import annotations
 from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.kernels.geometry.link_frames import put_links, tie
 from clench.kernels.geometry.link_meshes import find_contained
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.meetings.meeting_layout import Meetings
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import find_link_overlap
 
 from .bundles import among
 from .choosing import holds, read_item
 from .contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS, TOUCH_LINK, TOUCH_NORMAL, TouchArrays
 from .layout import SUNK, ClosingArrays, Floats, Ints
-from .meeting_layout import Meetings
 from .picking import put_item_angles, take_joints
 from .solve_layout import Closed, ProblemArrays, Solved, Workspace
 from .start_overlap import any_deep
@@ -24,7 +24,7 @@ GRASP, PARTIAL, NO_CONTACT, ALL_BLOCKED = 0, 1, 2, 3
 OPPOSED = -1e-9
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def judge_pose(
     problem: ProblemArrays,
     T_palm_object: Floats,
@@ -60,7 +60,7 @@ def judge_pose(
         solved.status[n] = PARTIAL
 
 
-@inner_kernel
+@kernel
 def write_fingers(
     problem: ProblemArrays,
     T_palm_object: Floats,
@@ -91,7 +91,7 @@ def write_fingers(
     tie(problem.frames, angles)
 
 
-@inner_kernel
+@kernel
 def held_link(met: Meetings, n: int, f: int) -> int:
     """Return the link of a finger that another finger holds first, or -1."""
     for k in range(met.size[n, 0]):
@@ -101,7 +101,7 @@ def held_link(met: Meetings, n: int, f: int) -> int:
     return -1
 
 
-@inner_kernel
+@kernel
 def finger_status(problem: ProblemArrays, entry: int, stuck: bool, links: int, first: int) -> int:
     """Return how a finger ended; see `FingerStatus`.
 
@@ -121,7 +121,7 @@ def finger_status(problem: ProblemArrays, entry: int, stuck: bool, links: int, f
     return NO_MOTION
 
 
-@inner_kernel
+@kernel
 def opposed(thumb: Ints, final: ClosingArrays, touches: TouchArrays) -> bool:
     """Say whether contacts of a thumb and of a finger oppose each other."""
     for a in range(thumb.shape[0]):
@@ -134,7 +134,7 @@ def opposed(thumb: Ints, final: ClosingArrays, touches: TouchArrays) -> bool:
     return False
 
 
-@inner_kernel
+@kernel
 def touches_oppose(touches: TouchArrays, a: int, n: int, b: int, m: int) -> bool:
     """Say whether two touches hold the object from opposite sides."""
     if not (holds(touches, a, n) and holds(touches, b, m)):
@@ -145,7 +145,7 @@ def touches_oppose(touches: TouchArrays, a: int, n: int, b: int, m: int) -> bool
     return bool(cosine < OPPOSED)
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def is_certified(
     problem: ProblemArrays, T_palm_object: Floats, space: Workspace, final: ClosingArrays, angles: Floats
 ) -> bool:
@@ -166,7 +166,7 @@ def is_certified(
     return bool(find_link_overlap(everything, poses, T_palm_object, ALLOWED_PENETRATION)[0] < 0)
 
 
-@inner_kernel
+@kernel
 def put_opened(problem: ProblemArrays, space: Workspace) -> None:
     """Write the posture from which the picked items close to `space.q`."""
     command, q = problem.command, space.q

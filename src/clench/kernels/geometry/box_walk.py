@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clench.kernels.closing.layout import Floats
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import move_core, plane_offset
 from clench.kernels.toi.toi_bounds import STEPS
 from clench.kernels.toi.toi_pairs import step_to_plane
@@ -29,7 +29,7 @@ SMALLEST = 1e-300
 PARALLEL = 1e-6
 
 
-@inner_kernel
+@kernel
 def put_box(slab: Any, T: Floats, box: Floats) -> float:
     """Write the box around a node, in a pose; return by how much it is grown [m].
 
@@ -51,7 +51,7 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
     return float(slab[12])
 
 
-@inner_kernel
+@kernel
 def square_axes(u: Vector, v: Vector) -> tuple[Vector, Vector]:
     """Return the unit vectors along u and across both, whatever their sizes, up to none."""
     size = math.sqrt(dot(u, u))
@@ -64,7 +64,7 @@ def square_axes(u: Vector, v: Vector) -> tuple[Vector, Vector]:
     return first, scaled(third, 1.0 / size)
 
 
-@inner_kernel
+@kernel
 def put_axis(axis: Vector, u: Vector, v: Vector, w: Vector, T: Floats, k: int, box: Floats) -> None:
     """Write axis `k` of a box, turned by a pose, and how far the edges u, v and w reach along it."""
     for r in range(3):
@@ -72,7 +72,7 @@ def put_axis(axis: Vector, u: Vector, v: Vector, w: Vector, T: Floats, k: int, b
     box[4, k] = abs(dot(axis, u)) + abs(dot(axis, v)) + abs(dot(axis, w))
 
 
-@inner_kernel
+@kernel
 def nearest_on_edge(a: Vector, edge: Vector, p: Vector) -> Vector:
     """Return the point of the segment from `a` along an edge that is closest to a point."""
     along = edge[0] * (p[0] - a[0]) + edge[1] * (p[1] - a[1]) + edge[2] * (p[2] - a[2])
@@ -80,7 +80,7 @@ def nearest_on_edge(a: Vector, edge: Vector, p: Vector) -> Vector:
     return a[0] + t * edge[0], a[1] + t * edge[1], a[2] + t * edge[2]
 
 
-@inner_kernel
+@kernel
 def nearest_of(core: Floats, corners: int, p: Vector) -> Vector:
     """Return the point of a core that is closest to a point; four corners are those of a rectangle, in order."""
     a = core[0, 0], core[0, 1], core[0, 2]
@@ -95,7 +95,7 @@ def nearest_of(core: Floats, corners: int, p: Vector) -> Vector:
     return nearest_on_edge(q, (core[3, 0] - a[0], core[3, 1] - a[1], core[3, 2] - a[2]), p)
 
 
-@inner_kernel
+@kernel
 def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[float, float, float, float, float]:
     """Return how far a core lies beyond a box along a direction that parts them well, and the box's top along it.
 
@@ -140,20 +140,20 @@ def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[flo
     return gap, nx, ny, nz, nx * box[0, 0] + ny * box[0, 1] + nz * box[0, 2] + box_reach(box, n)
 
 
-@inner_kernel
+@kernel
 def clamped(x: float, half: float) -> float:
     """Return what is closest to a coordinate within half a size to either side."""
     return min(max(x, -half), half)
 
 
-@inner_kernel
+@kernel
 def box_reach(box: Floats, m: Vector) -> float:
     """Return how far a box reaches from its middle along a direction that is given along its axes."""
     reach: float = abs(m[0]) * box[4, 0] + abs(m[1]) * box[4, 1] + abs(m[2]) * box[4, 2]
     return reach
 
 
-@inner_kernel
+@kernel
 def walk_to_box(
     core: Floats,
     ka: int,
@@ -183,7 +183,7 @@ def walk_to_box(
     return s
 
 
-@inner_kernel
+@kernel
 def put_rectangle(corners: Floats, box: Floats) -> None:
     """Write a box without height around a rectangle, whose corners are given in order, (4, 3)."""
     u = edge_half(corners, 1)
@@ -197,14 +197,14 @@ def put_rectangle(corners: Floats, box: Floats) -> None:
     box[4, 1], box[4, 2] = abs(dot(second, v)), 0.0
 
 
-@inner_kernel
+@kernel
 def edge_half(corners: Floats, k: int) -> Vector:
     """Return half of the way from the first corner to corner `k`."""
     a, b = corners[0], corners[k]
     return 0.5 * (b[0] - a[0]), 0.5 * (b[1] - a[1]), 0.5 * (b[2] - a[2])
 
 
-@inner_kernel
+@kernel
 def walk_rectangle(
     core: Floats,
     fixed: Floats,

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -106,7 +106,7 @@ def _own(masks: NDArray[np.uint8], sides: NDArray[np.integer], shift: int) -> No
         masks[sides[sides % 3 == k] // 3] |= np.uint8(1 << (k + shift))
 
 
-@kernel
+@entry_kernel
 def face_normals(vertices: Floats, triangles: Ints, out: Floats) -> None:
     """Write the unit normal of each triangle to `out`, shape (T, 3); zero for triangles without area."""
     for i in range(triangles.shape[0]):
@@ -161,7 +161,7 @@ def _grow(vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats, Ints
     )
 
 
-@kernel
+@entry_kernel
 def part_nodes(
     boxes: Floats,
     centers: Floats,
@@ -211,7 +211,7 @@ def part_nodes(
     return nodes
 
 
-@kernel
+@entry_kernel
 def triangle_boxes(vertices: Floats, triangles: Ints, boxes: Floats, centers: Floats) -> None:
     """Write the box of each triangle as (low, high), shape (T, 6), and the middle of each box, shape (T, 3)."""
     for i in range(triangles.shape[0]):
@@ -224,7 +224,7 @@ def triangle_boxes(vertices: Floats, triangles: Ints, boxes: Floats, centers: Fl
             centers[i, k] = 0.5 * (boxes[i, k] + boxes[i, k + 3])
 
 
-@inner_kernel
+@kernel
 def _bounds(boxes: Floats, order: Ints, start: int, end: int, low: Floats, high: Floats, node: int) -> None:
     for k in range(3):
         low[node, k] = np.inf
@@ -236,7 +236,7 @@ def _bounds(boxes: Floats, order: Ints, start: int, end: int, low: Floats, high:
             high[node, k] = max(high[node, k], boxes[t, k + 3])
 
 
-@inner_kernel
+@kernel
 def _split(
     boxes: Floats,
     centers: Floats,
@@ -278,7 +278,7 @@ def _split(
     return middle
 
 
-@inner_kernel
+@kernel
 def _fill_bins(
     boxes: Floats,
     centers: Floats,
@@ -305,7 +305,7 @@ def _fill_bins(
             bin_boxes[j, k + 3] = max(bin_boxes[j, k + 3], boxes[t, k + 3])
 
 
-@inner_kernel
+@kernel
 def _best_cut(bin_boxes: Floats, numbers: Any, areas: Floats) -> int:
     """Return the bin before which to cut: the least sum of area times number of triangles."""
     for side in range(2):

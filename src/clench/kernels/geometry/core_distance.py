@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 #: Edges whose directions are closer than this are parallel [-]; the difference of their points gives the direction.
 PARALLEL = 1e-8
@@ -16,7 +16,7 @@ AT_CORNER, AT_EDGE, AT_FACE = 0, 1, 2
 Separation = tuple[float, float, float, float, int, int, float, float, float]
 
 
-@inner_kernel
+@kernel
 def face_normal(t: Floats) -> tuple[float, float, float, float]:
     """Return the unit normal of a triangle and twice its area; zeros for one without area."""
     ux, uy, uz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
@@ -29,7 +29,7 @@ def face_normal(t: Floats) -> tuple[float, float, float, float]:
     return nx / size, ny / size, nz / size, size
 
 
-@inner_kernel
+@kernel
 def above_face(t: Floats, nx: float, ny: float, nz: float, px: float, py: float, pz: float) -> bool:
     """Say whether a point lies straight above or below a triangle with unit normal n."""
     for k in range(3):
@@ -42,7 +42,7 @@ def above_face(t: Floats, nx: float, ny: float, nz: float, px: float, py: float,
     return True
 
 
-@inner_kernel
+@kernel
 def edge_pair(a: Floats, i: int, j: int, b: Floats, k: int, m: int) -> tuple[float, float, float, float, float, float]:
     """Return where two edges are closest: parameters from 0 to 1 on each, difference there, and its square."""
     ux, uy, uz = a[j, 0] - a[i, 0], a[j, 1] - a[i, 1], a[j, 2] - a[i, 2]
@@ -69,13 +69,13 @@ def edge_pair(a: Floats, i: int, j: int, b: Floats, k: int, m: int) -> tuple[flo
     return s, t, dx, dy, dz, dx * dx + dy * dy + dz * dz
 
 
-@inner_kernel
+@kernel
 def edge_count(corners: int) -> int:
     """Return how many edges a core has; a point counts as one of no length."""
     return 3 if corners == 3 else 1
 
 
-@inner_kernel
+@kernel
 def corner_over_face(a: Floats, ka: int, b: Floats, kb: int, best: float) -> tuple[float, float, float, float, int]:
     """Return the closest corner of `a` over the face of `b` nearer than `best`: distance, direction, number."""
     d, mx, my, mz, corner = best, 0.0, 0.0, 0.0, -1
@@ -90,7 +90,7 @@ def corner_over_face(a: Floats, ka: int, b: Floats, kb: int, best: float) -> tup
     return d, mx, my, mz, corner
 
 
-@kernel
+@entry_kernel
 def separation(a: Floats, ka: int, b: Floats, kb: int) -> Separation:
     """Return how far two cores are apart, and along which direction.
 
@@ -124,7 +124,7 @@ def separation(a: Floats, ka: int, b: Floats, kb: int) -> Separation:
     return d, nx, ny, nz, fa, fb, qx, qy, qz
 
 
-@inner_kernel
+@kernel
 def edge_direction(
     a: Floats, i: int, j: int, b: Floats, k: int, m: int, dx: float, dy: float, dz: float, inside: bool
 ) -> tuple[float, float, float]:
@@ -145,7 +145,7 @@ def edge_direction(
     return dx / size, dy / size, dz / size
 
 
-@inner_kernel
+@kernel
 def edge_pierces(a: Floats, i: int, j: int, b: Floats, nx: float, ny: float, nz: float) -> bool:
     """Say whether an edge goes through the inside of a triangle with unit normal n."""
     hi = nx * (a[i, 0] - b[0, 0]) + ny * (a[i, 1] - b[0, 1]) + nz * (a[i, 2] - b[0, 2])
@@ -157,7 +157,7 @@ def edge_pierces(a: Floats, i: int, j: int, b: Floats, nx: float, ny: float, nz:
     return bool(above_face(b, nx, ny, nz, x, y, z))
 
 
-@inner_kernel
+@kernel
 def crosses(a: Floats, ka: int, b: Floats, kb: int) -> bool:
     """Say whether an edge of one core goes through the face of the other."""
     if kb == 3:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import plane_gap
 from clench.kernels.toi.separating import side
 
@@ -18,7 +18,7 @@ DEEP = 1e-9
 _NONE = 1e-9
 
 
-@inner_kernel
+@kernel
 def looks_right(core: Floats, corners: int, n: Vector, way: float) -> bool:
     """Say whether a face that lies across n looks the given way along it, so that its body is on the other."""
     if corners < 3 or -plane_gap(core, corners, core, corners, n[0], n[1], n[2]) > DEEP:
@@ -27,7 +27,7 @@ def looks_right(core: Floats, corners: int, n: Vector, way: float) -> bool:
     return way * (mx * n[0] + my * n[1] + mz * n[2]) >= 0.0
 
 
-@inner_kernel
+@kernel
 def keeps_apart(a: Floats, ka: int, b: Floats, kb: int, n: Vector) -> bool:
     """Say whether a plane across n, either way round, has core `a` and its body on one side, `b` and its on the other.
 
@@ -43,7 +43,7 @@ def keeps_apart(a: Floats, ka: int, b: Floats, kb: int, n: Vector) -> bool:
     return False
 
 
-@inner_kernel
+@kernel
 def across(u: Vector, v: Vector) -> tuple[bool, Vector]:
     """Return whether u and v span a plane, and the direction across it, made square to u."""
     n = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
@@ -55,7 +55,7 @@ def across(u: Vector, v: Vector) -> tuple[bool, Vector]:
     return True, (n[0] - along * u[0], n[1] - along * u[1], n[2] - along * u[2])
 
 
-@inner_kernel
+@kernel
 def only_touch(a: Floats, ka: int, b: Floats, kb: int) -> bool:
     """Say whether two sharp cores that cross do so by no more than `DEEP`, with their bodies on either side of a plane.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from clench.kernels.closing.layout import Floats, Ints
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 
-@inner_kernel
+@kernel
 def face_keeps_apart(box: Floats, poses: Floats, m: int, r: int) -> bool:
     """Say whether a face of the box around body `m` keeps it apart from the one around body `r`; see `mark_meeting`."""
     A, B = poses[m], poses[r]
@@ -26,13 +26,13 @@ def face_keeps_apart(box: Floats, poses: Floats, m: int, r: int) -> bool:
     return False
 
 
-@inner_kernel
+@kernel
 def boxes_meet(box: Floats, poses: Floats, m: int, r: int) -> bool:
     """Say whether no face of either box keeps two bodies apart."""
     return not face_keeps_apart(box, poses, m, r) and not face_keeps_apart(box, poses, r, m)
 
 
-@kernel
+@entry_kernel
 def mark_meeting(box: Floats, poses: Floats, meet: Ints) -> None:
     """Write which bodies have boxes that no face of either keeps apart, (B, B).
 

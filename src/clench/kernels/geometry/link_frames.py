@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from clench.kernels.closing.layout import ChainArrays, Floats, Ints
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_pose
 
 
@@ -48,7 +48,7 @@ class FrameArrays(NamedTuple):
     breakaway: Ints
 
 
-@inner_kernel
+@kernel
 def turn_link(axis: Floats, anchor: Floats, angle: float, T: Floats, R: Floats, out: Floats) -> None:
     """Write a pose turned about an axis of its own frame through an anchor; R is scratch (Rodrigues)."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -61,13 +61,13 @@ def turn_link(axis: Floats, anchor: Floats, angle: float, T: Floats, R: Floats, 
     compose(T, R, out)
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def place_links(frames: FrameArrays, q: Floats, poses: Floats) -> None:
     """Write `T_palm_link` of every link at a posture (J,) [rad] to `poses`, (L, 3, 4)."""
     put_links(frames, q, np.empty((frames.parent.shape[0] + 2, 3, 4)), poses)
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def place_postures(frames: FrameArrays, postures: Floats, poses: Floats) -> None:
     """Do as `place_links` for many postures, (N, J) [rad], to (N, L, 3, 4)."""
     scratch = np.empty((frames.parent.shape[0] + 2, 3, 4))
@@ -75,7 +75,7 @@ def place_postures(frames: FrameArrays, postures: Floats, poses: Floats) -> None
         put_links(frames, postures[n], scratch, poses[n])
 
 
-@inner_kernel
+@kernel
 def put_links(frames: FrameArrays, q: Floats, scratch: Floats, poses: Floats) -> None:
     """Do as `place_links` with scratch space, (L + 2, 3, 4)."""
     links = frames.parent.shape[0]
@@ -85,7 +85,7 @@ def put_links(frames: FrameArrays, q: Floats, scratch: Floats, poses: Floats) ->
         compose_inverse(scratch[frames.palm[0]], scratch[i], poses[i])
 
 
-@inner_kernel
+@kernel
 def put_link(frames: FrameArrays, i: int, q: Floats, R: Floats, turned: Floats, poses: Floats) -> None:
     """Write the pose of one link in the frame of the root to `poses[i]`; that of its parent is there already.
 
@@ -104,7 +104,7 @@ def put_link(frames: FrameArrays, i: int, q: Floats, R: Floats, turned: Floats, 
         compose(poses[parent], turned, poses[i])
 
 
-@inner_kernel
+@kernel
 def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: Floats, q: Floats) -> None:
     """Write all joints' angles when the groups `first` to `last` of an entry have travelled (G,); see `FingerPlan`."""
     for j in range(q.shape[0]):
@@ -115,7 +115,7 @@ def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: F
     couple(frames, q)
 
 
-@inner_kernel
+@kernel
 def put_closed(
     frames: FrameArrays,
     chain: ChainArrays,
@@ -141,7 +141,7 @@ def put_closed(
             q[j] = inside(q[j] + frames.chain_turn[k] * turn[k], frames.lower[j], frames.upper[j])
 
 
-@inner_kernel
+@kernel
 def tie(frames: FrameArrays, q: Floats) -> None:
     """Do as `couple`, but leave followers that can break away where they are; see `Hand.tied`."""
     for c in range(frames.leader.shape[0]):
@@ -151,7 +151,7 @@ def tie(frames: FrameArrays, q: Floats) -> None:
             q[f] = inside(angle, frames.lower[f], frames.upper[f])
 
 
-@inner_kernel
+@kernel
 def couple(frames: FrameArrays, q: Floats) -> None:
     """Make followers obey their couplings, each inside its limits, in place; see `Hand.coupled`."""
     for c in range(frames.leader.shape[0]):
@@ -160,7 +160,7 @@ def couple(frames: FrameArrays, q: Floats) -> None:
         q[f] = inside(angle, frames.lower[f], frames.upper[f])
 
 
-@inner_kernel
+@kernel
 def inside(value: float, low: float, high: float) -> float:
     """Return a value, or the limit that it passes."""
     if low > value:
@@ -168,7 +168,7 @@ def inside(value: float, low: float, high: float) -> float:
     return high if high < value else value
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def relate_poses(first: Floats, second: Floats, placed: Floats) -> None:
     """Write where the second pose is in the first one, row by row: `T_first_second`, (N, 3, 4).
 
@@ -182,7 +182,7 @@ def relate_poses(first: Floats, second: Floats, placed: Floats) -> None:
         compose_inverse(a, b, placed[n])
 
 
-@inner_kernel
+@kernel
 def put_pose(wxyz_xyz: Floats, out: Floats) -> None:
     """Write a pose as a matrix, (3, 4)."""
     w, x, y, z = wxyz_xyz[0], wxyz_xyz[1], wxyz_xyz[2], wxyz_xyz[3]

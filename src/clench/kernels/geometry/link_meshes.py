@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.closing.layout import Ints as Numbers
-from clench.kernels.runtime.compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import back, compose_inverse, put_point
 
 from .bvh import STACK_SIZE, Ints, MeshTree
@@ -51,7 +51,7 @@ class ObjectMesh(NamedTuple):
     points: Floats
 
 
-@inner_kernel
+@kernel
 def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
     """Return the tree of one link."""
     v0, v1 = meshes.vertex_first[k], meshes.vertex_first[k + 1]
@@ -73,7 +73,7 @@ def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
     )
 
 
-@inner_kernel
+@kernel
 def in_box(obj: MeshTree, p: Floats) -> bool:
     """Say whether a point lies in the box around a mesh."""
     inside = True
@@ -82,7 +82,7 @@ def in_box(obj: MeshTree, p: Floats) -> bool:
     return bool(inside)
 
 
-@inner_kernel
+@kernel
 def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree) -> bool:
     """Say whether the ball around a link meets the box around the object."""
     if obj.low.shape[0] == 0:
@@ -104,7 +104,7 @@ class DepthWork(NamedTuple):
     pairs: Ints
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_depth_work() -> DepthWork:
     """Allocate the scratch space of `depth_of`."""
     return DepthWork(
@@ -116,7 +116,7 @@ def make_depth_work() -> DepthWork:
     )
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def measure_depths(
     meshes: LinkMeshArrays, which: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, out: Floats
 ) -> None:
@@ -137,7 +137,7 @@ def measure_depths(
             )
 
 
-@inner_kernel
+@kernel
 def depth_of(
     meshes: LinkMeshArrays,
     k: int,
@@ -176,7 +176,7 @@ def depth_of(
     return found
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def find_contained(
     meshes: LinkMeshArrays, which: Numbers, poses: Floats, solid: ObjectMesh, T_palm_object: Floats
 ) -> int:
@@ -190,7 +190,7 @@ def find_contained(
     return -1
 
 
-@inner_kernel
+@kernel
 def has_contained(meshes: LinkMeshArrays, k: int, T_object_link: Floats, solid: ObjectMesh, p: Floats) -> bool:
     """Say whether a link has a part inside the object, or around a part of it; `p` is overwritten."""
     if solid.tree.low.shape[0] > 0 and may_fit(meshes, k, T_object_link, solid.tree, p):
@@ -205,7 +205,7 @@ def has_contained(meshes: LinkMeshArrays, k: int, T_object_link: Floats, solid: 
     return False
 
 
-@inner_kernel
+@kernel
 def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree, p: Floats) -> bool:
     """Say whether a link of one part lies in the object's box, as it must to lie in the object; any other may."""
     if meshes.point_first[k + 1] - meshes.point_first[k] != 1:
@@ -220,7 +220,7 @@ def may_fit(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTree
     return True
 
 
-@inner_kernel
+@kernel
 def may_hold_part(
     meshes: LinkMeshArrays, poses: Floats, solid: ObjectMesh, T_palm_object: Floats, points: Floats
 ) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .bvh import STACK_SIZE, Floats, Ints, MeshTree
 
@@ -12,7 +12,7 @@ PAIRS = 2 * STACK_SIZE
 ROUNDING = 1e-13
 
 
-@inner_kernel
+@kernel
 def boxes_apart(a: MeshTree, n: int, b: MeshTree, m: int, T: Floats) -> bool:
     """Say whether a face of either of two nodes' boxes keeps them apart, `T` = `T_b_a` of shape (3, 4)."""
     lowest, highest, low, high = a.low, a.high, b.low, b.high
@@ -37,7 +37,7 @@ def boxes_apart(a: MeshTree, n: int, b: MeshTree, m: int, T: Floats) -> bool:
     return False
 
 
-@inner_kernel
+@kernel
 def size(tree: MeshTree, n: int) -> float:
     """Return the sum of a box's edges [m]; below 0 for a leaf, which has no smaller ones."""
     if tree.count[n] > 0:
@@ -46,7 +46,7 @@ def size(tree: MeshTree, n: int) -> float:
     return float(high[n, 0] - low[n, 0] + high[n, 1] - low[n, 1] + high[n, 2] - low[n, 2])
 
 
-@inner_kernel
+@kernel
 def surfaces_apart(a: MeshTree, b: MeshTree, T: Floats, pairs: Ints) -> bool:
     """Say whether boxes show that no triangle of one mesh touches one of another; if not, nothing is known.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .bvh import STACK_SIZE, Floats, Ints, MeshTree
 
@@ -23,7 +23,7 @@ _RAYS = np.array(
 )
 
 
-@kernel
+@entry_kernel
 def signed_distance(tree: MeshTree, p: Any, closed: bool) -> float:
     """Return the distance from a point to the mesh [m], negative inside; infinite for a mesh without triangles.
 
@@ -36,7 +36,7 @@ def signed_distance(tree: MeshTree, p: Any, closed: bool) -> float:
     return -distance if is_inside(tree, p, closed) else distance
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def closest_point(tree: MeshTree, p: Any, bound: float) -> tuple[float, int, float, float, float]:
     """Return the squared distance, triangle and coordinates of the point of the mesh closest to `p`.
 
@@ -53,7 +53,7 @@ def closest_point(tree: MeshTree, p: Any, bound: float) -> tuple[float, int, flo
     return found
 
 
-@inner_kernel
+@kernel
 def closest_within(tree: MeshTree, p: Point, bound: float, stack: Ints) -> tuple[float, int, float, float, float]:
     """Do as `closest_point` with a stack of `STACK_SIZE` entries that the caller gives."""
     vertices, triangles, low, high = tree.vertices, tree.triangles, tree.low, tree.high
@@ -91,7 +91,7 @@ def closest_within(tree: MeshTree, p: Point, bound: float, stack: Ints) -> tuple
     return best, best_triangle, x, y, z
 
 
-@kernel
+@entry_kernel
 def is_inside(tree: MeshTree, p: Any, closed: bool) -> bool:
     """Say whether a point lies inside a mesh.
 
@@ -116,7 +116,7 @@ def is_inside(tree: MeshTree, p: Any, closed: bool) -> bool:
     return bool(abs(winding_number(tree, q)) > 0.5)
 
 
-@kernel
+@entry_kernel
 def winding_number(tree: MeshTree, p: Any) -> float:
     """Return how often the mesh winds around a point: its exact solid angle over 4π (van Oosterom and Strackee)."""
     vertices, triangles = tree.vertices, tree.triangles
@@ -136,7 +136,7 @@ def winding_number(tree: MeshTree, p: Any) -> float:
     return total / (2.0 * math.pi)
 
 
-@inner_kernel
+@kernel
 def _crossings(tree: MeshTree, p: Point, ray: int) -> tuple[bool, int]:
     """Count the signed crossings of a ray from p with the mesh; say whether it met no edge and no vertex."""
     vertices, triangles, low, high = tree.vertices, tree.triangles, tree.low, tree.high
@@ -172,7 +172,7 @@ def _crossings(tree: MeshTree, p: Point, ray: int) -> tuple[bool, int]:
     return clear, winding
 
 
-@inner_kernel
+@kernel
 def _ray_misses(low: Floats, high: Floats, node: int, p: Point, dx: float, dy: float, dz: float) -> bool:
     enter, leave = 0.0, np.inf
     slack = 1e-12 * (high[0, 0] - low[0, 0] + high[0, 1] - low[0, 1] + high[0, 2] - low[0, 2])
@@ -185,7 +185,7 @@ def _ray_misses(low: Floats, high: Floats, node: int, p: Point, dx: float, dy: f
     return bool(enter > leave)
 
 
-@inner_kernel
+@kernel
 def _box_distance(low: Floats, high: Floats, node: int, p: Point) -> float:
     """Return the squared distance from a point to a node's box [m²]."""
     x = max(low[node, 0] - p[0], p[0] - high[node, 0], 0.0)
@@ -194,7 +194,7 @@ def _box_distance(low: Floats, high: Floats, node: int, p: Point) -> float:
     return float(x * x + y * y + z * z)
 
 
-@inner_kernel
+@kernel
 def corners(vertices: Floats, triangles: Ints, t: int) -> tuple[Point, Point, Point]:
     """Return the three corners of a triangle."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -205,7 +205,7 @@ def corners(vertices: Floats, triangles: Ints, t: int) -> tuple[Point, Point, Po
     )
 
 
-@kernel
+@entry_kernel
 def closest_on_triangle(p: Point, a: Point, b: Point, c: Point) -> Point:
     """Return the point of a triangle closest to p, by its Voronoi regions: corners, edges, inside."""
     bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

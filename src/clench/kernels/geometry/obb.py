@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from clench.core.memory import in_parts
 from clench.kernels.closing.layout import Floats
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import put_point
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats, spread: Floa
     return slab
 
 
-@kernel
+@entry_kernel
 def measure_spread(vertices: Floats, elements: Any, tree_parts: Any, sums: Floats, spread: Floats) -> None:
     """Write the second moments of the corners of each node's elements about their mean, (N, 3, 3).
 
@@ -103,7 +103,7 @@ def measure_spread(vertices: Floats, elements: Any, tree_parts: Any, sums: Float
                 spread[n, j, i] = spread[n, i, j]
 
 
-@kernel
+@entry_kernel
 def measure_extent(vertices: Floats, elements: Any, begin: Any, end: Any, axes: Floats, box: Floats) -> None:
     """Write the smallest and the largest coordinate of each node's elements along its axes, (N, 6)."""
     for n in range(begin.shape[0]):
@@ -119,7 +119,7 @@ def measure_extent(vertices: Floats, elements: Any, begin: Any, end: Any, axes: 
                     box[n, i], box[n, 3 + i] = min(box[n, i], at), max(box[n, 3 + i], at)
 
 
-@inner_kernel
+@kernel
 def slab_half(slab: Any, nx: float, ny: float, nz: float) -> float:
     """Return half the extent of a box along a vector n, times the vector's length, without what it is grown by."""
     half = 0.0
@@ -128,27 +128,27 @@ def slab_half(slab: Any, nx: float, ny: float, nz: float) -> float:
     return half
 
 
-@inner_kernel
+@kernel
 def slab_top(slab: Any, nx: float, ny: float, nz: float) -> float:
     """Return the largest coordinate of a box along the unit vector n, in the box's frame."""
     top: float = nx * slab[0] + ny * slab[1] + nz * slab[2] + slab[12] + slab_half(slab, nx, ny, nz)
     return top
 
 
-@inner_kernel
+@kernel
 def edge_square(slab: Any, k: int) -> float:
     """Return the square of the half edge of a box that begins in column `k`: 3 the longest, 6, or 9 the shortest."""
     x, y, z = np.float64(slab[k]), np.float64(slab[k + 1]), np.float64(slab[k + 2])
     return float(x * x + y * y + z * z)
 
 
-@inner_kernel
+@kernel
 def slab_slack(slab: Any) -> float:
     """Return about how far a box reaches beyond what is in it: its thickness, and some of its width [m]."""
     return math.sqrt(edge_square(slab, 9)) + SOME * math.sqrt(edge_square(slab, 6))
 
 
-@inner_kernel
+@kernel
 def slab_misses(slab: Any, T: Floats, core: Floats, corners: int, w: float) -> bool:
     """Say whether a core lies farther than `w` beyond a face of a box, where a pose puts that; else nothing is known.
 
@@ -179,7 +179,7 @@ def slab_misses(slab: Any, T: Floats, core: Floats, corners: int, w: float) -> b
     return False
 
 
-@inner_kernel
+@kernel
 def put_slab_core(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
     """Write the core of the capsule around a box, in a pose: its axis, or its middle where a ball is as good.
 
@@ -196,7 +196,7 @@ def put_slab_core(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
     return 2, math.sqrt(wide) * ALMOST + slab[12]
 
 
-@inner_kernel
+@kernel
 def put_slab_face(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
     """Write a core of a box, in a pose: the rectangle through its middle along its longer edges, or `put_slab_core`'s.
 

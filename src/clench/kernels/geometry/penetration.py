@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .bvh import Floats, Ints, MeshTree
 from .mesh_distance import Point, closest_within, corners, is_inside
@@ -17,7 +17,7 @@ Deepest = tuple[float, Point]
 CROSSINGS = 64
 
 
-@kernel
+@entry_kernel
 def penetration(
     link: MeshTree,
     link_owners: Masks,
@@ -64,7 +64,7 @@ def penetration(
     return depth, p[0], p[1], p[2]
 
 
-@inner_kernel
+@kernel
 def moved(T: Floats, p: Point) -> Point:
     """Map a point by a transform, shape (3, 4)."""
     return (
@@ -74,7 +74,7 @@ def moved(T: Floats, p: Point) -> Point:
     )
 
 
-@inner_kernel
+@kernel
 def _deepest(
     a: MeshTree,
     owners: Masks,
@@ -113,7 +113,7 @@ def _deepest(
     return best, place
 
 
-@inner_kernel
+@kernel
 def _is_shallow(b: MeshTree, center: Point, radius: float, closed: bool, best: float, stack: Ints) -> bool:
     """Say whether no point of a ball can be deeper inside b than `best`: depth changes no faster than place."""
     if b.low.shape[0] == 0:
@@ -132,7 +132,7 @@ def _is_shallow(b: MeshTree, center: Point, radius: float, closed: bool, best: f
     return True
 
 
-@inner_kernel
+@kernel
 def _deeper(b: MeshTree, p: Point, closed: bool, best: float, limit: float, place: Point, stack: Ints) -> Deepest:
     """Return the deeper of `best` and the depth of p inside b up to `limit`, with its place."""
     if best >= limit:
@@ -147,7 +147,7 @@ def _deeper(b: MeshTree, p: Point, closed: bool, best: float, limit: float, plac
     return best, place
 
 
-@inner_kernel
+@kernel
 def _deeper_on_edge(
     b: MeshTree,
     p: Point,
@@ -174,7 +174,7 @@ def _deeper_on_edge(
     return best, place
 
 
-@inner_kernel
+@kernel
 def _cross_edge(b: MeshTree, p: Point, q: Point, crossings: Floats) -> int:
     """Write where the edge pq crosses b, as fractions of its length in ascending order; return how often."""
     vertices, triangles, low, high = b.vertices, b.triangles, b.low, b.high
@@ -198,7 +198,7 @@ def _cross_edge(b: MeshTree, p: Point, q: Point, crossings: Floats) -> int:
     return number
 
 
-@inner_kernel
+@kernel
 def _edge_misses(low: Floats, high: Floats, node: int, p: Point, q: Point) -> bool:
     enter, leave = 0.0, 1.0
     for k in range(3):
@@ -213,7 +213,7 @@ def _edge_misses(low: Floats, high: Floats, node: int, p: Point, q: Point) -> bo
     return enter > leave
 
 
-@inner_kernel
+@kernel
 def _cross_triangle(p: Point, q: Point, a: Point, b: Point, c: Point) -> float:
     """Return where the edge pq crosses a triangle, as a fraction of its length; -1 when it does not."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]

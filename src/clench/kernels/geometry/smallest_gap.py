@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clench.kernels.closing.layout import Floats, Ints
-from clench.kernels.runtime.compiling import allocating_kernel
+from clench.kernels.runtime.compiling import entry_kernel
 from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.toi_work import body_gap, make_sweep_work, put_core
 
@@ -13,7 +13,7 @@ from .bodies import BodyArrays
 from .core_distance import separation
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def smallest_gap(
     links: BodyArrays, which: Ints, poses: Floats, target: BodyArrays, T_palm_object: Floats
 ) -> tuple[float, int]:
@@ -38,7 +38,7 @@ def smallest_gap(
     return best, nearest
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, slack: float, out: Floats) -> float:
     """Return the gap of two links if it is below `bound`, else `bound`; where, and the direction to `m`, go to `out`.
 

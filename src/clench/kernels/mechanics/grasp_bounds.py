@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from clench.kernels.closing.layout import Floats, Ints
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .wrench_bound import resisted_ball
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def bound_grasps(
     first: Ints,
     position: Floats,
@@ -52,7 +52,7 @@ def bound_grasps(
         out[n] = resisted_ball(G, generators, faces, reach, caps, np.ones(1), rounds)
 
 
-@inner_kernel
+@kernel
 def _put_cone(
     generators: Floats, faces: Floats, reach: Floats, mu: float, torsion: float, around: Floats, between: Floats
 ) -> None:
@@ -74,7 +74,7 @@ def _put_cone(
             faces[e, 3], faces[edges + e, 3] = 1.0 / torsion, -1.0 / torsion
 
 
-@inner_kernel
+@kernel
 def _put_columns(G: Floats, width: int, i: int, p: Floats, n: Floats, center: Floats, length: float) -> None:
     """Write the columns of the grasp map of a contact: two tangents and the inward normal, right-handed.
 

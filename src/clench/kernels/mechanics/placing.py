@@ -9,7 +9,7 @@ import numpy as np
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bvh import Ints as Stack
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, mesh_of
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import compose
 from clench.kernels.toi.toi_translation import PAIRS, first_contact
 
@@ -29,7 +29,7 @@ class Placed(NamedTuple):
     link: Ints
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def bring_up(
     meshes: LinkMeshArrays,
     poses: Floats,
@@ -79,14 +79,14 @@ def bring_up(
         out.travel[n], out.body[n], out.link[n] = best - back, body, link
 
 
-@inner_kernel
+@kernel
 def put_direction(T: Floats, direction: Floats, out: Floats) -> None:
     """Write a direction turned by a pose, (3,)."""
     for r in range(3):
         out[r] = T[r, 0] * direction[0] + T[r, 1] * direction[1] + T[r, 2] * direction[2]
 
 
-@inner_kernel
+@kernel
 def _meet(
     meshes: LinkMeshArrays, k: int, T: Floats, solid: ObjectMesh, along: Floats, limit: float, stack: Stack
 ) -> tuple[float, int]:
@@ -98,7 +98,7 @@ def _meet(
     return distance, solid.tree.body[triangle]
 
 
-@inner_kernel
+@kernel
 def _reach(T: Floats, point: Floats, along: Floats) -> float:
     """Return how far along a direction a point of a placed link lies [m]."""
     reach = 0.0
@@ -107,7 +107,7 @@ def _reach(T: Floats, point: Floats, along: Floats) -> float:
     return reach
 
 
-@inner_kernel
+@kernel
 def _put(order: Ints, keys: Floats, k: int) -> None:
     """Put mesh k into the order of the meshes before it, those that reach farthest first."""
     i = k

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clench.kernels.runtime.compiling import allocating_kernel, inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 #: Growth and slopes below this are rounding [-].
 _SMALL = 1e-11
@@ -20,7 +20,7 @@ _CORNERS = 30
 _STEPS = 100
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def nearer_facets(points: np.ndarray, starts: np.ndarray, found: np.ndarray, reach: np.ndarray) -> None:
     """Write a direction in which the hull of 0 and points reaches least far near every start, and how far.
 
@@ -51,7 +51,7 @@ def nearer_facets(points: np.ndarray, starts: np.ndarray, found: np.ndarray, rea
             reach[m] = max(reach[m], _dot(points[w], found[m]))
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def _farthest_corner(points: np.ndarray, c: np.ndarray, y: np.ndarray) -> bool:
     """Write the y with `w y <= 1` for all points that maximises `c y`; without one, a direction that has no bound.
 
@@ -95,7 +95,7 @@ def _farthest_corner(points: np.ndarray, c: np.ndarray, y: np.ndarray) -> bool:
     return True
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def _orthogonal(points: np.ndarray, active: np.ndarray, count: int, basis: np.ndarray) -> None:
     """Write orthonormal rows that span the active points, one after another."""
     for k in range(count):
@@ -106,7 +106,7 @@ def _orthogonal(points: np.ndarray, active: np.ndarray, count: int, basis: np.nd
         basis[k] /= max(np.sqrt(_dot(basis[k], basis[k])), 1e-300)
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def _least_multiplier(points: np.ndarray, active: np.ndarray, count: int, basis: np.ndarray, c: np.ndarray) -> int:
     """Return the place of the active point with the most negative multiplier in `c = sum of m w`, -1 for none."""
     m = np.zeros(count)
@@ -123,7 +123,7 @@ def _least_multiplier(points: np.ndarray, active: np.ndarray, count: int, basis:
     return worst
 
 
-@inner_kernel
+@kernel
 def _dot(a: np.ndarray, b: np.ndarray) -> float:
     total = 0.0
     for k in range(len(a)):
@@ -131,7 +131,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> float:
     return total
 
 
-@inner_kernel
+@kernel
 def _remove(a: np.ndarray, unit: np.ndarray) -> None:
     """Take the part along a unit row from another."""
     along = _dot(a, unit)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clench.kernels.runtime.compiling import allocating_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel
 
 #: Newton steps that balance internal forces, in the first round and in later ones.
 _FIRST_STEPS = 12
@@ -20,7 +20,7 @@ _ANSWER = 0.6
 _PRELOAD = 0.5
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def resisted_ball(
     G: np.ndarray,
     edges: np.ndarray,
@@ -64,7 +64,7 @@ def resisted_ball(
     return best
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def _response(G: np.ndarray, reach: np.ndarray, answers: np.ndarray, K: np.ndarray) -> bool:
     """Write `K = H G^T (G H G^T)^-1` with weights H; say whether the wrenches span all directions."""
     count, width = reach.shape
@@ -86,7 +86,7 @@ def _response(G: np.ndarray, reach: np.ndarray, answers: np.ndarray, K: np.ndarr
     return True
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def _balance(wrenches: np.ndarray, share: np.ndarray, y: np.ndarray, weights: np.ndarray, steps: int) -> None:
     """Write weights `share exp(y w)`, summing to 1, whose wrenches balance: Newton steps on the logarithm of their sum.
 
@@ -134,7 +134,7 @@ def _balance(wrenches: np.ndarray, share: np.ndarray, y: np.ndarray, weights: np
             y[r] -= damping * d[r]
 
 
-@kernel
+@entry_kernel
 def _factor(M: np.ndarray, L: np.ndarray) -> bool:
     """Write the Cholesky factor of a matrix of which the lower half counts; say whether it is well conditioned."""
     for r in range(6):
@@ -151,7 +151,7 @@ def _factor(M: np.ndarray, L: np.ndarray) -> bool:
     return True
 
 
-@kernel
+@entry_kernel
 def _solve(L: np.ndarray, x: np.ndarray) -> None:
     """Solve `L L^T x = b` in place."""
     for r in range(6):
@@ -164,7 +164,7 @@ def _solve(L: np.ndarray, x: np.ndarray) -> None:
         x[r] /= L[r, r]
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def _internal_forces(G: np.ndarray, K: np.ndarray, edges: np.ndarray, weights: np.ndarray, f0: np.ndarray) -> None:
     """Write the forces of weighted edges, balanced to rounding, shape (n,)."""
     count, each, width = edges.shape
@@ -182,7 +182,7 @@ def _internal_forces(G: np.ndarray, K: np.ndarray, edges: np.ndarray, weights: n
             f0[column] -= K[column, r] * wrench[r]
 
 
-@kernel
+@entry_kernel
 def _room(faces: np.ndarray, force: np.ndarray, K: np.ndarray) -> float:
     """Return the radius of the wrenches that one contact's response keeps inside its cone."""
     width = len(force)
@@ -200,7 +200,7 @@ def _room(faces: np.ndarray, force: np.ndarray, K: np.ndarray) -> float:
     return room
 
 
-@kernel
+@entry_kernel
 def _capped(least: float, f0: np.ndarray, K: np.ndarray, caps: np.ndarray, most: np.ndarray) -> float:
     """Return the largest r with `r = s least` that every cap allows."""
     radius = np.inf
@@ -219,7 +219,7 @@ def _capped(least: float, f0: np.ndarray, K: np.ndarray, caps: np.ndarray, most:
     return radius
 
 
-@kernel
+@entry_kernel
 def _reweigh(room: np.ndarray, answers: np.ndarray, share: np.ndarray, each: int) -> None:
     """Give contacts with little room a larger share of the internal forces, and let them answer less."""
     middle = 0.0

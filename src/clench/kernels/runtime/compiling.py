@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, TypeVar, overload
 
 from numba import njit
+from numba.core.registry import CPUDispatcher
 
 from clench.core import tolerances
 
@@ -22,31 +23,43 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 _IMPORTED: Final = re.compile(r"^\s*from (\.+|clench\.kernels\.)(\w[\w.]*) import ", re.MULTILINE)
 
 
-def kernel(function: Kernel) -> Kernel:
-    """Compile a function on its first call; it keeps its signature. It may not allocate.
+@overload
+def kernel(function: Kernel) -> Kernel: ...
 
-    Without counts of references, which would be kept for every view of an array: counting takes most of the time
-    of a kernel that reads many rows. What such a kernel reads is alive as long as its caller holds it.
+
+@overload
+def kernel(*, allocates: bool) -> Callable[[Kernel], Kernel]: ...
+
+
+def kernel(function: Any = None, *, allocates: bool = False) -> Any:
+    """Compile a function that only other kernels call, on its first call; it keeps its signature.
+
+    Without an entry from Python, a kernel compiles faster. A call from Python raises `TypeError`.
+
+    Kernels that do not allocate count no references, which would be kept for every view of an array. Counting takes
+    most of the time of a kernel that reads many rows. What such a kernel reads is alive as long as its caller holds it.
+
+    Args:
+        allocates: the function makes arrays. It may not keep an array that a kernel without this option returns.
     """
-    return _compiled(function, _nrt=False)
+    if function is None:
+        return partial(kernel, allocates=allocates)
+    return _compiled(function, from_python=False, allocates=allocates)
 
 
-def inner_kernel(function: Kernel) -> Kernel:
-    """Compile a function that only other kernels call: without an entry from Python, it compiles faster.
-
-    A call from Python would end the process without a word; a test holds that there is none.
-    """
-    return _compiled(function, _nrt=False, no_cpython_wrapper=True)
+@overload
+def entry_kernel(function: Kernel) -> Kernel: ...
 
 
-def allocating_kernel(function: Kernel) -> Kernel:
-    """Compile a function that allocates. It may not keep an array that a kernel which does not allocate returns."""
-    return _compiled(function, _nrt=True)
+@overload
+def entry_kernel(*, allocates: bool) -> Callable[[Kernel], Kernel]: ...
 
 
-def inner_allocating_kernel(function: Kernel) -> Kernel:
-    """Compile a function that allocates, and that only other kernels call."""
-    return _compiled(function, _nrt=True, no_cpython_wrapper=True)
+def entry_kernel(function: Any = None, *, allocates: bool = False) -> Any:
+    """Compile a function that Python calls, and other kernels may; see `kernel`."""
+    if function is None:
+        return partial(entry_kernel, allocates=allocates)
+    return _compiled(function, from_python=True, allocates=allocates)
 
 
 @cache
@@ -88,15 +101,31 @@ def is_kept(function: Any) -> bool:
     return not hasattr(function, "get_call_template") or bool(index_of(function)._load_index())
 
 
-def _compiled(function: Kernel, **options: bool) -> Kernel:
+class KernelForKernels(CPUDispatcher):
+    """A kernel without an entry from Python; a call would end the process without a message."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Refuse to be called.
+
+        Raises:
+            TypeError: always.
+        """
+        raise TypeError(f"{self.py_func.__name__}: expected a call from a kernel; it has no entry from Python.")
+
+
+def _compiled(function: Callable[..., Any], *, from_python: bool, allocates: bool) -> Any:
     """Compile a function on its first call, once for all values of a number.
 
     Numba would compile it anew for every integer that another kernel writes out in a call.
     """
-    settings: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+    settings: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": allocates}
+    if not from_python:
+        settings["no_cpython_wrapper"] = True
     dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
-        return cast(Kernel, dispatcher)
+        return dispatcher
+    if not from_python:
+        dispatcher.__class__ = KernelForKernels
     forgive_unreadable(dispatcher)
     index_of(dispatcher)._source_stamp = source_stamp(Path(function.__code__.co_filename))
     choose = dispatcher.get_call_template
@@ -105,4 +134,4 @@ def _compiled(function: Kernel, **options: bool) -> Kernel:
         return choose(tuple(map(handed, args)), {name: handed(a) for name, a in kws.items()})
 
     dispatcher.get_call_template = choose_handed
-    return cast(Kernel, dispatcher)
+    return dispatcher

@@ -30,7 +30,6 @@ from clench.kernels.closing.layout import (
     SectionArrays,
     Work,
 )
-from clench.kernels.closing.meeting_layout import FingerLinks, Meetings, MeetingWork
 from clench.kernels.closing.settling import settle_pair
 from clench.kernels.closing.solve_layout import (
     Arena,
@@ -47,6 +46,7 @@ from clench.kernels.geometry.bvh import MeshTree, build_tree
 from clench.kernels.geometry.link_frames import FrameArrays, place_links, relate_poses
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, measure_depths
 from clench.kernels.geometry.smallest_gap import smallest_gap
+from clench.kernels.meetings.meeting_layout import FingerLinks, Meetings, MeetingWork
 from clench.kernels.sections.advance import advance
 from clench.kernels.sections.plane_contact import describe_hit, settle_hit
 from clench.kernels.sections.plane_sections import cut_first_families

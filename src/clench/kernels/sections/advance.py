@@ -18,7 +18,7 @@ from clench.kernels.closing.layout import (
     SectionArrays,
     Work,
 )
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .outline_sweep import farthest, first_near, put_stadium, sweep_ellipses, sweep_outline, turn_outline
 from .turning_pairs import sooner
@@ -27,7 +27,7 @@ from .turning_pairs import sooner
 STRIDE = 0.06
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_work(joints: int, outlines: OutlineArrays) -> Work:
     """Allocate the scratch space for a hand."""
     rows = joints + 1
@@ -49,7 +49,7 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
     )
 
 
-@inner_kernel
+@kernel
 def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) -> None:
     """Write where the joints of a family are when each has turned by `turns` [rad]; see `Work`."""
     x, z, angle, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
@@ -62,7 +62,7 @@ def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) 
             place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4] = x, z, angle, c, s
 
 
-@inner_kernel
+@kernel
 def put_outline(
     outlines: OutlineArrays, o: int, j: int, place: Floats, cx: float, cz: float, mirror: float, work: Work
 ) -> Outline:
@@ -89,7 +89,7 @@ def put_outline(
     return Outline(o, v0, v1, s0, s1, radius, outlines.both[o] != 0, KIND_TIP if radius > 0.0 else KIND_EDGE)
 
 
-@inner_kernel
+@kernel
 def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work) -> tuple[int, int, float, float]:
     """Write the chain of active joints up to `joint`.
 
@@ -110,7 +110,7 @@ def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work)
     return count, last, rate, speed
 
 
-@inner_kernel
+@kernel
 def advance_outline(
     chain: ChainArrays,
     outlines: OutlineArrays,
@@ -165,7 +165,7 @@ def advance_outline(
     return best
 
 
-@inner_kernel
+@kernel
 def advance(
     hand: HandArrays,
     family: int,

@@ -10,7 +10,7 @@ import math
 
 from clench.core.tolerances import FOOT_FRACTION
 from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .coupled import STEPS, bounds, cosine_and_sine, evaluate, line_on_point, safe_step
 from .coupled_pairs import side_foot
@@ -22,7 +22,7 @@ NOTHING = 1e-290
 RANGE = 1e-9
 
 
-@inner_kernel
+@kernel
 def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
     """Return the point of an ellipse with semi-axes a >= b nearest to (t, y).
 
@@ -45,7 +45,7 @@ def ellipse_foot(a: float, b: float, t: float, y: float) -> tuple[float, float]:
         m = more
 
 
-@inner_kernel
+@kernel
 def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, float, float]:
     """Return the distance of a point to an ellipse between its caps, the outward normal and the foot (x, z).
 
@@ -72,7 +72,7 @@ def region_gap(e: Floats, px: float, pz: float) -> tuple[float, float, float, fl
     return distance, (px - fx) / distance, (pz - fz) / distance, fx, fz
 
 
-@inner_kernel
+@kernel
 def sweep_vertex_region(
     chain: Floats, count: int, vx: float, vz: float, w: float, e: Floats, touch: float, best: float
 ) -> float:
@@ -107,7 +107,7 @@ def sweep_vertex_region(
     return s
 
 
-@inner_kernel
+@kernel
 def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
     """Return the support of a whole ellipse about its centre, its derivative by the normal's angle, and -t there."""
     p, q = nx * e[2] + nz * e[3], -nx * e[3] + nz * e[2]
@@ -116,14 +116,14 @@ def support(e: Floats, nx: float, nz: float) -> tuple[float, float, float]:
     return value, (b2 - a2) * p * q / value, a2 * p / value
 
 
-@inner_kernel
+@kernel
 def turn_into(angle: float, low: float, high: float) -> float:
     """Return how far an angle grows until it is in a range, modulo a full turn; 0 where it is in there already."""
     beyond = (angle - low) % (2.0 * math.pi)
     return 0.0 if beyond <= high - low else 2.0 * math.pi - beyond
 
 
-@inner_kernel
+@kernel
 def curve_range(e: Floats) -> tuple[float, float]:
     """Return the range of angles of the normals of a region's curve between two caps, on the side of positive ones."""
     a, b = e[4], e[5]
@@ -131,7 +131,7 @@ def curve_range(e: Floats) -> tuple[float, float]:
     return first, math.atan2(math.sqrt(max(1.0 - (e[6] / a) ** 2, 0.0)) / b, e[6] / (a * a)) + RANGE
 
 
-@inner_kernel
+@kernel
 def turn_to_curve(e: Floats, first: float, last: float, nx: float, nz: float, sense: float) -> float:
     """Return how far a side with normal n turns until the curved part of a region has a tangent along it.
 
@@ -147,7 +147,7 @@ def turn_to_curve(e: Floats, first: float, last: float, nx: float, nz: float, se
     return turn + 0.5 * RANGE if turn > 0.0 else 0.0
 
 
-@inner_kernel
+@kernel
 def sweep_side_region(
     chain: Floats,
     terms: Floats,
@@ -204,7 +204,7 @@ def sweep_side_region(
     return s
 
 
-@inner_kernel
+@kernel
 def sweep_region(
     outline: Outline,
     i: int,

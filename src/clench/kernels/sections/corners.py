@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats, Outline
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .coupled import bounds, evaluate, line_on_point, point_on_line
 from .turning import is_blocking
@@ -23,7 +23,7 @@ LEAN = 1e-9
 NEAR = 4.0
 
 
-@inner_kernel
+@kernel
 def line_permits(
     chain: Floats, terms: Floats, joints: int, vx: float, vz: float, nx: float, nz: float, touch: float
 ) -> bool:
@@ -35,7 +35,7 @@ def line_permits(
     return not is_blocking(slope, curvature, lever, touch)
 
 
-@inner_kernel
+@kernel
 def side_permits(
     chain: Floats, terms: Floats, joints: int, mx: float, mz: float, qx: float, qz: float, touch: float
 ) -> bool:
@@ -46,7 +46,7 @@ def side_permits(
     return not is_blocking(slope, curvature, lever, touch)
 
 
-@inner_kernel
+@kernel
 def body_above(outline: Outline, side: Floats, x: float, z: float, nx: float, nz: float, near: float) -> bool:
     """Say whether the link's sides that end at (x, z) lie on the outer side of a line with normal `n`."""
     for k in range(outline.s0, outline.s1):
@@ -61,7 +61,7 @@ def body_above(outline: Outline, side: Floats, x: float, z: float, nx: float, nz
     return True
 
 
-@inner_kernel
+@kernel
 def object_below(
     segments: Floats,
     count: int,
@@ -88,7 +88,7 @@ def object_below(
     return True
 
 
-@inner_kernel
+@kernel
 def corner_blocks(
     outline: Outline,
     segments: Floats,
@@ -152,7 +152,7 @@ def corner_blocks(
     return not (sides > 1 and left == sides)
 
 
-@inner_kernel
+@kernel
 def vertex_blocks(
     outline: Outline,
     segments: Floats,
@@ -193,7 +193,7 @@ def vertex_blocks(
     )
 
 
-@inner_kernel
+@kernel
 def sharp_blocks(
     outline: Outline,
     segments: Floats,

@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats
-from clench.kernels.runtime.compiling import kernel
+from clench.kernels.runtime.compiling import entry_kernel
 
 STEPS = 2000
 
 
-@kernel
+@entry_kernel
 def cosine_and_sine(angle: float) -> tuple[float, float]:
     """Return the cosine and the sine of an angle [rad], at once at the start, after which most pairs are done with."""
     if angle == 0.0:
@@ -24,7 +24,7 @@ def cosine_and_sine(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-@kernel
+@entry_kernel
 def evaluate(terms: Floats, count: int, constant: float, s: float) -> tuple[float, float, float]:
     """Return a trigonometric sum, its slope and its curvature at `s`.
 
@@ -42,7 +42,7 @@ def evaluate(terms: Floats, count: int, constant: float, s: float) -> tuple[floa
     return value, slope, curvature
 
 
-@kernel
+@entry_kernel
 def at_start(terms: Floats, count: int, constant: float) -> float:
     """Return a trigonometric sum at 0."""
     value = constant
@@ -51,7 +51,7 @@ def at_start(terms: Floats, count: int, constant: float) -> float:
     return value
 
 
-@kernel
+@entry_kernel
 def bounds(terms: Floats, count: int) -> tuple[float, float]:
     """Return bounds on the absolute slope and curvature of a trigonometric sum."""
     first, second = 0.0, 0.0
@@ -62,7 +62,7 @@ def bounds(terms: Floats, count: int) -> tuple[float, float]:
     return first, second
 
 
-@kernel
+@entry_kernel
 def safe_step(value: float, slope: float, bound: float) -> float:
     """Return the first zero of `value + slope d - bound d²/2` for value >= 0, bound > 0."""
     root = math.sqrt(slope * slope + 2.0 * bound * value)
@@ -71,7 +71,7 @@ def safe_step(value: float, slope: float, bound: float) -> float:
     return (root + slope) / bound
 
 
-@kernel
+@entry_kernel
 def next_root(
     terms: Floats, count: int, constant: float, s: float, sign: float, bound: float, touch: float, end: float
 ) -> float:
@@ -105,7 +105,7 @@ def next_root(
     return s
 
 
-@kernel
+@entry_kernel
 def point_on_line(chain: Floats, count: int, nx: float, nz: float, offset: float, terms: Floats) -> tuple[int, float]:
     """Write the gap of a moving point over a fixed line `n·x = offset`; return its term count and constant.
 
@@ -119,7 +119,7 @@ def point_on_line(chain: Floats, count: int, nx: float, nz: float, offset: float
     return count, -offset
 
 
-@kernel
+@entry_kernel
 def line_on_point(
     chain: Floats, count: int, nx: float, nz: float, g: float, qx: float, qz: float, w: float, terms: Floats
 ) -> tuple[int, float]:
@@ -139,7 +139,7 @@ def line_on_point(
     return count, -g - w
 
 
-@kernel
+@entry_kernel
 def point_on_point(chain: Floats, count: int, qx: float, qz: float, w: float, terms: Floats) -> tuple[int, float]:
     """Write `(|p(s) - q|² - w²) / 2w`, a gap to first order, for a moving point `p` and w > 0."""
     scale = 1.0 / (2.0 * w)
@@ -161,7 +161,7 @@ def point_on_point(chain: Floats, count: int, qx: float, qz: float, w: float, te
     return n, scale * constant
 
 
-@kernel
+@entry_kernel
 def place(chain: Floats, count: int, s: float) -> tuple[float, float]:
     """Return where the chain's last point is at `s`, relative to the first pivot."""
     x, z = 0.0, 0.0

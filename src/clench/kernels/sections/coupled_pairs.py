@@ -6,13 +6,13 @@ import math
 
 from clench.core.tolerances import FOOT_FRACTION
 from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .coupled import at_start, bounds, line_on_point, next_root, place, point_on_line, point_on_point
 from .turning_pairs import defer, note
 
 
-@inner_kernel
+@kernel
 def side_foot(chain: Floats, count: int, nx: float, nz: float, qx: float, qz: float, s: float) -> float:
     """Return where along a moving side with start normal `n` a fixed point is at `s`, from the last pivot."""
     x, z = place(chain, count - 1, s)
@@ -22,7 +22,7 @@ def side_foot(chain: Floats, count: int, nx: float, nz: float, qx: float, qz: fl
     return -mz * (qx - x) + mx * (qz - z)
 
 
-@inner_kernel
+@kernel
 def sweep_vertex_line(
     chain: Floats,
     terms: Floats,
@@ -58,7 +58,7 @@ def sweep_vertex_line(
         sign = -sign
 
 
-@inner_kernel
+@kernel
 def sweep_side_point(
     chain: Floats,
     terms: Floats,
@@ -91,7 +91,7 @@ def sweep_side_point(
         sign = -sign
 
 
-@inner_kernel
+@kernel
 def sweep_vertex_point(
     chain: Floats,
     terms: Floats,
@@ -114,7 +114,7 @@ def sweep_vertex_point(
     return next_root(terms, n, constant, 0.0, 1.0, second, touch, best)
 
 
-@inner_kernel
+@kernel
 def sweep_segment(
     outline: Outline,
     i: int,
@@ -172,7 +172,7 @@ def sweep_segment(
     return sweep_sides(outline, i, 1, bx, bz, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
 
 
-@inner_kernel
+@kernel
 def sweep_sides(
     outline: Outline,
     i: int,
@@ -210,7 +210,7 @@ def sweep_sides(
     return best
 
 
-@inner_kernel
+@kernel
 def sweep_disk(
     outline: Outline,
     i: int,

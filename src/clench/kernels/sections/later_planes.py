@@ -25,7 +25,7 @@ from clench.kernels.closing.layout import (
     Work,
 )
 from clench.kernels.closing.solve_layout import ObjectArrays
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .advance import place_joints
 from .plane_pose import back, compose_inverse, pose_family
@@ -34,7 +34,7 @@ from .section_overlap import outline_overlaps
 from .turning import STILL
 
 
-@inner_kernel
+@kernel
 def enter_family(
     hand: HandArrays,
     family: int,
@@ -75,7 +75,7 @@ def enter_family(
             return
 
 
-@inner_kernel
+@kernel
 def is_still_there(chain: ChainArrays, hit: Ints, last: int, turns: Floats) -> bool:
     """Say whether nothing has moved a link since it touched; `last` is the last joint that can."""
     still = True
@@ -84,7 +84,7 @@ def is_still_there(chain: ChainArrays, hit: Ints, last: int, turns: Floats) -> b
     return still
 
 
-@inner_kernel
+@kernel
 def touches_still(hand: HandArrays, o: int, i: int, answer: ClosingArrays) -> bool:
     """Say whether the link of an outline is where it touched on an earlier family's plane."""
     outlines = hand.outlines
@@ -96,7 +96,7 @@ def touches_still(hand: HandArrays, o: int, i: int, answer: ClosingArrays) -> bo
     return False
 
 
-@inner_kernel
+@kernel
 def joint_of(hand: HandArrays, family: int, link: int) -> int:
     """Return the last joint of a family that moves a link, or -1 where no plane of the family cuts the link."""
     for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
@@ -106,7 +106,7 @@ def joint_of(hand: HandArrays, family: int, link: int) -> int:
     return -1
 
 
-@inner_kernel
+@kernel
 def is_held(
     hand: HandArrays, family: int, group: int, items: ItemArrays, i: int, work: Work, answer: ClosingArrays
 ) -> bool:
@@ -139,7 +139,7 @@ def is_held(
     return False
 
 
-@inner_kernel
+@kernel
 def carried(T: Floats, T_other: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Map a point of one family's coordinates to those of another, by their poses, (3, 4) each."""
     return back(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import KIND_SIDE, Floats, Outline, SectionArrays, Work
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .conics import region_gap, support
 from .turning_pairs import note
 
 
-@inner_kernel
+@kernel
 def point_segment(px: float, pz: float, ax: float, az: float, bx: float, bz: float) -> tuple[float, float, float]:
     """Return the distance of a point to a segment, and the foot."""
     dx, dz = bx - ax, bz - az
@@ -24,7 +24,7 @@ def point_segment(px: float, pz: float, ax: float, az: float, bx: float, bz: flo
     return math.hypot(px - fx, pz - fz), fx, fz
 
 
-@inner_kernel
+@kernel
 def side_ends(side: Floats, i: int) -> tuple[float, float, float, float]:
     """Return the end points of a side."""
     nx, nz, g = side[i, 0], side[i, 1], side[i, 2]
@@ -32,7 +32,7 @@ def side_ends(side: Floats, i: int) -> tuple[float, float, float, float]:
     return g * nx - ta * nz, g * nz + ta * nx, g * nx - tb * nz, g * nz + tb * nx
 
 
-@inner_kernel
+@kernel
 def outline_distance(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> float:
     """Return the least distance of an outline (put in family coordinates) to a section; `work.best` gets the pair."""
     best = math.inf
@@ -61,20 +61,20 @@ def outline_distance(outline: Outline, sections: SectionArrays, row: int, touch:
     return round_distance(outline, sections, row, best - outline.radius, work)
 
 
-@inner_kernel
+@kernel
 def side_distance(side: Floats, s: int, px: float, pz: float) -> float:
     """Return the distance of a point to the inside of a side, infinite where an end, which is a vertex, is nearest."""
     along = side[s, 0] * pz - side[s, 1] * px
     return abs(side[s, 0] * px + side[s, 1] * pz - side[s, 2]) if side[s, 3] < along < side[s, 4] else math.inf
 
 
-@inner_kernel
+@kernel
 def face(outline: Outline, side: Floats, s: int, px: float, pz: float) -> int:
     """Return 2 where a point is behind a side of which both faces count, else 0."""
     return 2 if outline.both and side[s, 0] * px + side[s, 1] * pz < side[s, 2] else 0
 
 
-@inner_kernel
+@kernel
 def round_distance(outline: Outline, sections: SectionArrays, row: int, best: float, work: Work) -> float:
     """Return the least distance of an outline to the round parts of a section, if below `best`; as above."""
     for i in range(sections.counts[row, 1]):
@@ -105,7 +105,7 @@ def round_distance(outline: Outline, sections: SectionArrays, row: int, best: fl
     return best
 
 
-@inner_kernel
+@kernel
 def core_distance(outline: Outline, qx: float, qz: float, work: Work) -> tuple[float, float, float]:
     """Return the distance of a point to an outline's core, and the unit direction towards it."""
     best, x, z = math.inf, 0.0, 0.0
@@ -123,7 +123,7 @@ def core_distance(outline: Outline, qx: float, qz: float, work: Work) -> tuple[f
     return best, (x - qx) / best, (z - qz) / best
 
 
-@inner_kernel
+@kernel
 def nearest_on_side(e: Floats, side: Floats, s: int) -> tuple[float, float, bool]:
     """Return the point of a side's line that is nearest to a whole ellipse; whether it lies on the side, at no end.
 

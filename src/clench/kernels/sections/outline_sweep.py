@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import RUN, Floats, Outline, SectionArrays, Work
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .conics import sweep_region
 from .corners import sharp_blocks
@@ -13,7 +13,7 @@ from .coupled_pairs import sweep_disk, sweep_segment
 from .turning_pairs import turn_disk, turn_segment
 
 
-@inner_kernel
+@kernel
 def put_stadium(stadium: Floats, o: int, c: float, s: float, dx: float, dz: float, mirror: float, out: Floats) -> None:
     """Write the stadium around a placed outline: an end, the way to the other one, 1 / its square, and the radius."""
     ax, az = stadium[o, 0], stadium[o, 1]
@@ -25,7 +25,7 @@ def put_stadium(stadium: Floats, o: int, c: float, s: float, dx: float, dz: floa
     out[o, 5] = stadium[o, 4]
 
 
-@inner_kernel
+@kernel
 def stadium_gap(stadium: Floats, o: int, x: float, z: float) -> float:
     """Return the distance from a point to a placed stadium, negative inside."""
     dx, dz = x - stadium[o, 0], z - stadium[o, 1]
@@ -36,7 +36,7 @@ def stadium_gap(stadium: Floats, o: int, x: float, z: float) -> float:
     return float(math.sqrt(dx * dx + dz * dz) - stadium[o, 5])
 
 
-@inner_kernel
+@kernel
 def farthest(stadium: Floats, o: int) -> float:
     """Return how far a placed stadium gets from the origin."""
     ax, az = stadium[o, 0], stadium[o, 1]
@@ -44,7 +44,7 @@ def farthest(stadium: Floats, o: int) -> float:
     return float(math.sqrt(max(ax * ax + az * az, bx * bx + bz * bz)) + stadium[o, 5])
 
 
-@inner_kernel
+@kernel
 def misses(
     cx: float, cz: float, d: float, ex: float, ez: float, wide: bool, mx: float, mz: float, reach: float
 ) -> bool:
@@ -61,7 +61,7 @@ def misses(
     return (mx - cx) ** 2 + (mz - cz) ** 2 > square and (mx - ex) ** 2 + (mz - ez) ** 2 > square
 
 
-@inner_kernel
+@kernel
 def deferred_blocks(
     outline: Outline,
     sections: SectionArrays,
@@ -97,14 +97,14 @@ def deferred_blocks(
     return True
 
 
-@inner_kernel
+@kernel
 def turned(x: float, z: float, turn: float) -> tuple[float, float]:
     """Return a point after a turn about the origin [rad]."""
     c, s = math.cos(turn), math.sin(turn)
     return c * x - s * z, s * x + c * z
 
 
-@inner_kernel
+@kernel
 def nearest_turn(
     outline: Outline,
     sections: SectionArrays,
@@ -149,7 +149,7 @@ def nearest_turn(
     return nearest
 
 
-@inner_kernel
+@kernel
 def turn_outline(
     outline: Outline,
     sections: SectionArrays,
@@ -212,7 +212,7 @@ def turn_outline(
     return best
 
 
-@inner_kernel
+@kernel
 def first_near(
     outline: Outline,
     sections: SectionArrays,
@@ -249,7 +249,7 @@ def first_near(
     return free / speed if speed > 0.0 else (math.inf if free > 0.0 else 0.0), nearest
 
 
-@inner_kernel
+@kernel
 def sweep_outline(
     outline: Outline,
     sections: SectionArrays,
@@ -320,7 +320,7 @@ def sweep_outline(
     return best
 
 
-@inner_kernel
+@kernel
 def sweep_ellipses(
     outline: Outline,
     sections: SectionArrays,

@@ -32,7 +32,7 @@ from clench.kernels.closing.layout import (
     SectionArrays,
     Work,
 )
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .advance import place_joints, put_outline
 from .conics import region_gap, support
@@ -40,7 +40,7 @@ from .outline_gap import core_distance, outline_distance, point_segment
 from .turning import STILL
 
 
-@inner_kernel
+@kernel
 def outline_point(outlines: OutlineArrays, work: Work, o: int, v: int) -> tuple[float, float]:
     """Return where a vertex of an outline is at the placed joints."""
     j = outlines.joint[o]
@@ -49,7 +49,7 @@ def outline_point(outlines: OutlineArrays, work: Work, o: int, v: int) -> tuple[
     return c * x - s * z + work.place[j, 0], s * x + c * z + work.place[j, 1]
 
 
-@inner_kernel
+@kernel
 def side_normal(outlines: OutlineArrays, work: Work, o: int, side: int, which: int) -> tuple[float, float]:
     """Return the outward normal of a touching link side at the placed joints; `which` >= 2 is its other face."""
     j = outlines.joint[o]
@@ -61,7 +61,7 @@ def side_normal(outlines: OutlineArrays, work: Work, o: int, side: int, which: i
     ]
 
 
-@inner_kernel
+@kernel
 def touch_segment(
     outlines: OutlineArrays, segment: Floats, work: Work
 ) -> tuple[float, float, float, float, float, float]:
@@ -88,7 +88,7 @@ def touch_segment(
     return ox, oz, nx, nz, cx, cz
 
 
-@inner_kernel
+@kernel
 def touch_round(
     outlines: OutlineArrays, sections: SectionArrays, row: int, work: Work
 ) -> tuple[float, float, float, float]:
@@ -117,7 +117,7 @@ def touch_round(
     return x, z, nx, nz
 
 
-@inner_kernel
+@kernel
 def describe_hit(
     hand: HandArrays,
     sections: SectionArrays,
@@ -136,7 +136,7 @@ def describe_hit(
     describe_touch(hand, sections, plane - base, work, hit, point)
 
 
-@inner_kernel
+@kernel
 def touch_found(
     hand: HandArrays, sections: SectionArrays, row: int, work: Work
 ) -> tuple[float, float, float, float, float, float]:
@@ -147,7 +147,7 @@ def touch_found(
     return x, z, nx, nz, nx, nz
 
 
-@inner_kernel
+@kernel
 def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Work, hit: Ints, point: Floats) -> None:
     """Write where and how the pair in `work.best` touches with the joints where they are placed."""
     source, shape = work.best[3], work.best[5]
@@ -162,7 +162,7 @@ def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Wo
     point[HIT_CURVE_X], point[HIT_CURVE_Z] = cx, cz
 
 
-@inner_kernel
+@kernel
 def still_touches(outline: Outline, hit: Ints, point: Floats, work: Work) -> bool:
     """Say whether the feature that touched a point is still where the touch's normal says, to `PASSED_GAP`."""
     x, z = point[HIT_X] + outline.radius * point[HIT_NX], point[HIT_Z] + outline.radius * point[HIT_NZ]
@@ -176,7 +176,7 @@ def still_touches(outline: Outline, hit: Ints, point: Floats, work: Work) -> boo
     return bool(inside and turned <= PASSED_GAP and away <= PASSED_GAP)
 
 
-@inner_kernel
+@kernel
 def holds(chain: ChainArrays, hit: Ints, x: float, z: float, nx: float, nz: float, place: Floats) -> bool:
     """Say whether a touch with this outward normal holds what a contact stopped: it would not be left by going on."""
     slope, lever = 0.0, 0.0
@@ -188,7 +188,7 @@ def holds(chain: ChainArrays, hit: Ints, x: float, z: float, nx: float, nz: floa
     return slope <= STILL * lever
 
 
-@inner_kernel
+@kernel
 def settle_hit(
     hand: HandArrays,
     start: int,

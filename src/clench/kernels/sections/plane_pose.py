@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from clench.kernels.closing.layout import Floats, HandArrays, Work
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .advance import place_joints
 
 
-@inner_kernel
+@kernel
 def copy_pose(T: Floats, out: Floats) -> None:
     """Write a pose elsewhere, shape (3, 4) each."""
     for r in range(3):
@@ -16,14 +16,14 @@ def copy_pose(T: Floats, out: Floats) -> None:
             out[r, c] = T[r, c]
 
 
-@inner_kernel
+@kernel
 def put_point(T: Floats, p: Floats, out: Floats) -> None:
     """Write a point in the frame that a pose leads to."""
     for r in range(3):
         out[r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
 
 
-@inner_kernel
+@kernel
 def back(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Map a point by the inverse of a pose, (3, 4)."""
     x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]
@@ -34,7 +34,7 @@ def back(T: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     )
 
 
-@inner_kernel
+@kernel
 def compose(a: Floats, b: Floats, out: Floats) -> None:
     """Write the product of two rigid poses, shape (3, 4) each."""
     for r in range(3):
@@ -45,7 +45,7 @@ def compose(a: Floats, b: Floats, out: Floats) -> None:
             out[r, c] = total
 
 
-@inner_kernel
+@kernel
 def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
     """Write `a⁻¹ b` for rigid poses, shape (3, 4) each."""
     for r in range(3):
@@ -57,7 +57,7 @@ def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
             out[r, c] = total
 
 
-@inner_kernel
+@kernel
 def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, work: Work, poses: Floats) -> None:
     """Write `T_palm_family` of a family from that of the family before and the turns of its joints.
 
@@ -84,7 +84,7 @@ def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, work:
     compose(before, hand.family_pose[family], poses[family])
 
 
-@inner_kernel
+@kernel
 def pose_families(hand: HandArrays, entry: int, turns: Floats, work: Work, poses: Floats) -> None:
     """Write `T_palm_family` of all families of an entry after the first, which has been written; see `pose_family`."""
     for family in range(hand.entry_family[entry] + 1, hand.entry_family[entry + 1]):

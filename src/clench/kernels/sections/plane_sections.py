@@ -8,7 +8,7 @@ import numpy as np
 
 from clench.kernels.closing.layout import RUN, Floats, HandArrays, ItemArrays, RoundArrays, SectionArrays
 from clench.kernels.geometry.bvh import MeshTree
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .plane_pose import compose, compose_inverse
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
@@ -33,7 +33,7 @@ def make_sections(planes: int, capacity: int, rounds: int) -> SectionArrays:
     )
 
 
-@inner_kernel
+@kernel
 def put_circles(sections: SectionArrays, row: int) -> None:
     """Write circles around those that have the segments of a row as diameters."""
     segments, count = sections.segments, sections.counts[row, 0]
@@ -53,7 +53,7 @@ def put_circles(sections: SectionArrays, row: int) -> None:
         circle[0], circle[1], circle[2] = x, z, WIDER * radius
 
 
-@kernel
+@entry_kernel
 def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections: SectionArrays, pose: Floats) -> None:
     """Append the sections of all round primitives with one plane; `pose` is scratch space, (3, 4)."""
     for i in range(rounds.kind.shape[0]):
@@ -69,7 +69,7 @@ def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections
             cut_sphere(pose[0, 3], pose[1, 3], pose[2, 3], size[0], offset, i, row, sections)
 
 
-@inner_kernel
+@kernel
 def cut_planes(
     hand: HandArrays,
     family: int,
@@ -111,7 +111,7 @@ def cut_planes(
     return int(wanted)
 
 
-@kernel
+@entry_kernel
 def needs_planes(items: ItemArrays) -> bool:
     """Say whether any item has planes; the full width has none around what it sweeps exactly."""
     planes = 0
@@ -120,7 +120,7 @@ def needs_planes(items: ItemArrays) -> bool:
     return bool(planes > 0)
 
 
-@kernel
+@entry_kernel
 def cut_first_families(
     hand: HandArrays,
     tree: MeshTree,

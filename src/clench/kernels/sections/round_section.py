@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats, SectionArrays
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 SPHERE, CAPSULE, CYLINDER, ELLIPSOID = 0, 1, 2, 3
 
@@ -15,7 +15,7 @@ ALIGNED = 1e-9
 STRAIGHT = 1e-10
 
 
-@inner_kernel
+@kernel
 def add_segment(
     ax: float, az: float, bx: float, bz: float, nx: float, nz: float, source: int, row: int, sections: SectionArrays
 ) -> None:
@@ -27,7 +27,7 @@ def add_segment(
     sections.counts[row, 0] = i + 1
 
 
-@inner_kernel
+@kernel
 def add_disk(x: float, z: float, radius: float, source: int, row: int, sections: SectionArrays) -> None:
     """Append a disk."""
     i = sections.counts[row, 1]
@@ -36,7 +36,7 @@ def add_disk(x: float, z: float, radius: float, source: int, row: int, sections:
     sections.counts[row, 1] = i + 1
 
 
-@inner_kernel
+@kernel
 def add_ellipse(
     x: float,
     z: float,
@@ -58,7 +58,7 @@ def add_ellipse(
     sections.counts[row, 2] = i + 1
 
 
-@inner_kernel
+@kernel
 def cut_sphere(
     x: float, y: float, z: float, radius: float, offset: float, source: int, row: int, sections: SectionArrays
 ) -> None:
@@ -68,7 +68,7 @@ def cut_sphere(
         add_disk(x, z, math.sqrt(square), source, row, sections)
 
 
-@inner_kernel
+@kernel
 def cut_capsule(
     pose: Floats, radius: float, half: float, offset: float, source: int, row: int, sections: SectionArrays
 ) -> None:
@@ -87,7 +87,7 @@ def cut_capsule(
     cut_cylinder(pose, radius, half, offset, False, source, row, sections)
 
 
-@inner_kernel
+@kernel
 def cut_cylinder(
     pose: Floats,
     radius: float,
@@ -123,7 +123,7 @@ def cut_cylinder(
             add_chord(cx, cz, ux, uz, radius * math.sqrt(1.0 - (high / a) ** 2), high, 1.0, source, row, sections)
 
 
-@inner_kernel
+@kernel
 def add_band(
     pose: Floats, radius: float, half: float, offset: float, caps: bool, source: int, row: int, sections: SectionArrays
 ) -> bool:
@@ -160,7 +160,7 @@ def add_band(
     return True
 
 
-@inner_kernel
+@kernel
 def add_chord(
     cx: float,
     cz: float,
@@ -178,7 +178,7 @@ def add_chord(
     add_segment(x - half * uz, z + half * ux, x + half * uz, z - half * ux, sign * ux, sign * uz, source, row, sections)
 
 
-@inner_kernel
+@kernel
 def cut_ellipsoid(pose: Floats, size: Floats, offset: float, source: int, row: int, sections: SectionArrays) -> None:
     """Append the ellipse of an ellipsoid, the image of the unit sphere under `pose · diag(size)`."""
     mx, my, mz = pose[1, 0] * size[0], pose[1, 1] * size[1], pose[1, 2] * size[2]
@@ -212,7 +212,7 @@ def cut_ellipsoid(pose: Floats, size: Floats, offset: float, source: int, row: i
         add_ellipse(x, z, rho * ax / a, rho * az / a, a, b, -a, a, source, row, sections)
 
 
-@inner_kernel
+@kernel
 def project(pose: Floats, size: Floats, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the in-plane image of a direction of the unit sphere."""
     x, y, z = x * size[0], y * size[1], z * size[2]

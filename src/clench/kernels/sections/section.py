@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.kernels.geometry.bvh import Floats, Ints, MeshTree, build_tree
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 Row = tuple[float, float, float, float]
 Point = tuple[float, float, float]
@@ -54,7 +54,7 @@ def cut_mesh(
     return segments[0, :found].copy(), tree.original[sources[0, :found]]
 
 
-@kernel
+@entry_kernel
 def cut(
     tree: MeshTree,
     T: Floats,
@@ -154,7 +154,7 @@ def cut(
     return int(_end_counts(low - base, high - base, counts, capacity))
 
 
-@inner_kernel
+@kernel
 def _start_counts(tree: MeshTree, scale: float, offsets: Floats, low: int, high: int, counts: Any, base: int) -> float:
     """Set the counts of planes to 0; return the largest coordinate, at least `scale` [m]."""
     for plane in range(low, high):
@@ -165,7 +165,7 @@ def _start_counts(tree: MeshTree, scale: float, offsets: Floats, low: int, high:
     return scale
 
 
-@inner_kernel
+@kernel
 def _end_counts(first: int, last: int, counts: Any, capacity: int) -> int:
     """Return the largest count where it is above the capacity, else 0; rows that got too many have none."""
     wanted = 0
@@ -176,13 +176,13 @@ def _end_counts(first: int, last: int, counts: Any, capacity: int) -> int:
     return wanted
 
 
-@inner_kernel
+@kernel
 def _span(row: Row, hx: float, hy: float, hz: float) -> float:
     """Return how far a box with some half extents gets from its centre in a direction."""
     return abs(row[0]) * hx + abs(row[1]) * hy + abs(row[2]) * hz
 
 
-@inner_kernel
+@kernel
 def _out_of_reach(
     center: Point, hx: float, hy: float, hz: float, x_row: Row, z_row: Row, reach: float, slack: float
 ) -> bool:
@@ -194,7 +194,7 @@ def _out_of_reach(
     return x * x + z * z > reach * reach
 
 
-@inner_kernel
+@kernel
 def _segment(
     p: Flat, q: Flat, r: Flat, da: float, db: float, dc: float, on: float
 ) -> tuple[int, float, float, float, float]:
@@ -233,31 +233,31 @@ def _segment(
     return ends, u[0], u[1], v[0], v[1]
 
 
-@inner_kernel
+@kernel
 def _dot(row: Row, m: Row) -> float:
     return row[0] * m[0] + row[1] * m[1] + row[2] * m[2]
 
 
-@inner_kernel
+@kernel
 def _map(row: Row, p: Point) -> float:
     return row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]
 
 
-@inner_kernel
+@kernel
 def _add(ends: int, u: Flat, v: Flat, point: Flat) -> tuple[int, Flat, Flat]:
     if ends == 0:
         return 1, point, v
     return ends + 1, u, point
 
 
-@inner_kernel
+@kernel
 def _crossing(p: Flat, q: Flat, dp: float, dq: float) -> Flat:
     """Return the point between p and q at distances dp and dq from the plane: the same bits with both exchanged."""
     share = 1.0 / (dp + dq)
     return (p[0] * dq + q[0] * dp) * share, (p[1] * dq + q[1] * dp) * share
 
 
-@inner_kernel
+@kernel
 def _within(ax: float, az: float, bx: float, bz: float, reach: float) -> bool:
     """Say whether a segment comes as near to the origin as `reach`."""
     if ax * ax + az * az <= reach * reach:
@@ -271,7 +271,7 @@ def _within(ax: float, az: float, bx: float, bz: float, reach: float) -> bool:
     return x * x + z * z <= reach * reach
 
 
-@inner_kernel
+@kernel
 def _normal(ax: float, az: float, bx: float, bz: float, fx: float, fz: float, short: float) -> Flat:
     """Return the unit normal of a segment on the side of the face's projected normal; zero without one."""
     if fx == 0.0 and fz == 0.0:

@@ -8,7 +8,7 @@ from clench.core.tolerances import TOUCH_FRACTION
 from clench.kernels.closing.layout import RUN, Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
 from clench.kernels.geometry.bvh import MeshTree
 from clench.kernels.geometry.mesh_distance import Point, is_inside
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .advance import place_joints, put_outline
 from .outline_gap import core_distance, point_segment, round_distance, side_ends
@@ -17,7 +17,7 @@ from .plane_pose import back, compose_inverse
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID
 
 
-@inner_kernel
+@kernel
 def crosses(
     ax: float, az: float, bx: float, bz: float, cx: float, cz: float, dx: float, dz: float, margin: float
 ) -> bool:
@@ -32,7 +32,7 @@ def crosses(
     return ((c > mu and d < -mu) or (c < -mu and d > mu)) and ((a > mv and b < -mv) or (a < -mv and b > mv))
 
 
-@inner_kernel
+@kernel
 def core_holds(outline: Outline, qx: float, qz: float, work: Work) -> bool:
     """Say whether an outline's core goes around a point (by the crossings of a ray along x)."""
     around = 0
@@ -43,7 +43,7 @@ def core_holds(outline: Outline, qx: float, qz: float, work: Work) -> bool:
     return around != 0
 
 
-@inner_kernel
+@kernel
 def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: float, margin: float, work: Work) -> bool:
     """Say whether a segment crosses an outline, comes closer to its core than the radius, or begins inside it."""
     limit = outline.radius - margin
@@ -68,7 +68,7 @@ def segment_overlaps(outline: Outline, ax: float, az: float, bx: float, bz: floa
     return False
 
 
-@inner_kernel
+@kernel
 def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> bool:
     """Say whether an outline and a section cross, or one of the section's pieces lies in the outline."""
     margin = 4.0 * touch
@@ -99,7 +99,7 @@ def curves_overlap(outline: Outline, sections: SectionArrays, row: int, touch: f
     return False
 
 
-@inner_kernel
+@kernel
 def inside_round(rounds: RoundArrays, i: int, p: Point) -> bool:
     """Say whether a point of the object's frame lies inside a round primitive."""
     pose, size = rounds.pose[i], rounds.size[i]
@@ -117,7 +117,7 @@ def inside_round(rounds: RoundArrays, i: int, p: Point) -> bool:
     return bool(x * x + y * y + beyond * beyond < size[0] ** 2)
 
 
-@inner_kernel
+@kernel
 def starts_inside(
     tree: MeshTree, rounds: RoundArrays, closed: bool, T_family_object: Floats, x: float, y: float, z: float
 ) -> bool:
@@ -134,7 +134,7 @@ def starts_inside(
     return bool(is_inside(tree, p, closed))
 
 
-@inner_kernel
+@kernel
 def outline_overlaps(
     hand: HandArrays,
     o: int,
@@ -158,7 +158,7 @@ def outline_overlaps(
     return bool(curves_overlap(outline, sections, row, touch, work))
 
 
-@kernel
+@entry_kernel
 def look_for_overlaps(
     hand: HandArrays,
     tree: MeshTree,
@@ -188,7 +188,7 @@ def look_for_overlaps(
                 break
 
 
-@inner_kernel
+@kernel
 def closer_than(outline: Outline, sections: SectionArrays, row: int, margin: float, work: Work) -> bool:
     """Say whether an outline's first vertex is within `margin` of a section's segments, so that inside is not sure."""
     x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]

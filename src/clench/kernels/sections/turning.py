@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 
 from clench.core.tolerances import FOOT_FRACTION
-from clench.kernels.runtime.compiling import kernel
+from clench.kernels.runtime.compiling import entry_kernel
 
 TWO_PI = 2.0 * math.pi
 #: Gap rates below this fraction of the lever arm count as zero: over any closing they stay under the touch tolerance.
 STILL = 1e-9
 
 
-@kernel
+@entry_kernel
 def turn_to(fx: float, fz: float, tx: float, tz: float) -> float:
     """Return the counter-clockwise turn in [0, 2π) that takes direction `f` to direction `t`."""
     angle = math.atan2(fx * tz - fz * tx, fx * tx + fz * tz)
@@ -28,7 +28,7 @@ def turn_to(fx: float, fz: float, tx: float, tz: float) -> float:
     return angle
 
 
-@kernel
+@entry_kernel
 def is_blocking(slope: float, curvature: float, lever: float, touch: float) -> bool:
     """Say whether a touching pair blocks: its gap shrinks, or stands still and bends down.
 
@@ -40,7 +40,7 @@ def is_blocking(slope: float, curvature: float, lever: float, touch: float) -> b
     return slope < -still or (slope <= still and curvature < -still)
 
 
-@kernel
+@entry_kernel
 def grazing_band(u: float, touch: float) -> float:
     """Return how far `ρ² - u²` may be off zero while a pass at offset `u` stays within the touch tolerance.
 
@@ -50,7 +50,7 @@ def grazing_band(u: float, touch: float) -> float:
     return touch * (2.0 * abs(u) + touch)
 
 
-@kernel
+@entry_kernel
 def disk_on_segment(
     vx: float, vz: float, w: float, nx: float, nz: float, h: float, ta: float, tb: float, touch: float, best: float
 ) -> float:
@@ -84,7 +84,7 @@ def disk_on_segment(
     return min(best, turn_to(vx, vz, u * nx - t * nz, u * nz + t * nx))
 
 
-@kernel
+@entry_kernel
 def side_on_vertex(
     nx: float, nz: float, g: float, ta: float, tb: float, qx: float, qz: float, w: float, touch: float, best: float
 ) -> float:
@@ -118,7 +118,7 @@ def side_on_vertex(
     return min(best, turn_to(u * nx - t * nz, u * nz + t * nx, qx, qz))
 
 
-@kernel
+@entry_kernel
 def disk_on_vertex(
     vx: float, vz: float, rho: float, qx: float, qz: float, r: float, w: float, touch: float, best: float
 ) -> float:

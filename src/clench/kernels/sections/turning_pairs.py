@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
 
@@ -13,26 +13,26 @@ from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
 BELOW = 1.0 - 2.0**-53
 
 
-@inner_kernel
+@kernel
 def sooner(found: float, best: float) -> float:
     """Return a winner's travel below `best`, which rounding may have lost."""
     return min(found, best * BELOW)
 
 
-@inner_kernel
+@kernel
 def note(pair: Ints, kind: int, outline: int, feature: int, source: int, which: int, disk: int) -> None:
     """Write the winning pair."""
     pair[0], pair[1], pair[2], pair[3], pair[4], pair[5] = kind, outline, feature, source, which, disk
 
 
-@inner_kernel
+@kernel
 def defer(pair: Ints, kind: int, outline: int, feature: int, source: int, which: int) -> None:
     """Write a sharp pair that touches at the start; `corners` decides whether it blocks."""
     pair[6] = 1
     pair[7], pair[8], pair[9], pair[10], pair[11], pair[12] = kind, outline, feature, source, which, 0
 
 
-@inner_kernel
+@kernel
 def turn_segment(
     outline: Outline,
     i: int,
@@ -93,7 +93,7 @@ def turn_segment(
     return sooner(turn / rate, best) if turn < limit else best
 
 
-@inner_kernel
+@kernel
 def turn_sides(
     outline: Outline,
     i: int,
@@ -128,7 +128,7 @@ def turn_sides(
     return turn
 
 
-@inner_kernel
+@kernel
 def turn_disk(
     outline: Outline,
     i: int,

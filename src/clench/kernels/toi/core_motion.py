@@ -6,12 +6,12 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector, dot
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .spatial_motion import is_spatial, moved, moved_back, point_bounds, point_motion, total_rate
 
 
-@inner_kernel
+@kernel
 def move_core(core: Floats, corners: int, chain: Floats, count: int, s: float, out: Floats) -> None:
     """Write a core's corners when the chain has moved by `s`; they are given relative to its last pivot."""
     if is_spatial(chain):
@@ -30,7 +30,7 @@ def move_core(core: Floats, corners: int, chain: Floats, count: int, s: float, o
         out[k, 2] = z + d * core[k, 0] + c * core[k, 2]
 
 
-@inner_kernel
+@kernel
 def base_motion(
     chain: Floats, count: int, nx: float, nz: float, s: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -53,7 +53,7 @@ def base_motion(
     return px, pz, slope, curvature, lever, math.sqrt(nx * nx + nz * nz) * bound
 
 
-@inner_kernel
+@kernel
 def corner_motion(
     core: Floats, k: int, chain: Floats, count: int, nx: float, ny: float, nz: float, s: float
 ) -> tuple[float, float, float, float]:
@@ -76,7 +76,7 @@ def corner_motion(
     )
 
 
-@inner_kernel
+@kernel
 def turn_rate(chain: Floats, count: int) -> float:
     """Return a bound on how fast the core, or anything before it, turns."""
     if is_spatial(chain):
@@ -87,7 +87,7 @@ def turn_rate(chain: Floats, count: int) -> float:
     return rate
 
 
-@inner_kernel
+@kernel
 def carried_back(m: Vector, chain: Floats, count: int, s: float, step: float) -> Vector:
     """Return a direction that goes along with the core as it was a step before `s + step`."""
     if is_spatial(chain):
@@ -96,7 +96,7 @@ def carried_back(m: Vector, chain: Floats, count: int, s: float, step: float) ->
     return c * m[0] + d * m[2], m[1], c * m[2] - d * m[0]
 
 
-@inner_kernel
+@kernel
 def plane_offset(core: Floats, corners: int, nx: float, ny: float, nz: float) -> float:
     """Return the largest coordinate of a core along n."""
     top: float = nx * core[0, 0] + ny * core[0, 1] + nz * core[0, 2]
@@ -105,13 +105,13 @@ def plane_offset(core: Floats, corners: int, nx: float, ny: float, nz: float) ->
     return top
 
 
-@inner_kernel
+@kernel
 def plane_gap(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float) -> float:
     """Return how far core `a` lies beyond core `b` along n."""
     return -plane_offset(a, ka, -nx, -ny, -nz) - plane_offset(b, kb, nx, ny, nz)
 
 
-@inner_kernel
+@kernel
 def turn_to_plane(gap: float, slope: float, curvature: float, best: float) -> float:
     """Return the next turn at which a point comes down to a plane, for a gap `K + A cos + B sin` >= 0 now.
 

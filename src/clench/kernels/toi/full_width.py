@@ -29,7 +29,7 @@ from clench.kernels.geometry.core_distance import AT_CORNER, edge_count, face_no
 from clench.kernels.geometry.crossing import across
 from clench.kernels.geometry.link_boxes import boxes_meet
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import copy_pose
 
 from .separating import side
@@ -88,7 +88,7 @@ def planes_only(items: int, entries: int) -> ExactArrays:
     )
 
 
-@inner_kernel
+@kernel
 def turn_about(axis: Floats, anchor: Floats, turn: float, T: Floats) -> None:
     """Turn a pose about an axis, in place."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -103,7 +103,7 @@ def turn_about(axis: Floats, anchor: Floats, turn: float, T: Floats) -> None:
         T[2, k] += s * cz + v * (x * cy - y * cx)
 
 
-@inner_kernel
+@kernel
 def pose_movers(exact: ExactArrays, chain: ChainArrays, entry: int, turns: Floats, poses: Floats) -> None:
     """Write `T_palm_link` of an entry's moving links at the present turns to `poses`, (L, 3, 4)."""
     for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
@@ -114,7 +114,7 @@ def pose_movers(exact: ExactArrays, chain: ChainArrays, entry: int, turns: Float
                 turn_about(exact.axis[j], exact.anchor[j], turns[j], T)
 
 
-@inner_kernel
+@kernel
 def place_axes(exact: ExactArrays, entry: int, turns: Floats, sweep: SweepWork) -> None:
     """Write the axes and anchors of an entry's joints at the present turns to `sweep`, in the palm frame."""
     begin, end = exact.joint_first[entry], exact.joint_first[entry + 1]
@@ -131,14 +131,14 @@ def place_axes(exact: ExactArrays, entry: int, turns: Floats, sweep: SweepWork) 
         sweep.anchor[j, 0], sweep.anchor[j, 1], sweep.anchor[j, 2] = at
 
 
-@inner_kernel
+@kernel
 def keep_pair(sweep: SweepWork) -> None:
     """Keep the pair that was found last as the winner of the stage."""
     for k in range(4):
         sweep.winner[k] = sweep.pair[k]
 
 
-@inner_kernel
+@kernel
 def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
     """Return the last joint of an entry that moves a link; `last` where that is later, or none does."""
     for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
@@ -147,7 +147,7 @@ def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
     return int(last)
 
 
-@inner_kernel
+@kernel
 def overlap_truly(
     links: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, sweep: SweepWork
 ) -> bool:
@@ -180,7 +180,7 @@ def overlap_truly(
     return True
 
 
-@inner_kernel
+@kernel
 def pressed_along(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bool, Vector]:
     """Return whether there is a unit direction of a number, and it: across a face of either core, or across two edges.
 
@@ -201,7 +201,7 @@ def pressed_along(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[
     return spans, scaled(m, 1.0 / math.sqrt(dot(m, m))) if spans else m
 
 
-@inner_kernel
+@kernel
 def face_across(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bool, Vector]:
     """Return whether the first (0) or second (1) of two cores is a face, and its unit normal."""
     if (ka if number == 0 else kb) < 3:
@@ -210,7 +210,7 @@ def face_across(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bo
     return size > 0.0, (nx, ny, nz)
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
     """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
 
@@ -233,7 +233,7 @@ def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, 
     return -1, -1
 
 
-@inner_kernel
+@kernel
 def describe_pair(
     exact: ExactArrays,
     T_palm_object: Floats,

@@ -14,7 +14,7 @@ from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.link_frames import FrameArrays, put_link
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, make_depth_work
 from clench.kernels.geometry.vectors import Vector
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_pose, put_point
 
 from .toi_bodies import sweep_body
@@ -67,7 +67,7 @@ class PathWork(NamedTuple):
     depth: DepthWork
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_path_work(joints: int, links: int, points: int) -> PathWork:
     """Allocate the scratch space of a check."""
     return PathWork(
@@ -82,13 +82,13 @@ def make_path_work(joints: int, links: int, points: int) -> PathWork:
     )
 
 
-@inner_kernel
+@kernel
 def moves_one(problem: PathProblem, m: int, r: int, link: int) -> bool:
     """Say whether the joint of a link moves `m`, and does not move `r` along with it."""
     return bool(problem.frames.joint[link] >= 0 and problem.lineage[m, link] != 0 and problem.lineage[r, link] == 0)
 
 
-@inner_kernel
+@kernel
 def put_left(problem: PathProblem, m: int, r: int, work: PathWork) -> None:
     """Write to `work.left` how far the points of a pair can move relative to each other until the end of the path."""
     path, frames, links = problem.path, problem.frames, problem.frames.joint.shape[0]
@@ -109,7 +109,7 @@ def put_left(problem: PathProblem, m: int, r: int, work: PathWork) -> None:
         work.left[k] = work.left[k + 1] + motion
 
 
-@inner_kernel
+@kernel
 def place_pair(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> None:
     """Write the poses of a pair in the palm's frame to `work.sweep`, a share `t` of the way after way-point `k`."""
     path, frames, palm = problem.path, problem.frames, problem.frames.palm[0]
@@ -127,7 +127,7 @@ def place_pair(problem: PathProblem, m: int, r: int, k: int, t: float, work: Pat
         copy_pose(problem.T_palm_object, work.sweep.resting)
 
 
-@inner_kernel
+@kernel
 def put_row(
     problem: PathProblem, link: int, rate: float, count: int, pivot: Vector, work: PathWork
 ) -> tuple[int, Vector]:
@@ -145,7 +145,7 @@ def put_row(
     return count + 1, at
 
 
-@inner_kernel
+@kernel
 def put_chain(
     problem: PathProblem, m: int, other: int, k: int, share: float, work: PathWork
 ) -> tuple[int, Vector, Vector]:
@@ -177,7 +177,7 @@ def put_chain(
     return count, first, last
 
 
-@inner_kernel
+@kernel
 def free_share(problem: PathProblem, m: int, r: int, k: int, t: float, touch: float, work: PathWork) -> float:
     """Return which share of what is left of a segment a pair goes until it touches, 1 for all; `OVERLAP` as a sweep.
 
@@ -202,7 +202,7 @@ def free_share(problem: PathProblem, m: int, r: int, k: int, t: float, touch: fl
     return float(sweep_body(problem.links, m, target, b, sweep.spatial, count, touch, 1.0, sweep))
 
 
-@inner_kernel
+@kernel
 def target_of(problem: PathProblem, r: int) -> tuple[BodyArrays, int]:
     """Return the bodies that the second one of a pair is among, and its number there."""
     if r >= 0:
@@ -210,7 +210,7 @@ def target_of(problem: PathProblem, r: int) -> tuple[BodyArrays, int]:
     return problem.object, 0
 
 
-@inner_kernel
+@kernel
 def turned(T: Floats, p: Vector) -> Vector:
     """Return a vector in the frame that a pose leads to."""
     return (

@@ -11,14 +11,14 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector, cross, dot, plus, scaled
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 
 from .pair_motion import PathProblem, PathWork, moves_one, target_of, turned
 from .toi_work import put_core
 
 
-@inner_kernel
+@kernel
 def highest(bodies: BodyArrays, m: int, T: Floats, n: Vector, c: Vector, radius: float, work: PathWork) -> float:
     """Return the largest coordinate along a unit vector of a body's elements that come near a ball [m].
 
@@ -48,7 +48,7 @@ def highest(bodies: BodyArrays, m: int, T: Floats, n: Vector, c: Vector, radius:
     return most
 
 
-@inner_kernel
+@kernel
 def approach(
     problem: PathProblem, m: int, other: int, n: Vector, k: int, sign: float, work: PathWork
 ) -> tuple[float, float]:
@@ -82,7 +82,7 @@ def approach(
     return sign * speed - math.sqrt(dot(twist, twist)) * links.node[links.root[m], 3], bend
 
 
-@inner_kernel
+@kernel
 def palm_moves(problem: PathProblem, m: int, k: int) -> bool:
     """Say whether a joint moves the palm, and the object with it, but not a link, on a segment."""
     frames, palm, moves = problem.frames, problem.frames.palm[0], False
@@ -92,7 +92,7 @@ def palm_moves(problem: PathProblem, m: int, k: int) -> bool:
     return moves
 
 
-@inner_kernel
+@kernel
 def keep_normal(problem: PathProblem, r: int, work: PathWork) -> None:
     """Write the direction between the closest elements, in the frame of the second body, to `work.normal`."""
     sweep, links, out = work.sweep, problem.links, work.normal
@@ -106,7 +106,7 @@ def keep_normal(problem: PathProblem, r: int, work: PathWork) -> None:
         out[axis] = T[0, axis] * nx + T[1, axis] * ny + T[2, axis] * nz
 
 
-@inner_kernel
+@kernel
 def parted_share(problem: PathProblem, m: int, r: int, k: int, margin: float, work: PathWork) -> float:
     """Return for which share of a segment the plane of `work.normal` keeps a pair apart, up to `margin` [m]; 0 without.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .toi_work import SweepWork
 
 
-@inner_kernel
+@kernel
 def swap_pairs(work: SweepWork, i: int, k: int) -> None:
     """Swap two pairs that wait."""
     stack, keys, since = work.stack, work.keys, work.since
@@ -17,7 +17,7 @@ def swap_pairs(work: SweepWork, i: int, k: int) -> None:
         stack[i, column], stack[k, column] = stack[k, column], stack[i, column]
 
 
-@inner_kernel
+@kernel
 def lift_pair(work: SweepWork, i: int) -> None:
     """Move a pair of the heap up to where it belongs."""
     while i > 0 and work.keys[i] < work.keys[(i - 1) // 2]:
@@ -25,7 +25,7 @@ def lift_pair(work: SweepWork, i: int) -> None:
         i = (i - 1) // 2
 
 
-@inner_kernel
+@kernel
 def take_first(work: SweepWork, size: int) -> int:
     """Move the earliest pair of a heap to the heap's last row; return the size of what is left, where it lies."""
     size -= 1
@@ -42,7 +42,7 @@ def take_first(work: SweepWork, size: int) -> int:
     return size
 
 
-@inner_kernel
+@kernel
 def take_in(work: SweepWork, size: int, row: int) -> int:
     """Take the pair of a row outside a heap into it; return its size."""
     swap_pairs(work, size, row)

@@ -12,7 +12,7 @@ from typing import Final
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.link_meshes import ObjectMesh, depth_of, mesh_of
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .pair_motion import PathProblem, PathWork, free_share, make_path_work, place_pair, put_left, target_of
 from .pair_planes import keep_normal, parted_share
@@ -34,7 +34,7 @@ MOST_LOOKS: Final = 3_000
 BALLS: Final = 0.25
 
 
-@inner_kernel
+@kernel
 def gap_between(problem: PathProblem, m: int, r: int, near: float, work: PathWork) -> float:
     """Return the gap of a pair in its present place, minus its depth where the pair overlaps; `near` if larger [m].
 
@@ -51,7 +51,7 @@ def gap_between(problem: PathProblem, m: int, r: int, near: float, work: PathWor
     return -depth if depth > max(0.0, -gap) else gap
 
 
-@inner_kernel
+@kernel
 def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
     """Return how deep a pair overlaps in its present place [m]; 0 when it is apart."""
     meshes, k = problem.meshes, problem.mesh[m]
@@ -68,7 +68,7 @@ def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float
     return depth_of(meshes, k, work.sweep.moving, solid, work.sweep.resting, limit, work.depth)[0]
 
 
-@inner_kernel
+@kernel
 def step_on(left: Floats, k: int, t: float, motion: float) -> tuple[int, float]:
     """Return the place at which a pair has moved by `motion` [m] since a place; the last way-point at the latest."""
     last = left.shape[0] - 1
@@ -82,7 +82,7 @@ def step_on(left: Floats, k: int, t: float, motion: float) -> tuple[int, float]:
     return last, 0.0
 
 
-@inner_kernel
+@kernel
 def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> tuple[int, float]:
     """Return the place at which a pair that is apart touches next; the last way-point where it does not."""
     target, b = target_of(problem, r)
@@ -101,7 +101,7 @@ def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: Pat
     return last, 0.0
 
 
-@inner_kernel
+@kernel
 def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tuple[float, float]:
     """Return the place at which a pair first overlaps, and how deep [m]; infinite and 0 where it does not.
 
@@ -150,7 +150,7 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
     return math.inf, 0.0
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def first_overlap(problem: PathProblem, out: Floats) -> int:
     """Return the pair that overlaps first on a path, -1 when none does; write place and depth to `out`, (2,).
 

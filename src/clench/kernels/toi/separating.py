@@ -12,7 +12,7 @@ import math
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.core_distance import edge_count, face_normal, separation
 from clench.kernels.geometry.vectors import Vector
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.coupled import safe_step
 from clench.kernels.sections.turning import is_blocking
 
@@ -33,7 +33,7 @@ OPPOSED = -0.5
 TILT = 64.0
 
 
-@inner_kernel
+@kernel
 def plane_permits(
     core: Floats,
     placed: Floats,
@@ -57,7 +57,7 @@ def plane_permits(
     return True
 
 
-@inner_kernel
+@kernel
 def leave_plane(
     core: Floats,
     placed: Floats,
@@ -98,20 +98,20 @@ def leave_plane(
     return step
 
 
-@inner_kernel
+@kernel
 def lies_in_plane(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float, touch: float) -> bool:
     """Say whether two cores lie in one plane with normal n, so that it separates them whichever way it looks."""
     return -plane_gap(a, ka, b, kb, nx, ny, nz) <= touch and -plane_gap(b, kb, a, ka, nx, ny, nz) <= touch
 
 
-@inner_kernel
+@kernel
 def looks_along(face: Floats, nx: float, ny: float, nz: float) -> bool:
     """Say whether a moving face looks along n, so that its body lies on the side from which n points."""
     mx, my, mz, _ = face_normal(face)
     return nx * mx + ny * my + nz * mz > 0.0
 
 
-@inner_kernel
+@kernel
 def separates(
     placed: Floats, ka: int, fixed: Floats, kb: int, w: float, nx: float, ny: float, nz: float, touch: float
 ) -> bool:
@@ -126,7 +126,7 @@ def separates(
     return not lies_in_plane(placed, ka, fixed, kb, nx, ny, nz, touch)
 
 
-@inner_kernel
+@kernel
 def try_direction(
     core: Floats,
     placed: Floats,
@@ -161,7 +161,7 @@ def try_direction(
     return leave_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch, best)
 
 
-@inner_kernel
+@kernel
 def try_across(
     core: Floats,
     placed: Floats,
@@ -195,14 +195,14 @@ def try_across(
     return max(one, other)
 
 
-@inner_kernel
+@kernel
 def side(core: Floats, corners: int, k: int) -> Vector:
     """Return a core's edge from corner `k` on."""
     j = (k + 1) % corners
     return core[j, 0] - core[k, 0], core[j, 1] - core[k, 1], core[j, 2] - core[k, 2]
 
 
-@inner_kernel
+@kernel
 def leave_touch(
     core: Floats,
     placed: Floats,
@@ -247,7 +247,7 @@ def leave_touch(
     return found
 
 
-@inner_kernel
+@kernel
 def starts_apart(
     placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Vector, back: Vector, turn: float, touch: float
 ) -> bool:
@@ -279,7 +279,7 @@ def starts_apart(
     return False
 
 
-@inner_kernel
+@kernel
 def probe(
     core: Floats,
     placed: Floats,
@@ -322,7 +322,7 @@ def probe(
     return step if starts_apart(placed, ka, fixed, kb, w, m, back, rate * step, touch) else BLOCKED
 
 
-@inner_kernel
+@kernel
 def move_on(
     core: Floats,
     placed: Floats,

@@ -8,14 +8,14 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.obb import slab_top
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .core_motion import plane_offset
 from .toi_bounds import stays_above
 from .toi_work import SweepWork
 
 
-@inner_kernel
+@kernel
 def put_plane(nx: float, ny: float, nz: float, offset: float, work: SweepWork) -> None:
     """Write a plane, given relative to the first pivot, to `work`, in the resting body's frame as well."""
     plane, T = work.plane, work.resting
@@ -25,14 +25,14 @@ def put_plane(nx: float, ny: float, nz: float, offset: float, work: SweepWork) -
     plane[7] = offset - (nx * T[0, 3] + ny * T[1, 3] + nz * T[2, 3])
 
 
-@inner_kernel
+@kernel
 def lay_plane(ka: int, wa: float, kb: int, wb: float, work: SweepWork) -> None:
     """Write the plane half way between two elements that have just met; `work` has them placed there."""
     d, nx, ny, nz, _, _, _, _, _ = separation(work.placed, ka, work.fixed, kb)
     put_plane(nx, ny, nz, plane_offset(work.fixed, kb, nx, ny, nz) + wb + 0.5 * (d - wa - wb), work)
 
 
-@inner_kernel
+@kernel
 def keep_plane(kb: int, wb: float, touch: float, work: SweepWork) -> bool:
     """Keep the plane by which `sweep_pair` saw that two elements never meet; say whether there is one.
 
@@ -46,14 +46,14 @@ def keep_plane(kb: int, wb: float, touch: float, work: SweepWork) -> bool:
     return True
 
 
-@inner_kernel
+@kernel
 def stays_beyond(ka: int, wa: float, chain: Floats, count: int, begin: float, best: float, work: SweepWork) -> bool:
     """Say whether the moving item in `work` is seen to stay beyond its plane from `begin` until `best`."""
     nx, ny, nz, offset = work.plane[0], work.plane[1], work.plane[2], work.plane[3]
     return bool(stays_above(work.core, work.placed, ka, chain, count, nx, ny, nz, offset + wa, begin, best))
 
 
-@inner_kernel
+@kernel
 def span(bodies: BodyArrays, n: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the smallest and largest coordinate of an item, a node's box or an element, along a unit vector."""
     if n >= 0:
@@ -69,27 +69,27 @@ def span(bodies: BodyArrays, n: int, x: float, y: float, z: float) -> tuple[floa
     return low - bodies.radius[-1 - n], high + bodies.radius[-1 - n]
 
 
-@inner_kernel
+@kernel
 def lies_within(resting: BodyArrays, b: int, work: SweepWork) -> bool:
     """Say whether a resting item lies on the near side of the plane of `work`."""
     plane = work.plane
     return bool(span(resting, b, plane[4], plane[5], plane[6])[1] <= plane[7])
 
 
-@inner_kernel
+@kernel
 def item_lane(bodies: BodyArrays, n: int, T: Floats) -> tuple[float, float]:
     """Return the smallest and largest coordinate of an item along the axis that everything turns about."""
     low, high = span(bodies, n, T[1, 0], T[1, 1], T[1, 2])
     return T[1, 3] + low, T[1, 3] + high
 
 
-@inner_kernel
+@kernel
 def lanes_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Say whether two extents lie apart along the axis that everything turns about: then nothing meets."""
     return bool(one[0] > other[1] or other[0] > one[1])
 
 
-@inner_kernel
+@kernel
 def passes_beside(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> bool:
     """Say whether two items lie apart along the axis that everything turns about: they never meet."""
     return bool(lanes_apart(item_lane(moving, a, work.moving), item_lane(resting, b, work.resting)))

@@ -11,31 +11,31 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector, cross, dot, plus, scaled
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 #: Columns of such a chain; one of parallel joints has three.
 SPATIAL = 7
 
 
-@inner_kernel
+@kernel
 def is_spatial(chain: Floats) -> bool:
     """Say whether the axes of a chain are not parallel."""
     return bool(chain.shape[1] == SPATIAL)
 
 
-@inner_kernel
+@kernel
 def axis_of(chain: Floats, i: int) -> Vector:
     """Return the axis of a row."""
     return chain[i, 1], chain[i, 2], chain[i, 3]
 
 
-@inner_kernel
+@kernel
 def way_of(chain: Floats, i: int) -> Vector:
     """Return the way from a row's pivot to the next."""
     return chain[i, 4], chain[i, 5], chain[i, 6]
 
 
-@inner_kernel
+@kernel
 def turned_about(p: Vector, axis: Vector, angle: float) -> Vector:
     """Return a vector turned about a unit axis."""
     s, v = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
@@ -43,7 +43,7 @@ def turned_about(p: Vector, axis: Vector, angle: float) -> Vector:
     return plus(plus(p, scaled(across, s)), scaled(cross(axis, across), v))
 
 
-@inner_kernel
+@kernel
 def moved(p: Vector, chain: Floats, count: int, s: float) -> Vector:
     """Return where a point is when the chain has moved by `s`."""
     for k in range(count):
@@ -54,7 +54,7 @@ def moved(p: Vector, chain: Floats, count: int, s: float) -> Vector:
     return p
 
 
-@inner_kernel
+@kernel
 def moved_back(m: Vector, chain: Floats, count: int, s: float, step: float) -> Vector:
     """Return a direction that goes along with what moves as it was a step before `s + step`."""
     for i in range(count):
@@ -65,7 +65,7 @@ def moved_back(m: Vector, chain: Floats, count: int, s: float, step: float) -> V
     return m
 
 
-@inner_kernel
+@kernel
 def point_motion(p: Vector, chain: Floats, count: int, s: float) -> tuple[Vector, Vector]:
     """Return velocity and acceleration of a point when the chain has moved by `s`."""
     v, a = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -82,7 +82,7 @@ def point_motion(p: Vector, chain: Floats, count: int, s: float) -> tuple[Vector
     return v, a
 
 
-@inner_kernel
+@kernel
 def point_bounds(p: Vector, chain: Floats, count: int) -> tuple[float, float]:
     """Return bounds on speed and acceleration of a point, wherever the chain is."""
     lever, bound, reach = 0.0, 0.0, 0.0
@@ -101,7 +101,7 @@ def point_bounds(p: Vector, chain: Floats, count: int) -> tuple[float, float]:
     return lever, bound
 
 
-@inner_kernel
+@kernel
 def total_rate(chain: Floats, count: int) -> float:
     """Return a bound on how fast what moves turns."""
     total = 0.0

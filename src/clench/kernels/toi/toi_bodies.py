@@ -8,7 +8,7 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.box_walk import put_box, walk_rectangle, walk_to_box
 from clench.kernels.geometry.obb import RECTANGLE, put_slab_face
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .pair_queue import take_first, take_in
 from .separating_planes import keep_plane, lay_plane, lies_within, passes_beside, stays_beyond
@@ -23,7 +23,7 @@ COARSE, WIDE = 0.1, 0.02
 NONE = -(2**40)
 
 
-@inner_kernel
+@kernel
 def earliest_meeting(
     moving: BodyArrays,
     a: int,
@@ -53,7 +53,7 @@ def earliest_meeting(
     return ball_entry(work.core[0, 0], sense * work.core[0, 2], work.fixed[0, 0], sense * work.fixed[0, 2], square)
 
 
-@inner_kernel
+@kernel
 def keep_earliest(
     moving: BodyArrays,
     resting: BodyArrays,
@@ -97,7 +97,7 @@ def keep_earliest(
     return kept
 
 
-@inner_kernel
+@kernel
 def put_moving(moving: BodyArrays, a: int, T: Floats, out: Floats) -> tuple[int, float]:
     """Write the core of a moving item, of a flat node a rectangle; return its corners and its radius."""
     if a >= 0:
@@ -105,7 +105,7 @@ def put_moving(moving: BodyArrays, a: int, T: Floats, out: Floats) -> tuple[int,
     return put_item(moving, a, T, out)
 
 
-@inner_kernel
+@kernel
 def walk_item(
     ka: int,
     wa: float,
@@ -144,13 +144,13 @@ def walk_item(
     return float(walk_to_box(work.core, ka, box, w, chain, count, near, since, best, work.placed))
 
 
-@inner_kernel
+@kernel
 def measure(s: float, chain: Floats, count: int) -> float:
     """Return a travel as `earliest_meeting` tells it."""
     return s if count > 1 else float(measure_of(abs(chain[0, 0]) * s))
 
 
-@inner_kernel
+@kernel
 def sweep_body(
     moving: BodyArrays,
     m: int,

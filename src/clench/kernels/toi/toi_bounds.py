@@ -6,7 +6,7 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.core_distance import crosses, separation
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 
 from .core_motion import corner_motion, move_core, plane_offset
 from .toi_pairs import step_to_plane
@@ -21,7 +21,7 @@ ROUNDING = 1e-14
 WALK = 24
 
 
-@inner_kernel
+@kernel
 def turn_measure(c: float, s: float) -> float:
     """Return a measure from 0 to 4 that grows with a turn, whose cosine and sine are given up to a factor."""
     if s >= 0.0:
@@ -29,13 +29,13 @@ def turn_measure(c: float, s: float) -> float:
     return 2.0 + s / (c + s) if c < 0.0 else 3.0 + c / (c - s)
 
 
-@inner_kernel
+@kernel
 def measure_of(turn: float) -> float:
     """Return `turn_measure` of an angle [rad]; infinite from a whole turn on."""
     return turn_measure(math.cos(turn), math.sin(turn)) if turn < 2.0 * math.pi else math.inf
 
 
-@inner_kernel
+@kernel
 def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> float:
     """Return the measure of the turn at which a point about the origin comes within a distance of another, or infinity.
 
@@ -58,7 +58,7 @@ def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> flo
     return turn_measure(ax * ex + az * ez, ax * ez - az * ex)
 
 
-@inner_kernel
+@kernel
 def walk_core(
     core: Floats,
     ka: int,
@@ -90,7 +90,7 @@ def walk_core(
     return s
 
 
-@inner_kernel
+@kernel
 def walk_ball(
     centre: Floats, other: Floats, reach: float, chain: Floats, count: int, begin: float, limit: float, placed: Floats
 ) -> float:
@@ -116,7 +116,7 @@ def walk_ball(
     return s
 
 
-@inner_kernel
+@kernel
 def stays_above(
     core: Floats,
     placed: Floats,

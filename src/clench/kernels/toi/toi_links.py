@@ -11,7 +11,7 @@ import math
 from clench.core.tolerances import SWEEP_FRACTION
 from clench.kernels.closing.layout import ChainArrays, Floats, Work
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.advance import fill_chain, place_joints
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
 
@@ -21,7 +21,7 @@ from .toi_bodies import sweep_body
 from .toi_work import SweepWork
 
 
-@inner_kernel
+@kernel
 def sweep_turning(
     links: BodyArrays,
     m: int,
@@ -50,7 +50,7 @@ def sweep_turning(
     return sweep_body(links, m, resting, r, work.chain, count, touch, best, sweep)
 
 
-@inner_kernel
+@kernel
 def fill_spatial(first: int, joint: int, rates: Floats, sweep: SweepWork) -> tuple[int, int]:
     """Write the chain of active joints up to `joint`; return its length and its last joint."""
     count, last = 0, first
@@ -66,7 +66,7 @@ def fill_spatial(first: int, joint: int, rates: Floats, sweep: SweepWork) -> tup
     return count, last
 
 
-@inner_kernel
+@kernel
 def sweep_spatially(
     links: BodyArrays,
     m: int,
@@ -90,7 +90,7 @@ def sweep_spatially(
     return sweep_body(links, m, resting, r, sweep.spatial, count, touch, best, sweep)
 
 
-@inner_kernel
+@kernel
 def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the extent of a body's box along an axis; NaN, which parts nothing, where there is no box."""
     middle, half = x * T[0, 3] + y * T[1, 3] + z * T[2, 3], 0.0
@@ -101,7 +101,7 @@ def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float
     return middle - half, middle + half
 
 
-@inner_kernel
+@kernel
 def sweep_link(
     exact: ExactArrays,
     chain: ChainArrays,
@@ -136,7 +136,7 @@ def sweep_link(
     return sweep_spatially(links, m, resting, r, T_palm_resting, first, joint, rates, touch, best, sweep)
 
 
-@inner_kernel
+@kernel
 def first_after(exact: ExactArrays, entry: int, link: int, first: int, rates: Floats) -> int:
     """Return the first active joint that does not move a link, or how many joints there are."""
     j = last_mover(exact, entry, link, first - 1) + 1
@@ -145,7 +145,7 @@ def first_after(exact: ExactArrays, entry: int, link: int, first: int, rates: Fl
     return j
 
 
-@inner_kernel
+@kernel
 def put_lanes(
     exact: ExactArrays,
     entry: int,
@@ -170,7 +170,7 @@ def put_lanes(
             lane[r, 0], lane[r, 1] = lane_of(exact.object.box[0], T_palm_object, x, y, z)
 
 
-@inner_kernel
+@kernel
 def sweep_links(
     exact: ExactArrays,
     chain: ChainArrays,
@@ -209,7 +209,7 @@ def sweep_links(
     return best, met
 
 
-@inner_kernel
+@kernel
 def sweep_stage(
     exact: ExactArrays,
     chain: ChainArrays,
@@ -264,7 +264,7 @@ def sweep_stage(
     return best, met
 
 
-@inner_kernel
+@kernel
 def place_active(
     exact: ExactArrays,
     chain: ChainArrays,

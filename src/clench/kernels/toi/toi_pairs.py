@@ -13,7 +13,7 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.core_distance import crosses, separation
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.coupled import safe_step
 
 from .core_motion import base_motion, corner_motion, move_core, plane_gap, plane_offset, turn_rate, turn_to_plane
@@ -28,7 +28,7 @@ PLAIN = 8
 CLOSE = 1.5
 
 
-@inner_kernel
+@kernel
 def fall_to_plane(
     core: Floats,
     placed: Floats,
@@ -54,7 +54,7 @@ def fall_to_plane(
     return step
 
 
-@inner_kernel
+@kernel
 def step_to_plane(
     core: Floats,
     placed: Floats,
@@ -96,14 +96,14 @@ def step_to_plane(
     return step
 
 
-@inner_kernel
+@kernel
 def passes_by(placed: Floats, ka: int, fixed: Floats, kb: int, apart: float) -> bool:
     """Say whether cores lie farther apart than that along the axis that everything turns about: it stays so."""
     one, other = plane_gap(placed, ka, fixed, kb, 0.0, 1.0, 0.0), plane_gap(placed, ka, fixed, kb, 0.0, -1.0, 0.0)
     return bool(max(one, other) > apart)
 
 
-@inner_kernel
+@kernel
 def turning_step(
     core: Floats,
     placed: Floats,
@@ -146,7 +146,7 @@ def turning_step(
     return step if 0.125 * step * (bend * step + 2.0 * turn * speed) <= margin else 0.0
 
 
-@kernel
+@entry_kernel
 def sweep_pair(
     core: Floats,
     ka: int,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from clench.kernels.geometry.bvh import STACK_SIZE, Floats, Ints, MeshTree
 from clench.kernels.geometry.mesh_distance import Point, corners
 from clench.kernels.geometry.penetration import moved
-from clench.kernels.runtime.compiling import inner_kernel, kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 Masks = NDArray[np.uint8]
 Triple = tuple[Point, Point, Point]
@@ -21,7 +21,7 @@ _EDGE_ON = 1e-14
 PAIRS = 2 * STACK_SIZE
 
 
-@kernel
+@entry_kernel
 def first_contact(
     moving: MeshTree,
     moving_owners: Masks,
@@ -99,7 +99,7 @@ def first_contact(
     return best, moving_triangle, rest_triangle
 
 
-@inner_kernel
+@kernel
 def _frame(direction: Floats) -> Triple:
     """Return rows of a rotation that maps the direction to z."""
     z = (direction[0], direction[1], direction[2])
@@ -116,7 +116,7 @@ def _frame(direction: Floats) -> Triple:
     return x, y, z
 
 
-@inner_kernel
+@kernel
 def _size(tree: MeshTree, node: int) -> float:
     x = tree.high[node, 0] - tree.low[node, 0]
     y = tree.high[node, 1] - tree.low[node, 1]
@@ -124,7 +124,7 @@ def _size(tree: MeshTree, node: int) -> float:
     return float(x * x + y * y + z * z)
 
 
-@inner_kernel
+@kernel
 def _entry(low: Floats, high: Floats, a: int, T: Floats, low_b: Floats, high_b: Floats, b: int, d: Floats) -> float:
     """Return the distance after which the boxes of two nodes can meet, 0 or more; infinite when they never do."""
     cx, cy, cz = 0.5 * (low[a, 0] + high[a, 0]), 0.5 * (low[a, 1] + high[a, 1]), 0.5 * (low[a, 2] + high[a, 2])
@@ -144,7 +144,7 @@ def _entry(low: Floats, high: Floats, a: int, T: Floats, low_b: Floats, high_b: 
     return enter if enter <= leave else np.inf
 
 
-@inner_kernel
+@kernel
 def _reach(low: Floats, high: Floats) -> float:
     most = 0.0
     for k in range(3):
@@ -152,7 +152,7 @@ def _reach(low: Floats, high: Floats) -> float:
     return most
 
 
-@inner_kernel
+@kernel
 def _meet_leaves(
     moving: MeshTree,
     moving_owners: Masks,
@@ -182,7 +182,7 @@ def _meet_leaves(
     return best, moving_triangle, rest_triangle
 
 
-@inner_kernel
+@kernel
 def _turn(rows: Triple, p: Point) -> Point:
     x, y, z = rows
     return (
@@ -192,7 +192,7 @@ def _turn(rows: Triple, p: Point) -> Point:
     )
 
 
-@inner_kernel
+@kernel
 def _apart(one: Triple, two: Triple, best: float) -> bool:
     """Say whether two triangles pass each other, or meet after `best` only."""
     a, b, c = one
@@ -206,7 +206,7 @@ def _apart(one: Triple, two: Triple, best: float) -> bool:
     return min(d[2], e[2], f[2]) - max(a[2], b[2], c[2]) > best or max(d[2], e[2], f[2]) < min(a[2], b[2], c[2]) - slack
 
 
-@inner_kernel
+@kernel
 def _meet(one: Triple, one_owns: int, two: Triple, two_owns: int, slack: float) -> float:
     """Return the distance at which two triangles first touch by the features that they own; infinite for none."""
     best = np.inf
@@ -229,7 +229,7 @@ def _meet(one: Triple, one_owns: int, two: Triple, two_owns: int, slack: float) 
     return best
 
 
-@inner_kernel
+@kernel
 def _earlier(distance: float, slack: float) -> float:
     """Return a distance as it counts: not a number is none, and what lies behind by rounding only is 0."""
     if distance >= 0.0:
@@ -237,7 +237,7 @@ def _earlier(distance: float, slack: float) -> float:
     return 0.0 if distance >= -slack else np.inf
 
 
-@inner_kernel
+@kernel
 def _height_over(p: Point, a: Point, b: Point, c: Point) -> float:
     """Return how far above p, along z, a triangle lies; not a number when it does not."""
     ax, ay, bx, by, cx, cy = a[0] - p[0], a[1] - p[1], b[0] - p[0], b[1] - p[1], c[0] - p[0], c[1] - p[1]
@@ -254,7 +254,7 @@ def _height_over(p: Point, a: Point, b: Point, c: Point) -> float:
     return (u * (a[2] - p[2]) + v * (b[2] - p[2]) + w * (c[2] - p[2])) / (u + v + w)
 
 
-@inner_kernel
+@kernel
 def _edges(a: Point, b: Point, c: Point, d: Point) -> float:
     """Return how far above the edge ab, along z, the edge cd lies where they cross; not a number when they do not."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]

@@ -12,7 +12,7 @@ from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import crosses, separation
 from clench.kernels.geometry.crossing import only_touch
 from clench.kernels.geometry.obb import put_slab_core, slab_misses, slab_slack
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 
 from .core_motion import plane_gap
@@ -66,7 +66,7 @@ class SweepWork(NamedTuple):
     skipped: Ints
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_sweep_work(joints: int, links: int) -> SweepWork:
     """Allocate the scratch space for sweeps of a hand."""
     return SweepWork(
@@ -92,14 +92,14 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
     )
 
 
-@inner_kernel
+@kernel
 def put_core(bodies: BodyArrays, element: int, T: Floats, out: Floats) -> None:
     """Write the corners of an element in the frame that a pose leads to."""
     for k in range(bodies.corners[element]):
         put_point(T, bodies.vertices[bodies.elements[element, k]], out[k])
 
 
-@inner_kernel
+@kernel
 def put_ball(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> float:
     """Write the centre of the ball around node `n`, or around element `-1 - n`, as `put_point`; return its radius."""
     ball = bodies.node[n] if n >= 0 else bodies.ball[-1 - n]
@@ -107,7 +107,7 @@ def put_ball(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> float:
     return float(ball[3])
 
 
-@inner_kernel
+@kernel
 def put_item(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> tuple[int, float]:
     """Write the core of element `-1 - n`, or of the capsule around node `n`; return its corners and its radius."""
     if n >= 0:
@@ -116,13 +116,13 @@ def put_item(bodies: BodyArrays, n: int, T: Floats, out: Floats) -> tuple[int, f
     return bodies.corners[-1 - n], bodies.radius[-1 - n]
 
 
-@inner_kernel
+@kernel
 def item_of(bodies: BodyArrays, n: int) -> int:
     """Return a node as an item; where it has one element that one."""
     return -1 - bodies.first[n] if n >= 0 and bodies.count[n] == 1 else n
 
 
-@inner_kernel
+@kernel
 def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints, waiting: int) -> int:
     """Put the children of a node, or the elements of a leaf, on the stack against `other`; return its new height."""
     if bodies.count[n] == 0:
@@ -134,7 +134,7 @@ def push_parts(bodies: BodyArrays, n: int, column: int, other: int, stack: Ints,
     return waiting + int(bodies.count[n])
 
 
-@inner_kernel
+@kernel
 def elements_of(bodies: BodyArrays, m: int) -> tuple[int, int]:
     """Return the first element of a body that has some, and the one after its last."""
     first = last = bodies.root[m]
@@ -145,7 +145,7 @@ def elements_of(bodies: BodyArrays, m: int) -> tuple[int, int]:
     return int(bodies.first[first]), int(bodies.first[last] + bodies.count[last])
 
 
-@inner_kernel
+@kernel
 def push_roots(moving: BodyArrays, m: int, resting: BodyArrays, r: int, stack: Ints) -> int:
     """Put two bodies on the empty stack, unless one has no elements; return its height."""
     if moving.root[m] < 0 or resting.root[r] < 0:
@@ -154,13 +154,13 @@ def push_roots(moving: BodyArrays, m: int, resting: BodyArrays, r: int, stack: I
     return 1
 
 
-@inner_kernel
+@kernel
 def is_wider(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
     """Say whether the moving one of two items, that are not both elements, has the larger ball, or is the only node."""
     return bool(b < 0 or (a >= 0 and moving.node[a, 3] >= resting.node[b, 3]))
 
 
-@inner_kernel
+@kernel
 def is_looser(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
     """Say whether the moving one of two items has the box that tells less about what is in it, or is the only node.
 
@@ -169,7 +169,7 @@ def is_looser(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
     return bool(b < 0 or (a >= 0 and slab_slack(moving.slab[a]) >= slab_slack(resting.slab[b])))
 
 
-@inner_kernel
+@kernel
 def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, first: bool, stack: Ints, waiting: int) -> int:
     """Put the parts of one of two items, of `a` where `first`, on the stack against the other; see `push_parts`."""
     if first:
@@ -177,7 +177,7 @@ def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, first: b
     return push_parts(resting, b, 1, a, stack, waiting)
 
 
-@inner_kernel
+@kernel
 def body_gap(
     moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, slack: float, work: SweepWork
 ) -> float:
@@ -209,7 +209,7 @@ def body_gap(
     return best
 
 
-@inner_kernel
+@kernel
 def put_nearest_last(
     moving: BodyArrays, resting: BodyArrays, stack: Ints, low: int, high: int, work: SweepWork
 ) -> None:
@@ -225,14 +225,14 @@ def put_nearest_last(
         stack[nearest, column] = top
 
 
-@inner_kernel
+@kernel
 def ball_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> float:
     """Return the gap between the balls of two nodes or elements."""
     reach = put_ball(moving, a, work.moving, work.core[0]) + put_ball(resting, b, work.resting, work.fixed[0])
     return point_distance(work.core, work.fixed) - reach
 
 
-@inner_kernel
+@kernel
 def element_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: SweepWork) -> float:
     """Return the gap between two items, elements or nodes' balls; their cores are left in `work`."""
     ka, wa = put_item(moving, a, work.moving, work.core)
@@ -240,7 +240,7 @@ def element_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: S
     return separation(work.core, ka, work.fixed, kb)[0] - wa - wb
 
 
-@inner_kernel
+@kernel
 def bodies_overlap(
     moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, work: SweepWork
 ) -> bool:
@@ -284,7 +284,7 @@ def bodies_overlap(
     return False
 
 
-@inner_kernel
+@kernel
 def point_distance(a: Floats, b: Floats) -> float:
     """Return the distance between the first rows."""
     return math.sqrt((a[0, 0] - b[0, 0]) ** 2 + (a[0, 1] - b[0, 1]) ** 2 + (a[0, 2] - b[0, 2]) ** 2)

@@ -7,7 +7,7 @@ import math
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import Separation, above_face, edge_count, edge_pair, face_normal, separation
-from clench.kernels.runtime.compiling import allocating_kernel, inner_kernel
+from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import copy_pose
 
 from .toi_work import SweepWork, ball_gap, is_wider, make_sweep_work, put_item, split_pair
@@ -22,7 +22,7 @@ PAIR_FLOATS = 7
 SAME_DIRECTION = 1e-9
 
 
-@allocating_kernel
+@entry_kernel(allocates=True)
 def touching_pairs(
     links: BodyArrays,
     obj: BodyArrays,
@@ -66,7 +66,7 @@ def touching_pairs(
     return count
 
 
-@inner_kernel
+@kernel
 def _add_pairs(
     moving: BodyArrays,
     m: int,
@@ -101,7 +101,7 @@ def _add_pairs(
     return count
 
 
-@inner_kernel
+@kernel
 def _add_touches(
     found: Separation,
     ka: int,
@@ -137,7 +137,7 @@ def _add_touches(
     return count
 
 
-@inner_kernel
+@kernel
 def _add_corners(
     a: Floats,
     ka: int,
@@ -164,7 +164,7 @@ def _add_corners(
     return count
 
 
-@inner_kernel
+@kernel
 def _add_row(x: float, y: float, z: float, w: float, tie: float, numbers: Floats, first: int, count: int) -> int:
     """Append a touch on the surface that lies `w` outside of a point; return the rows in use.
 

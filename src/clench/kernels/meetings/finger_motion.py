@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
+from clench.kernels.closing.layout import ChainArrays, ClosingArrays, Floats
 from clench.kernels.geometry.vectors import Vector, cross, dot
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.full_width import ExactArrays, turn_about
 from clench.kernels.toi.spatial_motion import turned_about
 
-from .layout import ChainArrays, ClosingArrays, Floats
 from .meeting_layout import FingerLinks, MeetingWork
 
 #: Motions that differ by less are one [-].
@@ -19,7 +19,7 @@ ROUNDING = 1e-12
 SPREAD = 4.0
 
 
-@inner_kernel
+@kernel
 def put_motion(
     exact: ExactArrays, chain: ChainArrays, entry: int, blocked: bool, answer: ClosingArrays, i: int, room: MeetingWork
 ) -> None:
@@ -37,7 +37,7 @@ def put_motion(
             room.end[j] = room.begin[j] + abs(room.final[j]) / room.rate[j]
 
 
-@inner_kernel
+@kernel
 def place_link(
     exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, at: float, room: MeetingWork, T: Floats
 ) -> None:
@@ -54,7 +54,7 @@ def place_link(
             turn_about(exact.axis[j], exact.anchor[j], room.turns[j], T)
 
 
-@inner_kernel
+@kernel
 def last_end(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, room: MeetingWork) -> float:
     """Return after how much motion a link is at rest."""
     end = 0.0
@@ -63,7 +63,7 @@ def last_end(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, room:
     return end
 
 
-@inner_kernel
+@kernel
 def next_change(
     exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, at: float, end: float, room: MeetingWork
 ) -> float:
@@ -74,7 +74,7 @@ def next_change(
     return end
 
 
-@inner_kernel
+@kernel
 def speed_of(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, at: float, room: MeetingWork) -> float:
     """Return a bound on how fast the points of a link move from a place on [m]."""
     speed = 0.0
@@ -84,7 +84,7 @@ def speed_of(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, at: f
     return speed
 
 
-@inner_kernel
+@kernel
 def put_axes(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, room: MeetingWork) -> None:
     """Write the axes of the joints that move a link, in the palm frame, at the turns that `place_link` wrote."""
     for j in range(exact.joint_first[entry], fingers.joint[k] + 1):
@@ -96,7 +96,7 @@ def put_axes(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, room:
         room.axis[j, 0], room.axis[j, 1], room.axis[j, 2] = axis
 
 
-@inner_kernel
+@kernel
 def motion_along(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -135,7 +135,7 @@ def motion_along(
     return way, speed, bend
 
 
-@inner_kernel
+@kernel
 def approach_along(
     exact: ExactArrays,
     fingers: FingerLinks,

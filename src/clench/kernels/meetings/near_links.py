@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from clench.kernels.closing.layout import Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import plane_gap
 from clench.kernels.toi.full_width import ExactArrays
 from clench.kernels.toi.separating_planes import span
@@ -22,22 +23,21 @@ from clench.kernels.toi.toi_work import (
 )
 
 from .finger_motion import approach_along, next_change, place_link, speed_of
-from .layout import Ints
 from .meeting_layout import FingerLinks, MeetingWork
 
 #: Gap at which links meet [m].
 TOUCH = 1e-11
 #: How many lengths of a step are tried with one plane.
-LENGTHS = 4
+LENGTHS = 6
 #: Elements count on a step that are nearer than so many times the gap of their links [-].
 AROUND = 8.0
 #: A direction along which links approach each other by less than this share of their speed counts as that [-].
 FLAT = 1e-2
 
 
-@inner_kernel
+@kernel
 def put_sides(n: Vector, sweep: SweepWork) -> None:
-    """Write a unit vector in the frames of two bodies, and where these are along it, to `sweep.plane`."""
+    """Write a unit vector in the frames of both bodies of `sweep`, and where these are along it, to `sweep.plane`."""
     plane = sweep.plane
     for c in range(3):
         plane[c] = n[0] * sweep.moving[0, c] + n[1] * sweep.moving[1, c] + n[2] * sweep.moving[2, c]
@@ -46,7 +46,7 @@ def put_sides(n: Vector, sweep: SweepWork) -> None:
     plane[7] = n[0] * sweep.resting[0, 3] + n[1] * sweep.resting[1, 3] + n[2] * sweep.resting[2, 3]
 
 
-@inner_kernel
+@kernel
 def are_apart(links: BodyArrays, a: int, b: int, gap: float, along: float, sweep: SweepWork) -> bool:
     """Say whether two items are that far apart, as balls tell, or so far along the vector of `put_sides`."""
     if ball_gap(links, a, links, b, sweep) >= gap:
@@ -56,7 +56,7 @@ def are_apart(links: BodyArrays, a: int, b: int, gap: float, along: float, sweep
     return bool(low - span(links, b, plane[4], plane[5], plane[6])[1] - plane[7] >= along)
 
 
-@inner_kernel
+@kernel
 def elements_gap(links: BodyArrays, i: int, k: int, sweep: SweepWork) -> tuple[float, Vector, Vector]:
     """Return the gap of two elements, the direction to the first and the closest point of the second."""
     put_core(links, i, sweep.moving, sweep.core)
@@ -66,7 +66,7 @@ def elements_gap(links: BodyArrays, i: int, k: int, sweep: SweepWork) -> tuple[f
     return d - w - links.radius[i], (nx, ny, nz), (x + w * nx, y + w * ny, z + w * nz)
 
 
-@inner_kernel
+@kernel
 def links_gap(links: BodyArrays, m: int, r: int, bound: float, n: Vector, near: Ints, sweep: SweepWork) -> float:
     """Return the gap of two links below a bound, else the bound; their poses are in `sweep`.
 
@@ -98,7 +98,7 @@ def links_gap(links: BodyArrays, m: int, r: int, bound: float, n: Vector, near: 
     return best
 
 
-@inner_kernel
+@kernel
 def lowest_on(step: float, margin: float, left: float, bend: float) -> float:
     """Return a bound from below on how far two parts are apart along a direction anywhere on a step.
 
@@ -114,15 +114,15 @@ def lowest_on(step: float, margin: float, left: float, bend: float) -> float:
     return margin - 0.5 * bend * low * low
 
 
-@inner_kernel
+@kernel
 def shorter_step(step: float, margin: float, left: float, bend: float) -> float:
     """Return a step that may be safe where a longer one is not; see `lowest_on`."""
     slope = max((margin - left) / step, 0.0)
     shorter = 2.0 * margin / (slope + math.sqrt(slope * slope + 0.5 * bend * margin))
-    return min(0.999 * shorter, 0.7 * step)
+    return 0.999 * min(shorter, step)
 
 
-@inner_kernel
+@kernel
 def step_by_elements(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -173,7 +173,7 @@ def step_by_elements(
     return max(step, least)
 
 
-@inner_kernel
+@kernel
 def put_ahead(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -187,7 +187,7 @@ def put_ahead(
     place_link(exact, fingers, entries[1], rows[1], at, room, room.ahead[1])
 
 
-@inner_kernel
+@kernel
 def step_of_elements(
     exact: ExactArrays,
     fingers: FingerLinks,

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from clench.kernels.runtime.compiling import inner_allocating_kernel
-
-from .layout import Floats, Ints
+from clench.kernels.closing.layout import Floats, Ints
+from clench.kernels.runtime.compiling import kernel
 
 
 class FingerLinks(NamedTuple):
@@ -77,7 +76,7 @@ class MeetingWork(NamedTuple):
     touch: Floats
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def make_meeting_work(fingers: FingerLinks, items: int, joints: int) -> MeetingWork:
     """Allocate the scratch space for a hand."""
     rows = fingers.link.shape[0]

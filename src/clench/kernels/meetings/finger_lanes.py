@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from clench.kernels.geometry.vectors import Vector, cross, dot
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import ExactArrays
 from clench.kernels.toi.separating_planes import lanes_apart
 from clench.kernels.toi.toi_links import lane_of
@@ -14,7 +14,7 @@ from .finger_motion import SPREAD
 from .meeting_layout import FingerLinks, MeetingWork
 
 
-@inner_kernel
+@kernel
 def put_finger_lanes(exact: ExactArrays, fingers: FingerLinks, entry: int, n: Vector, room: MeetingWork) -> None:
     """Write between which coordinates along a unit vector the links of an entry's finger stay, however it moves.
 
@@ -33,7 +33,7 @@ def put_finger_lanes(exact: ExactArrays, fingers: FingerLinks, entry: int, n: Ve
         room.lane[k, 0], room.lane[k, 1] = low - way, high + way
 
 
-@inner_kernel
+@kernel
 def leave_out_lanes(
     exact: ExactArrays, fingers: FingerLinks, one: int, other: int, begin: int, end: int, room: MeetingWork
 ) -> None:

@@ -4,30 +4,27 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.runtime.compiling import inner_allocating_kernel, inner_kernel
+from clench.kernels.closing.bundles import clear_answer
+from clench.kernels.closing.close_item import close_item
+from clench.kernels.closing.layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, SectionArrays, Work
+from clench.kernels.closing.solve_layout import ObjectArrays
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import ExactArrays
 from clench.kernels.toi.toi_work import SweepWork
 
-from .bundles import clear_answer
-from .close_item import close_item
 from .finger_lanes import leave_out_lanes
 from .finger_motion import put_motion
-from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, SectionArrays, Work
 from .meeting_layout import FingerLinks, Meetings, MeetingWork
 from .meeting_search import FREE, MEETS, first_waiting, list_pairs, look_at
-from .solve_layout import ObjectArrays
-
-#: What is returned where there is no room for all meetings.
-FULL = -1
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def held_items(items: ItemArrays, until: Floats) -> ItemArrays:
     """Return items whose joints are held at other places of the motion."""
     return ItemArrays(items.entry, items.low, items.high, until)
 
 
-@inner_kernel
+@kernel
 def set_off(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -51,7 +48,7 @@ def set_off(
         leave_out_lanes(exact, fingers, items.entry[chosen[a]], items.entry[chosen[b]], begin, p, room)
 
 
-@inner_kernel
+@kernel
 def leave_out_fingers(a: int, b: int, count: int, room: MeetingWork) -> None:
     """Leave out all pairs of links of two fingers."""
     for p in range(count):
@@ -59,7 +56,7 @@ def leave_out_fingers(a: int, b: int, count: int, room: MeetingWork) -> None:
             room.pair[p, 4], room.at[p] = 0, math.inf
 
 
-@inner_kernel
+@kernel
 def hold_up_to(
     exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, at: float, blocked: bool, until: Floats
 ) -> int:
@@ -75,21 +72,39 @@ def hold_up_to(
     return int(fingers.joint[k])
 
 
-@inner_kernel
-def write_meeting(
-    fingers: FingerLinks, chosen: Ints, p: int, joints: tuple[int, int], room: MeetingWork, met: Meetings
-) -> None:
-    """Write how a pair of links meets that was looked at last."""
-    pair, n = room.pair[p], met.size[0]
-    number, value = met.number[n], met.value[n]
-    number[0], number[1], number[2] = chosen[pair[0]], fingers.link[pair[2]], joints[0]
-    number[3], number[4], number[5] = chosen[pair[1]], fingers.link[pair[3]], joints[1]
+@kernel
+def hold_where_they_meet(
+    exact: ExactArrays,
+    fingers: FingerLinks,
+    items: ItemArrays,
+    chosen: Ints,
+    blocked: Ints,
+    p: int,
+    room: MeetingWork,
+    met: Meetings,
+) -> tuple[int, int]:
+    """Write how a pair of links meets that was looked at last, and hold the joints of either finger up to its link.
+
+    Returns:
+        the last joint of either that is held, or -1 where none is.
+    """
+    pair, at, one, other = room.pair[p], room.at[p], chosen[room.pair[p, 0]], chosen[room.pair[p, 1]]
+    first, second = items.entry[one], items.entry[other]
+    held = (
+        hold_up_to(exact, fingers, first, pair[2], at, blocked[first] != 0, room.until[one]),
+        hold_up_to(exact, fingers, second, pair[3], at, blocked[second] != 0, room.until[other]),
+    )
+    number, value = met.number[met.size[0]], met.value[met.size[0]]
+    number[0], number[1], number[2] = one, fingers.link[pair[2]], held[0]
+    number[3], number[4], number[5] = other, fingers.link[pair[3]], held[1]
     for c in range(8):
         value[c] = room.touch[c]
-    met.size[0] = n + 1
+    # Two links that met rest from there on: they do not meet again.
+    pair[4], room.at[p], met.size[0] = 0, math.inf, met.size[0] + 1
+    return held
 
 
-@inner_allocating_kernel
+@kernel(allocates=True)
 def close_at_once(
     hand: HandArrays,
     exact: ExactArrays,
@@ -122,46 +137,33 @@ def close_at_once(
             another one before they move, (I,); such fingers are left alone. met: written.
 
     Returns:
-        the capacity wanted, or 0; `FULL` where there are more meetings than there is room for.
+        the capacity wanted, or 0.
     """
     for i in range(items.entry.shape[0]):
         anew[i], overlapping[i], room.until[i] = 0, 0, items.until[i]
-    bound, count = held_items(items, room.until), list_pairs(exact, fingers, items, chosen, room)
+    count = list_pairs(exact, fingers, items, chosen, room)
     for k in range(chosen.shape[0]):
         entry = items.entry[chosen[k]]
         put_motion(exact, hand.chain, entry, blocked[entry] != 0, answer, chosen[k], room)
     set_off(exact, fingers, items, chosen, -1, 0.0, count, room)
-    met.size[0] = 0
+    bound, met.size[0] = held_items(items, room.until), 0
     while True:
         p = first_waiting(count, room)
         if p < 0:
             return 0
         a, b, at = room.pair[p, 0], room.pair[p, 1], room.at[p]
-        entries = (items.entry[chosen[a]], items.entry[chosen[b]])
-        told = look_at(exact, fingers, entries, p, room, sweep)
+        told = look_at(exact, fingers, (items.entry[chosen[a]], items.entry[chosen[b]]), p, room, sweep)
         if told == FREE:
             room.at[p] = math.inf
         elif told == MEETS and at == 0.0:
             overlapping[chosen[a]], overlapping[chosen[b]] = 1, 1
             leave_out_fingers(a, b, count, room)
-        elif told == MEETS and met.size[0] == met.number.shape[0]:
-            return FULL
         elif told == MEETS:
-            joints = (
-                hold_up_to(
-                    exact, fingers, entries[0], room.pair[p, 2], at, blocked[entries[0]] != 0, room.until[chosen[a]]
-                ),
-                hold_up_to(
-                    exact, fingers, entries[1], room.pair[p, 3], at, blocked[entries[1]] != 0, room.until[chosen[b]]
-                ),
-            )
-            write_meeting(fingers, chosen, p, joints, room, met)
-            # Two links that met rest from there on: they do not meet again.
-            room.pair[p, 4], room.at[p] = 0, math.inf
-            for k, joint in ((a, joints[0]), (b, joints[1])):
-                if joint < 0:
+            held = hold_where_they_meet(exact, fingers, items, chosen, blocked, p, room, met)
+            for which in range(2):
+                if held[which] < 0:
                     continue
-                i = chosen[k]
+                k, i = room.pair[p, which], chosen[room.pair[p, which]]
                 clear_answer(answer, i)
                 close_item(
                     hand,

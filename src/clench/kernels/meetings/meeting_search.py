@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 
+from clench.kernels.closing.layout import Floats, Ints, ItemArrays
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import ExactArrays
 from clench.kernels.toi.toi_work import SweepWork
 
 from .finger_motion import ROUNDING, approach_along, last_end, next_change, place_link, put_axes, speed_of
 from .hull_planes import find_plane, plane_between
-from .layout import Floats, Ints, ItemArrays
 from .meeting_layout import FingerLinks, MeetingWork
 from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shorter_step, step_by_elements
 
@@ -30,7 +30,7 @@ LOOKS = 20_000
 ON, FREE, MEETS = 0, 1, 2
 
 
-@inner_kernel
+@kernel
 def list_pairs(exact: ExactArrays, fingers: FingerLinks, items: ItemArrays, chosen: Ints, room: MeetingWork) -> int:
     """List the pairs of links of all chosen items' fingers that may not overlap, and return how many there are."""
     count = 0
@@ -51,7 +51,7 @@ def list_pairs(exact: ExactArrays, fingers: FingerLinks, items: ItemArrays, chos
     return count
 
 
-@inner_kernel
+@kernel
 def aside(exact: ExactArrays, one: int, m: int, other: int, r: int) -> Vector:
     """Return the direction from the middle of a link of one entry to that of another at their open postures."""
     here, there = (
@@ -63,7 +63,7 @@ def aside(exact: ExactArrays, one: int, m: int, other: int, r: int) -> Vector:
     return scaled(n, 1.0 / size) if size > 0.0 else (1.0, 0.0, 0.0)
 
 
-@inner_kernel
+@kernel
 def point_at(T: Floats, p: Floats) -> Vector:
     """Return a point in the frame that a pose leads to."""
     return (
@@ -73,7 +73,7 @@ def point_at(T: Floats, p: Floats) -> Vector:
     )
 
 
-@inner_kernel
+@kernel
 def place_pair(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -90,7 +90,7 @@ def place_pair(
     place_link(exact, fingers, other, r, at, room, sweep.resting)
 
 
-@inner_kernel
+@kernel
 def step_by_plane(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -134,7 +134,7 @@ def step_by_plane(
     return least
 
 
-@inner_kernel
+@kernel
 def put_touch(gap: float, n: Vector, point: Vector, at: float, touch: Floats) -> None:
     """Write how two links touch; see `Meetings`."""
     for c in range(3):
@@ -142,7 +142,7 @@ def put_touch(gap: float, n: Vector, point: Vector, at: float, touch: Floats) ->
     touch[6], touch[7] = gap, at
 
 
-@inner_kernel
+@kernel
 def look_at(
     exact: ExactArrays,
     fingers: FingerLinks,
@@ -187,7 +187,7 @@ def look_at(
     return ON if at + step < (1.0 - ROUNDING) * end else FREE
 
 
-@inner_kernel
+@kernel
 def first_waiting(count: int, room: MeetingWork) -> int:
     """Return the pair that has come least far, or -1 where all are free to the end."""
     first, least = -1, math.inf

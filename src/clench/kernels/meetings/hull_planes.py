@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
+from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.obb import slab_top
-from clench.kernels.runtime.compiling import inner_kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.toi_work import SweepWork
-
-from .layout import Floats, Ints
 
 #: Directions that are tried at most.
 TRIES = 16
@@ -20,7 +19,7 @@ GOOD = 0.9
 TOUCHING = 1e-12
 
 
-@inner_kernel
+@kernel
 def farthest_point(
     bodies: BodyArrays, m: int, T: Floats, nx: float, ny: float, nz: float, stack: Ints
 ) -> tuple[float, float, float, float]:
@@ -65,7 +64,7 @@ def farthest_point(
     )
 
 
-@inner_kernel
+@kernel
 def plane_between(bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: float, sweep: SweepWork) -> float:
     """Return how far body `m` lies beyond body `r` along a unit vector [m]; their poses are in `sweep`.
 
@@ -77,7 +76,7 @@ def plane_between(bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: 
     return -low - top
 
 
-@inner_kernel
+@kernel
 def nearest_with(k: int, corners: int, sweep: SweepWork) -> tuple[float, float, float, float]:
     """Return distance and direction from the origin to the first rows of `sweep.placed`, with the last for row `k`."""
     core, placed = sweep.core, sweep.placed
@@ -89,7 +88,7 @@ def nearest_with(k: int, corners: int, sweep: SweepWork) -> tuple[float, float, 
     return d, nx, ny, nz
 
 
-@inner_kernel
+@kernel
 def take_corner(size: int, sweep: SweepWork) -> tuple[int, float, float, float, float]:
     """Take the last row of `sweep.placed` into the triangle of its first rows, so that it lies nearest to the origin.
 
@@ -114,7 +113,7 @@ def take_corner(size: int, sweep: SweepWork) -> tuple[int, float, float, float, 
     return corners, d, x, y, z
 
 
-@inner_kernel
+@kernel
 def find_plane(
     bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: float, sweep: SweepWork
 ) -> tuple[float, float, float, float]:
