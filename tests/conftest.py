@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,11 +9,6 @@ import pytest
 from clench.kernels.runtime.warming import announce, warm_up
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
-
-if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.find_library("EGL"):
-    # Drawing without a screen: the engine looks for its renderer once, when it is imported. Where there is none either,
-    # the tests of pictures skip or ask for the sentence that says so.
-    os.environ.setdefault("MUJOCO_GL", "egl")
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 

@@ -25,7 +25,7 @@ LAYERS += ["apps"]
 NAMESPACES = {PACKAGE / name for name in ("criteria.py", "errors.py", "formats.py", "types.py")}
 NAMESPACES |= {PACKAGE / name / "__init__.py" for name in ("mechanics", "execution")}
 HEAVY = {"numba", "mujoco", "matplotlib", "trimesh", "coacd", "clarabel", "tyro", "rich", "PIL", "rclpy", "viser"}
-HEAVY |= {"pyarrow", "h5py", "ray", "torch"}
+HEAVY |= {"pyarrow", "h5py", "ray", "torch", "IPython", "pxr"}
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = sorted(PACKAGE.rglob("*.py"))
 #: The package and the benchmarks.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from clench.core.display import register_display
 from clench.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from clench import mechanics as mechanics
     from clench import types as types
     from clench.apps.figures import draw_solution
+    from clench.apps.pages.page import write_page
     from clench.closing.collision.approach import approach_poses
     from clench.closing.collision.self_check import check_hand
     from clench.core.errors import ClenchError
@@ -78,6 +80,7 @@ _HOMES = {
     "solve_stream": "clench.solver.batch.solve_batch",
     "stable_poses": "clench.models.objects.stable_poses",
     "table": "clench.models.objects.obstacles",
+    "write_page": "clench.apps.pages.page",
 }
 
 #: Their names are also found at the root.
@@ -115,6 +118,10 @@ __all__ = [
     "solve_stream",
     "stable_poses",
     "table",
+    "write_page",
 ]
 
-__getattr__, __dir__ = lazy_names(__name__, _HOMES, _NAMESPACES)
+# Objects of lower layers show themselves by what a higher layer draws; it is imported when something is shown.
+register_display("clench.apps.pages.showing")
+
+__getattr__, __dir__ = lazy_names(__name__, _HOMES, _NAMESPACES, ("dataset",))

@@ -10,11 +10,13 @@ if TYPE_CHECKING:
     from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
     from clench.execution.formats.grasp_posture import GraspPosture
     from clench.execution.formats.mcap_log import write_log
+    from clench.execution.formats.scene_files import export_scene
 
 _HOMES = {
     "GraspFormat": "clench.execution.formats.exchange",
     "GraspPosture": "clench.execution.formats.grasp_posture",
     "export_grasps": "clench.execution.formats.exchange",
+    "export_scene": "clench.execution.formats.scene_files",
     "import_grasps": "clench.execution.formats.exchange",
     "write_log": "clench.execution.formats.mcap_log",
 }
@@ -23,6 +25,7 @@ __all__ = [
     "GraspFormat",
     "GraspPosture",
     "export_grasps",
+    "export_scene",
     "import_grasps",
     "write_log",
 ]

@@ -71,7 +71,12 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> None:
         (folder / "figure.png").write_bytes(b"x")
         return [folder / "figure.png"]
 
+    def write(path: Path, *_: object) -> Path:
+        path.write_text("a page")
+        return path
+
     monkeypatch.setitem(sys.modules, "clench.apps.figures", SimpleNamespace(draw_solution=draw))
+    monkeypatch.setitem(vars(clench), "write_page", write)
     monkeypatch.setattr(
         "clench.execution.trajectory.plan_trajectory", lambda *_, **__: SimpleNamespace(save=Path.touch)
     )
@@ -508,7 +513,7 @@ def test_demo_plans_a_grasp_and_leaves_files(
     assert solution.status is SolutionStatus.GRASP
     assert (solution.hand_model, solution.object_model) == ("robonaut2", "mug")
     assert calls[0][0] == solution
-    names = {"solution.json", "trajectory.json", "figure.png", "execution.json", "record.sqlite"}
+    names = {"solution.json", "trajectory.json", "figure.png", "execution.json", "grasp.html", "record.sqlite"}
     assert names <= {p.name for p in (tmp_path / "out").iterdir()}
 
 

@@ -13,13 +13,10 @@ import clench
 from clench.apps.figures import draw_solution
 from clench.apps.figures.curl_plane import plane_title
 from clench.apps.figures.finger_scenes import FingerScenes
-from clench.apps.figures.hand_view import _labels, viewpoints
 from clench.apps.figures.plane_scene import PlaneScene, bounds
 from clench.apps.figures.set_grid import MOST_SETS, _selected, _short, _verdict
-from clench.apps.figures.surfaces import hand_surface, object_surface, thinned
 from clench.core.errors import FileError
 from clench.models.command import GraspCommand
-from clench.models.mesh import TriangleMesh
 from clench.models.objects.obstacles import table
 from clench.solver.solution import FingerStatus, GraspSolution
 from handmade import make_candidate, make_contact
@@ -339,54 +336,6 @@ def test_many_sets_are_thinned_evenly_and_keep_the_chosen_one() -> None:
 )
 def test_shared_words_are_left_out_of_joint_names(names: list[str], expected: list[str]) -> None:
     assert _short(names) == expected
-
-
-def test_contact_numbers_do_not_overlap_even_at_one_place() -> None:
-    rng = np.random.default_rng(0)
-    points = np.vstack([np.full((4, 2), 300.0), rng.uniform(200.0, 400.0, (8, 2))])
-    places = _labels(points, points + 20.0)
-    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)[~np.eye(len(places), dtype=bool)]
-    assert gaps.min() > 15.0
-    alone = _labels(points[:1], points[:1])
-    assert np.isfinite(alone).all()
-
-
-def test_viewpoints_differ_and_are_the_same_each_time(
-    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
-) -> None:
-    _, solution = answer
-    body, things = hand_surface(hand, solution).corners, object_surface(ball, solution).corners
-    focus = np.concatenate([body.reshape(-1, 3), things.reshape(-1, 3)])
-    for contacts in (solution.contacts, ()):
-        first, second = viewpoints(body, things, focus, replace(solution, contacts=contacts))
-        assert first @ second < 0.5
-        again = viewpoints(body, things, focus, replace(solution, contacts=contacts))
-        np.testing.assert_array_equal([first, second], again)
-
-
-def test_surfaces_stand_where_the_solution_has_them(
-    hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution]
-) -> None:
-    _, solution = answer
-    moved = replace(solution, object_pose=clench.Pose([0.3, 0.0, 0.0]) @ solution.object_pose)
-    shift = object_surface(ball, moved).corners - object_surface(ball, solution).corners
-    np.testing.assert_allclose(shift, np.broadcast_to([0.3, 0.0, 0.0], shift.shape), atol=1e-12)
-    body = hand_surface(hand, solution)
-    for contact in solution.contacts:
-        if not contact.passed:
-            nearest = np.linalg.norm(body.corners.reshape(-1, 3) - contact.position, axis=1).min()
-            assert nearest < 0.01, "a link stands at its contact"
-
-
-def test_huge_meshes_are_thinned_without_changing_their_shape() -> None:
-    ball = clench.GraspObject.load("sphere:r=0.05").bodies[0].shapes[0].to_mesh(2e-7)
-    assert len(ball.triangles) > 50_000
-    few = thinned(ball, 5_000)
-    assert 500 < len(few.triangles) <= 5_000
-    radii = np.linalg.norm(few.vertices[np.unique(few.triangles)], axis=1)
-    np.testing.assert_allclose(radii, 0.05, atol=1e-5)
-    small = TriangleMesh(np.eye(3), [[0, 1, 2]])
-    assert thinned(small, 5_000) is small
 
 
 def test_a_contact_keeps_the_number_it_has_in_the_solution(

@@ -13,13 +13,14 @@ import clench
 from chain_hands import one_link
 from clench.apps.cli.main import main
 from clench.apps.figures import draw_plan, grasp_sheet
-from clench.apps.figures.contact_map import _heat, _sides, _Touches, draw_contacts
+from clench.apps.figures.camera import fitted_camera
+from clench.apps.figures.contact_map import _heat, _normals, _photographs, _sides, _Touches, draw_contacts
 from clench.apps.figures.grasp_sheet import MOST_GRASPS, draw_grasps
-from clench.apps.figures.raster import rasterise
-from clench.apps.figures.surfaces import hand_surface, placed_object, without_forearm
-from clench.apps.figures.views import fitted_camera
+from clench.apps.figures.stage import Stage, solution_poses, solution_solids
+from clench.apps.figures.viewpoints import focus_of, viewpoints
 from clench.apps.figures.zone_map import _best, _ends, draw_zones
 from clench.core.errors import FileError
+from clench.models.appearance import SolidKind, carried_by_palm
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table
@@ -83,7 +84,8 @@ def test_every_grasp_has_a_panel_with_its_kind(monkeypatch, plan, hand, ball, tm
 
 def test_a_sheet_has_the_best_grasps_of_many(monkeypatch, plan, hand, ball, tmp_path) -> None:
     many = replace(plan, grasps=tuple(plan[k % len(plan)] for k in range(MOST_GRASPS + 3)))
-    monkeypatch.setattr(grasp_sheet, "_draw_panel", lambda *_: None)
+    drawn = grasp_sheet._photographs(hand, ball, list(plan)[:1])
+    monkeypatch.setattr(grasp_sheet, "_photographs", lambda _hand, _obj, grasps: drawn * len(grasps))
     assert len(panels(monkeypatch, many, hand, ball, tmp_path / "grasps.png")) == MOST_GRASPS
 
 
@@ -101,41 +103,57 @@ def test_without_grasps_the_sheet_says_why(plan, hand, ball, tmp_path) -> None:
     assert like(picture(files[1]), ORANGE) == 0
 
 
-def test_a_table_does_not_hide_the_grasps(hand, ball, tmp_path) -> None:
-    """A table is opaque where viewpoints are chosen: no grasp is seen from below."""
+def test_no_grasp_is_seen_from_under_a_table(hand, ball) -> None:
     scene = ball.with_body(table(-0.03))
     found = clench.plan_grasps(hand, scene, 2, effort=32, most=128, path=False)
     for grasp in found:
-        assert grasp_sheet._Scene(hand, scene, grasp.solution).towards[2] >= 0.0
-    assert draw_grasps(found, hand, scene, tmp_path / "grasps.png").exists()
+        with Stage.of(hand, scene, grasp.solution) as stage:
+            points = np.array([c.position for c in grasp.solution.contacts])
+            assert min(d[2] for d in viewpoints(stage, focus_of(stage), points, 3)) > 0.1
 
 
-def test_the_sheet_leaves_out_what_carries_the_palm(plan, hand) -> None:
+def test_the_sheet_leaves_out_what_carries_the_palm(plan, hand, ball) -> None:
     """Were a finger's first link the palm, the rest of that finger would stay, and nothing else."""
-    whole = hand_surface(hand, plan[0].solution)
     finger = hand.fingers[1]
     arm = SimpleNamespace(links=hand.links, palm=finger.links[0])
-    kept = set(without_forearm(arm, whole).groups.tolist())
-    assert kept == set(finger.links) & set(whole.groups.tolist())
-    assert set(without_forearm(hand, whole).groups.tolist()) > kept
+    kept = np.flatnonzero(carried_by_palm(arm)).tolist()
+    assert kept == sorted(finger.links)
+    solids = solution_solids(hand, ball, plan[0].solution)
+    solids = [replace(s, kind=SolidKind.FOREARM) if s.index == hand.palm and s.of_hand else s for s in solids]
+    with Stage(solids, solution_poses(hand, solids, plan[0].solution)) as stage:
+        camera = fitted_camera(np.array([1.0, 0.3, 0.4]), stage.points(*SolidKind), (60, 60))
+        seen = set(np.unique(stage.sight(camera, without=(SolidKind.FOREARM,)).solid)) - {-1}
+        assert {stage.solids[k].kind for k in seen} == {SolidKind.HAND, SolidKind.OBJECT}
+        more = set(np.unique(stage.sight(camera).solid)) - {-1}
+        assert SolidKind.FOREARM in {stage.solids[k].kind for k in more}
 
 
-def test_the_heat_is_the_share_of_grasps_that_touch_there(hand, ball) -> None:
+def test_the_heat_is_the_share_of_grasps_that_touch_there(ball) -> None:
     """Two of four grasps touch the ball's top, so it is half warm there, and cold at the bottom."""
-    surface = placed_object(ball, ball.pose.matrix)
-    top = surface.corners.reshape(-1, 3)[surface.corners.reshape(-1, 3)[:, 2].argmax()]
+    cameras, pictures = _photographs(ball)
+    top = ball.pose.matrix[:3, 3] + [0.0, 0.0, np.ptp(ball.bodies[0].shapes[0].to_mesh().vertices[:, 2]) / 2]
     touch = _Touches(top[None], np.array([[0.0, 0.0, 1.0]]), np.array([False]))
     nothing = _Touches(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool))
-    heats = []
-    for direction in ([0.1, 0.0, 1.0], [0.1, 0.0, -1.0]):
-        camera = fitted_camera(np.array(direction), surface.corners.reshape(-1, 3), (200, 200))
-        seen = rasterise(surface.corners, camera)
-        heats.append(_heat(seen, surface, camera, [touch, touch, nothing, nothing]))
-        if direction[2] > 0.0:
-            column, row = camera.project(top)[:2].astype(int)
-            assert heats[0][row, column] == pytest.approx(0.5, abs=0.01)
+    heats = [_heat(p, c, [touch, touch, nothing, nothing]) for p, c in zip(pictures, cameras, strict=True)]
+    column, row = cameras[0].project(top)[:2].astype(int)
+    assert heats[0][row, column] == pytest.approx(0.5, abs=0.01)
     assert heats[0].max() <= 0.5
-    assert heats[1].max() == 0.0
+    for camera, heat in zip(cameras[3:], heats[3:], strict=True):
+        assert camera.towards[2] < 0.0
+        column, row = camera.project(2.0 * ball.pose.matrix[:3, 3] - top)[:2].astype(int)
+        assert heat[row - 40 : row + 40, column - 40 : column + 40].max() == 0.0
+
+
+def test_normals_of_what_is_seen_are_those_of_a_ball() -> None:
+    cameras, pictures = _photographs(GraspObject.load("sphere:r=0.03"))
+    row, column = np.nonzero(pictures[0].solid >= 0)
+    at = (np.column_stack([column, row]) + 0.5 - 400.0) / cameras[0].scale
+    inner = np.linalg.norm(at, axis=1) < 0.024
+    normals = _normals(pictures[0], cameras[0])[row[inner], column[inner]]
+    across = np.outer(at[inner, 0], cameras[0].right) - np.outer(at[inner, 1], cameras[0].up)
+    depth = np.sqrt(0.03**2 - (at[inner] ** 2).sum(axis=1))
+    expected = (across + np.outer(depth, cameras[0].towards)) / 0.03
+    assert np.median((normals * expected).sum(axis=1)) > 0.999
 
 
 def test_the_six_sides_show_every_axis_apart() -> None:

@@ -47,3 +47,13 @@ def test_a_command_that_draws_nothing_does_its_work(tmp_path: object) -> None:
     code = "import sys; from clench.apps.cli.main import main; sys.exit(main(['hand', 'robonaut2', '--json']))"
     shown = run(code, "bogus", folder=tmp_path)
     assert (shown.returncode, shown.stderr) == (0, "")
+
+
+def test_drawing_leaves_the_environment_as_it_was() -> None:
+    said = (
+        "import os; before = dict(os.environ); import clench.core.opengl as gl\n"
+        "try: gl.open_context(8, 8).free()\n"
+        "except gl.OpenGLError: pass\n"
+        "print(dict(os.environ) == before)"
+    )
+    assert run(said, "").stdout == "True\n"

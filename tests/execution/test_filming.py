@@ -120,10 +120,11 @@ def test_without_a_screen_and_without_a_way_to_do_without(
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("sys.platform", "linux")
-    # What counts is what the engine found when it was imported, not what is said later.
-    monkeypatch.setenv("MUJOCO_GL", "egl")
-    monkeypatch.setattr("mujoco.GLContext", type("GLContext", (), {"__module__": "mujoco.glfw"}), raising=False)
-    with pytest.raises(ClenchError, match=r"OpenGL cannot draw here \(there is no screen\)\. .* set MUJOCO_GL=egl"):
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    monkeypatch.setattr("clench.core.opengl._found", [])
+    with pytest.raises(
+        ClenchError, match=r"OpenGL cannot draw here \(there is no screen\)\. .* install Mesa's libegl1"
+    ):
         execute(pinch, SimulatedHand(pincer, ball, film=Film(tmp_path / "a.gif")))
 
 

@@ -12,20 +12,21 @@ _RENAMED = {"Actuator": "Executor", "DrivenHand": "HardwareHand"}
 
 
 def lazy_names(
-    package: str, homes: Mapping[str, str], namespaces: Sequence[str] = ()
+    package: str, homes: Mapping[str, str], namespaces: Sequence[str] = (), modules: Sequence[str] = ()
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return `__getattr__` and `__dir__` of a package.
 
     Args:
         package: its name. homes: the module that defines each name.
-        namespaces: modules of the package whose names it has, too, without listing them.
+        namespaces: modules of the package whose names it has, too, without listing them. modules: other modules of the
+            package that need no import by name.
     """
 
     def find(name: str) -> Any:
         module = sys.modules[package]
         if name in homes:
             value = getattr(importlib.import_module(homes[name]), name)
-        elif name in namespaces:
+        elif name in namespaces or name in modules:
             return importlib.import_module(f"{package}.{name}")
         else:
             value = _in_namespaces(package, name, namespaces)

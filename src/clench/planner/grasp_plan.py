@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from clench.core import display
+from clench.core.display import Displayed
 from clench.core.pose import Pose
 from clench.execution.trajectory import Trajectory
 from clench.mechanics.contact_kinds import GraspKind
@@ -16,9 +19,13 @@ from clench.solver.solution import GraspSolution
 from .options import PlanOptions
 from .rejections import HELP, Rejection
 
+if TYPE_CHECKING:
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+
 
 @dataclass(frozen=True, eq=False)
-class PlannedGrasp:
+class PlannedGrasp(Displayed):
     """A grasp that was planned: everything that is needed to use it.
 
     Args:
@@ -61,6 +68,10 @@ class PlannedGrasp:
         """Angles of all joints at the touch [rad], by name."""
         return self.solution.joint_angles
 
+    def show(self, hand: Hand | None = None, obj: GraspObject | None = None) -> Path | None:
+        """Show the grasp as a page; see `GraspSolution.show`."""
+        return display.show(self, hand, obj)
+
     def __repr__(self) -> str:
         position = ", ".join(f"{x:.3f}" for x in self.hand_pose.position)
         return f"PlannedGrasp({self.kind}, '{self.preshape}', palm at [{position}] m, epsilon {self.epsilon:.3g})"
@@ -98,7 +109,7 @@ class UnfinishedGrasp:
 
 
 @dataclass(frozen=True, eq=False)
-class GraspPlan:
+class GraspPlan(Displayed):
     """Grasps of an object, the best ones first, and what became of all proposals.
 
     Args:
@@ -150,6 +161,10 @@ class GraspPlan:
         others = {k: n for k, n in counted.items() if k != Rejection.DIRECTION} or counted
         reason, number = max(others.items(), key=lambda item: item[1])
         return f"Found {found}. Most proposals fell for '{reason}' ({number}). {HELP[Rejection(reason)]}"
+
+    def show(self, hand: Hand | None = None, obj: GraspObject | None = None) -> Path | None:
+        """Show all grasps as a page, to be clicked through; see `GraspSolution.show`."""
+        return display.show(self, hand, obj)
 
     def __repr__(self) -> str:
         return f"GraspPlan({self.text!r})"

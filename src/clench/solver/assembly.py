@@ -19,6 +19,7 @@ from clench.core.pose import FloatArray, Pose
 from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
+from clench.models.recent_scenes import remember_scene
 
 from .causes import finger_cause, no_closing_joint, what_is_there
 from .certificate import Certificate
@@ -85,6 +86,8 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
             results[finger.name] = FingerResult(finger.name, FingerStatus.NO_MOTION, text, 0, (), cause)
     status, reason = _status(answer, results, problem)
     names = hand.joint_names
+    geometry_hash = f"{hash_hand(hand, problem.source)}+{packed.geometry_hash}"
+    remember_scene(geometry_hash, hand, problem.obj)
     return GraspSolution(
         clench_version=__version__,
         hand=hand.name,
@@ -92,7 +95,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         hand_model=str(hand.path) if hand.path else hand.name,
         object_model=str(problem.obj.path) if problem.obj.path else problem.obj.name,
         object_scale=problem.obj.scale,
-        geometry_hash=f"{hash_hand(hand, problem.source)}+{packed.geometry_hash}",
+        geometry_hash=geometry_hash,
         seed=command.seed,
         status=status,
         reason=reason,

@@ -6,13 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from clench.core import display
 from clench.core.deferring import DeferredMapping, LateFields
+from clench.core.display import Displayed
 from clench.core.pose import FloatArray, Pose
 from clench.core.short_repr import described, short_repr
+
+if TYPE_CHECKING:
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
 
 
 class SolutionStatus(StrEnum):
@@ -173,7 +179,7 @@ class FingerResult(LateFields):
 
 
 @dataclass(frozen=True)
-class GraspSolution(LateFields):
+class GraspSolution(Displayed, LateFields):
     """The answer of `clench.solve`; `to_dict` gives the documented JSON form.
 
     Args:
@@ -246,6 +252,20 @@ class GraspSolution(LateFields):
         """
         late = {"choice": DeferredMapping(lambda: make().choice or {})}
         return cls.with_late(lambda name: getattr(make(), name), **{**late, **known})
+
+    def show(self, hand: Hand | None = None, obj: GraspObject | None = None) -> Path | None:
+        """Show the closing as a page: in a notebook as the output of the cell, elsewhere in the browser.
+
+        Args:
+            hand, obj: what was solved. They may be left out after a recent solve, and for models that load by name.
+
+        Returns:
+            the file that the browser opens; None in a notebook.
+
+        Raises:
+            CommandError: hand and object are not known.
+        """
+        return display.show(self, hand, obj)
 
     def violations(self) -> tuple[str, ...]:
         """Return a sentence for everything that makes the solution unfit to execute."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,15 +110,13 @@ def report_of(actuator: Executor) -> ExecutionReport:
 
 
 def make_film(video: Path | None, stills: Path | None) -> Film | None:
-    """Return the film that was asked for; this comes before anything of MuJoCo, which looks once for OpenGL.
+    """Return the film that was asked for.
 
     Raises:
         FileError: a file or folder cannot be written.
     """
     if video is None and stills is None:
         return None
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("MUJOCO_GL", "egl")
     from clench.execution.simulation.filming import Film
 
     return Film(video, stills)

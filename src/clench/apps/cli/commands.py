@@ -23,6 +23,8 @@ from .scene_options import with_scene
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
     from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
     from clench.solver.solution import GraspSolution
 
@@ -38,20 +40,22 @@ def demo(
     hand: str = "robonaut2",
     object: str = "mug",
     seed: int | None = None,
+    html: Path | None = None,
     json: bool = False,
 ) -> int:
-    """Do the main job on a built-in hand and object: solve, figures, simulated hold, record.
+    """Do the main job on a built-in hand and object: solve, figures, a page, simulated hold, record.
 
     Args:
         out: folder for the files.
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         seed: plan a grasp from this seed instead of the kept pose of the built-in hand on the mug.
+        html: file (.html) for a page that shows the closing in any browser; grasp.html in the folder by default.
         json: print the solution as one JSON document, and nothing else, on standard output.
     """
     from .demo import run_demo
 
-    return run_demo(hand, object, out, seed, json)
+    return run_demo((hand, object), out, seed, html or out / "grasp.html", json)
 
 
 def solve(
@@ -70,6 +74,7 @@ def solve(
     criteria: str | None = None,
     seed: int = 0,
     out: Path | None = None,
+    html: Path | None = None,
     record: Path | None = None,
     pose_error: tuple[float, float] | None = None,
     explain: bool = False,
@@ -97,6 +102,7 @@ def solve(
         criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
         seed: of the planned grasp; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
+        html: file (.html) for a page that shows the closing in any browser, without a network (docs/pictures.md).
         record: SQLite record to append the solution to.
         pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
         explain: print the alternative sets with their scores, and why the chosen ones won.
@@ -124,7 +130,7 @@ def solve(
 
     forces = forces or bool(mass or friction)
     carried, gripped = _checked_forces(mass, friction, criteria)
-    _check_files(out, record)
+    _check_files(out, html, record)
     the_hand = clench.Hand.load(hand, hand_file=hand_file, palm=palm, collision_source=collision_source)
     the_object = clench.GraspObject.load(object, scale=scale)
     told = size_warnings(the_object) if warn_of_size(the_hand, the_object) else ()
@@ -142,10 +148,10 @@ def solve(
     solution = clench.solve(the_hand, the_object, the_command)
     the_command = settled(the_command, solution)
     solution = replace(solution, hand_model=loadable(hand), object_model=loadable(object))
-    if json or forces or out is not None or record is not None:
+    if json or forces or any((out, html, record)):
         solution = clench.execution.complete(solution, the_hand, the_object, mass=carried, friction=gripped)
     files = [] if out is None else write_results(the_hand, the_object, the_command, solution, out)
-    files += [] if record is None else [_recorded(solution, record)]
+    files += _page_and_record(the_hand, the_object, solution, html, record)
     error = None
     if pose_error is not None:
         off = pose_error[0], radians(pose_error[1])
@@ -169,22 +175,30 @@ def solve(
     return exit_code(solution, strict)
 
 
-def _recorded(solution: GraspSolution, path: Path) -> Path:
-    """Append a solution to a record, and return the record's path."""
+def _page_and_record(
+    hand: Hand, obj: GraspObject, solution: GraspSolution, html: Path | None, record: Path | None
+) -> list[Path]:
+    """Write the page of a solution, and append the solution to a record; return the files."""
     import clench
 
-    with clench.Record(path) as record:
-        record.append(solution)
-    return path
+    files = [] if html is None else [clench.write_page(html, hand, obj, solution)]
+    if record is not None:
+        with clench.Record(record) as kept:
+            kept.append(solution)
+        files.append(record)
+    return files
 
 
-def _check_files(out: Path | None, record: Path | None) -> None:
-    """Refuse a folder or a record that cannot be written, before anything is loaded."""
+def _check_files(out: Path | None, html: Path | None, record: Path | None) -> None:
+    """Refuse a folder, a page or a record that cannot be written, before anything is loaded."""
     import clench
+    from clench.apps.pages.page_files import check_page
     from clench.core.files.json_files import check_folder
 
     if out is not None:
         check_folder(out)
+    if html is not None:
+        check_page(html, out)
     if record is not None:
         clench.Record.check(record)
 

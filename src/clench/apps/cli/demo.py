@@ -26,13 +26,18 @@ MUG_POSE = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 STEPS = 6
 
 
-def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, json: bool) -> int:
+def run_demo(models: tuple[str, str], out: Path, seed: int | None, page: Path, json: bool) -> int:
     """Load, solve, draw, carry out and record; print what happened and where the files are.
+
+    Args:
+        models: of hand and object. out: folder for the files. seed: of a planned grasp. page: file for the page.
+        json: print the solution as a document.
 
     Returns:
         0 when the hand grasps and the simulated hand reaches the computed angles, else 1.
     """
     import clench
+    from clench.apps.pages.page_files import check_page
     from clench.core.files.json_files import check_folder
     from clench.kernels.runtime.warming import warm_up
 
@@ -40,6 +45,8 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
     from .printing import print_files, print_report, print_solution
 
     check_folder(out)
+    check_page(page, out)
+    hand_model, object_model = models
     if out.is_dir():
         clench.Record.check(out / "record.sqlite")
     with _progress() as step:
@@ -47,13 +54,13 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)
         step("Solving (the first run compiles the kernels, which takes most of a minute; later runs load them)")
         warm_up()
-        command = choose_command(hand, obj, (hand_model, object_model), seed)
+        command = choose_command(hand, obj, models, seed)
         # The first call of a process loads the compiled kernels; this one shows what a solve takes.
         solution = clench.solve(hand, obj, command)
         solution = replace(solution, hand_model=loadable(hand_model), object_model=loadable(object_model))
         solution = clench.execution.complete(solution, hand, obj)
         step("Drawing every finger in its curl planes, and the hand")
-        files = write_results(hand, obj, command, solution, out)
+        files = [*write_results(hand, obj, command, solution, out), clench.write_page(page, hand, obj, solution)]
         step("Closing the simulated hand")
         report = clench.execute(solution, clench.SimulatedHand(hand, obj), force=True)
         report.save(out / "execution.json")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from clench.core.errors import CommandError, FileError, UnknownNameError
 
 from .parsing import as_range
+
+if TYPE_CHECKING:
+    from .export_sources import ReadGrasps
 
 # The values of `GraspFormat`, written out so that the command line loads without NumPy.
 Format = Literal["isaac_grasp", "dexgraspbench", "moveit_grasp"]
@@ -34,13 +38,14 @@ def export(
     stiffness: float | None = None,
     json: bool = False,
 ) -> int:
-    """Write grasps as isaac_grasp YAML, DexGraspBench npy or moveit_msgs/Grasp JSON (docs/exporting.md).
+    """Write grasps as isaac_grasp YAML, DexGraspBench npy, moveit_msgs/Grasp JSON, or scenes (docs/exporting.md).
 
     Args:
         solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, or batches
             (.npz) written by `clench batch --out`, of which all poses that are grasps are taken; or one dataset: the
             folder of `clench generate`, or its grasps.parquet.
         out: the file; for several grasps in the format dexgraspbench, a folder; of a dataset, a folder or an HDF5 file.
+            A .glb, .usd, .usda or .usdc file shows hand, object and contacts; USD has the grasp lines, too.
         format: of the file; by its ending (.yaml, .npy, .json, .h5) by default, a folder is dexgraspbench. hdf5 is for
             datasets.
         hand: model of the hand; the one that the solutions name by default.
@@ -59,6 +64,7 @@ def export(
     import clench
     from clench.core.files.json_files import check_folder, check_writable
     from clench.execution.formats.exchange import format_of
+    from clench.execution.formats.scene_files import is_scene_file
 
     from .export_sources import make_test, read_grasps, refuse_several
     from .printing import print_exported
@@ -69,6 +75,11 @@ def export(
         return _export_dataset(solutions[0], out, format, any(unused) or hold or bool(mass or friction), json)
     if format == "hdf5" or out.suffix == ".h5":
         raise CommandError("hdf5: is for datasets; expected the folder of one, or its grasps.parquet.")
+    if format is None and is_scene_file(out):
+        if any((root, name, stiffness, hold, mass, friction)):
+            raise CommandError("export: a scene shows grasps as they are; leave out --root, --name, --hold and forces.")
+        check_writable(out)
+        return _export_scene(read_grasps(solutions, hand, object, (hand_file, palm), scale), out, json)
     chosen = format_of(out, format)
     one_each = chosen == "dexgraspbench" and (out.is_dir() or not out.suffix)
     (check_folder if one_each else check_writable)(out)
@@ -103,6 +114,28 @@ def export(
         )
     else:
         print_exported(report, notes)
+    return 0
+
+
+def _export_scene(read: ReadGrasps, out: Path, json: bool) -> int:
+    """Write hand, object and contacts as a file for other programs to show."""
+    import clench
+
+    from .export_sources import refuse_several
+    from .printing import print_files
+    from .results import print_json
+
+    refuse_several(read, "scene")
+    if read.hand is None:
+        raise CommandError(f"hand: '{read.solutions[0].hand_model}' cannot be loaded; give --hand.")
+    clench.formats.export_scene(out, read.solutions, read.hand, read.objects[0])
+    if json:
+        document = {"schema": "clench.export/1", "file": str(out), "files": [str(out)]}
+        print_json(document | {"grasps": len(read.solutions), "notes": list(read.notes)})
+    else:
+        print_files([out])
+        for note in read.notes:
+            sys.stdout.write(f"{note}\n")
     return 0
 
 

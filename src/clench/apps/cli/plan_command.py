@@ -46,6 +46,7 @@ def plan(
     without_path: bool = False,
     hold: bool = False,
     out: Path | None = None,
+    html: Path | None = None,
     json: bool = False,
 ) -> int:
     """Plan grasps of an object: wrist poses, preshapes, contacts, squeezes and free paths (docs/planning.md).
@@ -78,11 +79,13 @@ def plan(
         hold: try every grasp in simulation: close on the free object, squeeze, pull in six directions (docs/hold.md).
         out: folder for plan.json, the solution and trajectory of every grasp, and pictures: the best grasps, where
             all of them touch the object, and the zones in which the hand grasps.
+        html: file (.html) for a page that shows all grasps in any browser, without a network (docs/pictures.md).
         json: print one JSON document on standard output.
     """
     from math import radians
 
     import clench
+    from clench.apps.pages.page_files import check_page
     from clench.closing.collision.sizes import warn_of_size
     from clench.core.files.json_files import check_folder
     from clench.kernels.runtime.warming import announce, warm_up
@@ -93,6 +96,8 @@ def plan(
 
     if out is not None:
         check_folder(out)
+    if html is not None:
+        check_page(html, out)
     asked: dict[str, Any] = {
         "friction": as_range(friction, "--friction"),
         "gravity": gravity,
@@ -126,6 +131,8 @@ def plan(
         from clench.apps.figures import draw_plan
 
         files += draw_plan(found, the_hand, the_object, out, [report.held for report in held] if hold else None)
+    if html is not None and len(found):
+        files.append(clench.write_page(html, the_hand, the_object, found))
     if json:
         print_json(document)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray
+from clench.models.appearance import SolidKind, object_solids
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.solver.solution import Contact
 
 from . import style
-from .hand_view import is_hidden
-from .raster import Camera, Image, Picture, borders, halved, rasterise, shade
-from .surfaces import OBJECT_GROUP, Surface, placed_object
-from .views import fitted_camera, frame_axes, frame_panel, scale_bar
+from .camera import Camera, Image, Picture, fitted_camera, halved
+from .stage import Stage
+from .views import frame_axes, frame_panel, scale_bar, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,34 +60,35 @@ def draw_contacts(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path) -> 
         FileError: the file cannot be written, or no figure has its ending.
     """
     style.check_figure(path)
-    surface = placed_object(obj, obj.pose.matrix)
     names = {body.name for body in obj.bodies if body.role is BodyRole.GRASPABLE}
-    kept = [OBJECT_GROUP + k for k, body in enumerate(obj.bodies) if body.name in names]
-    surface = surface.taken(np.isin(surface.groups, kept))
     touches = [_Touches.of(grasp.solution.contacts, names, hand) for grasp in plan]
     width, height = 3 * _PANEL + 4 * _GAP, _TOP + 2 * _PANEL + _GAP + _BOTTOM
     figure = style.new_figure(width, height)
-    focus = surface.corners.reshape(-1, 3)
-    scale = _FILLED * min(fitted_camera(d, focus, (_PANEL, _PANEL)).scale for d in _sides())
-    cameras = [fitted_camera(d, focus, (2 * _PANEL, 2 * _PANEL), 2.0 * scale) for d in _sides()]
-    pictures = [rasterise(surface.corners, camera) for camera in cameras]
-    heats = [_heat(p, surface, camera, touches) for p, camera in zip(pictures, cameras, strict=True)]
+    cameras, pictures = _photographs(obj)
+    heats = [_heat(picture, camera, touches) for picture, camera in zip(pictures, cameras, strict=True)]
     most, colors = max(float(heat.max()) for heat in heats) or 1.0, _colors()
     for k, (camera, picture, heat) in enumerate(zip(cameras, pictures, heats, strict=True)):
         left, top = _GAP + (k % 3) * (_PANEL + _GAP), _TOP + (k // 3) * (_PANEL + _GAP)
         axes = figure.add_axes((left / width, 1.0 - (top + _PANEL) / height, _PANEL / width, _PANEL / height))
-        image = _painted(picture, surface, camera, colors(heat / most)[..., :3])
-        axes.imshow(halved(image), extent=(0, _PANEL, _PANEL, 0), interpolation="nearest")
+        show(axes, halved(_painted(picture, colors(heat / most)[..., :3])), (_PANEL, _PANEL))
         _dots(axes, touches, picture, camera)
         frame_axes(axes, camera, _PANEL)
-        axes.set_xlim(0, _PANEL)
-        axes.set_ylim(_PANEL, 0)
         frame_panel(axes)
-    scale_bar(figure.axes[0], scale, (_PANEL, _PANEL))
+    scale_bar(figure.axes[0], 0.5 * cameras[0].scale, (_PANEL, _PANEL))
     _explain(figure, hand, obj, len(plan))
     if touches:
         _color_bar(figure, colors, most)
     return style.save_figure(figure, path)
+
+
+def _photographs(obj: GraspObject) -> tuple[list[Camera], list[Picture]]:
+    """Return pictures of the object in white from six sides, all at one scale, with the cameras that took them."""
+    solids = [replace(s, color="#ffffff") for s in object_solids(obj, "raw") if s.kind is SolidKind.OBJECT]
+    with Stage(solids, np.tile(obj.pose.matrix, (len(solids), 1, 1))) as stage:
+        focus = stage.points(SolidKind.OBJECT)
+        scale = _FILLED * min(fitted_camera(d, focus, (_PANEL, _PANEL)).scale for d in _sides())
+        cameras = [fitted_camera(d, focus, (2 * _PANEL, 2 * _PANEL), 2.0 * scale) for d in _sides()]
+        return cameras, [stage.picture(camera) for camera in cameras]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,15 +122,15 @@ def _sides() -> FloatArray:
     return np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), height])
 
 
-def _heat(picture: Picture, surface: Surface, camera: Camera, touches: Sequence[_Touches]) -> FloatArray:
+def _heat(picture: Picture, camera: Camera, touches: Sequence[_Touches]) -> FloatArray:
     """Return the share of grasps that touch near what is seen at every pixel, shape (H, W)."""
-    seen = picture.triangle[::2, ::2] >= 0
-    row, column = np.nonzero(seen)
-    x, y = 2.0 * column + 0.5 - 0.5 * camera.width, 0.5 * camera.height - (2.0 * row + 0.5)
+    row, column = np.nonzero(picture.solid[::2, ::2] >= 0)
+    row, column = 2 * row, 2 * column
+    nearness = picture.nearness[row, column]
+    x, y = column + 0.5 - 0.5 * camera.width, 0.5 * camera.height - (row + 0.5)
     across = (np.outer(x, camera.right) + np.outer(y, camera.up)) / camera.scale
-    points = camera.center + across + np.outer(picture.nearness[::2, ::2][seen], camera.towards)
-    normals = surface.normals[picture.triangle[::2, ::2][seen]]
-    normals = np.where((normals @ camera.towards)[:, None] < 0.0, -normals, normals)
+    points = camera.center + across + np.outer(nearness, camera.towards)
+    normals = _normals(picture, camera)[row, column]
     share = np.zeros(len(points))
     for grasp in touches:
         warmest = np.zeros(len(points))
@@ -140,18 +141,34 @@ def _heat(picture: Picture, surface: Surface, camera: Camera, touches: Sequence[
             same_side = np.clip(0.5 + normals[near] @ normal, 0.0, 1.0)
             warmest[near] = np.maximum(warmest[near], same_side * np.exp(-0.5 * squared[near] / _SPREAD**2))
         share += warmest / len(touches)
-    heat = np.zeros(seen.shape)
-    heat[seen] = share
+    heat = np.zeros((camera.height // 2, camera.width // 2))
+    heat[row // 2, column // 2] = share
     return heat.repeat(2, axis=0).repeat(2, axis=1)
 
 
-def _painted(picture: Picture, surface: Surface, camera: Camera, colors: FloatArray) -> Image:
+def _normals(picture: Picture, camera: Camera) -> FloatArray:
+    """Return the normal of what is seen at every pixel, towards the viewer, shape (H, W, 3).
+
+    Of the two neighbours of a pixel in a direction the one at which the depth changes less counts: at the border of a
+    surface the other one is behind it.
+    """
+    depth = np.where(picture.solid >= 0, picture.nearness, -1e3)
+    slopes = []
+    for axis in (0, 1):
+        step = np.diff(depth, axis=axis)
+        before, after = np.insert(step, 0, np.inf, axis=axis), np.insert(step, step.shape[axis], np.inf, axis=axis)
+        slopes.append(camera.scale * np.where(np.abs(before) < np.abs(after), before, after))
+    down, right = np.clip(slopes, -1e3, 1e3)
+    normals = camera.towards - right[..., None] * camera.right + down[..., None] * camera.up
+    unit: FloatArray = normals / np.linalg.norm(normals, axis=2, keepdims=True)
+    return unit
+
+
+def _painted(picture: Picture, colors: FloatArray) -> Image:
     """Return the lit object in colours of its pixels, shape (H, W, 3), with dark lines around it."""
-    white = np.ones_like(surface.colors)
-    image = np.float32(1.0 - _EVEN) * shade(picture, surface.normals, white, camera) + np.float32(_EVEN)
-    seen = picture.triangle >= 0
+    image = np.float32(1.0 - _EVEN) * picture.outlined() + np.float32(_EVEN)
+    seen = picture.solid >= 0
     image[seen] *= colors[seen].astype(np.float32)
-    image[borders(picture, surface.groups, 4e-3) & seen] *= np.float32(0.45)
     return image
 
 
@@ -159,7 +176,7 @@ def _dots(axes: Axes, touches: Sequence[_Touches], picture: Picture, camera: Cam
     """Mark the contacts that are seen, those of thumbs in another way."""
     for of_thumb, mark in ((False, _FINGER), (True, _THUMB)):
         points = np.concatenate([np.empty((0, 3)), *(t.point[t.of_thumb == of_thumb] for t in touches)])
-        shown = points[~is_hidden(picture.nearness, camera, points)]
+        shown = points[~picture.hides(camera, points)]
         axes.plot(*(0.5 * camera.project(shown)[:, :2]).T, ls="", **mark)
 
 

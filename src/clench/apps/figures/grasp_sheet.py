@@ -5,29 +5,24 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray
+from clench.models.appearance import OBJECT_COLOR, OBSTACLE_COLOR, PALM_COLOR
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
-from clench.solver.solution import GraspSolution
 
 from . import style
-from .hand_view import around, focus_of, is_hidden, render
-from .raster import Camera, halved, rasterise
-from .surfaces import (
-    OBJECT_COLOR,
-    OBJECT_GROUP,
-    OBSTACLE_COLOR,
-    PALM_COLOR,
-    hand_surface,
-    object_surface,
-    without_forearm,
-)
-from .views import fitted_camera, frame_panel, scale_bar
+from .camera import Camera, Image, fitted_camera
+from .contact_labels import dot, photograph
+from .stage import Stage, solution_poses, solution_solids
+from .viewpoints import focus_of, viewpoints
+from .views import frame_panel, scale_bar, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,17 +45,6 @@ _LETTER: Final = 8
 #: Width of the figure at least, for the text above and below the panels, and of a legend in one row, in pixels.
 _NARROWEST: Final = 960
 _LEGEND: Final = 1400
-#: How much of the hand shows through the object [-].
-_THROUGH: Final = 0.42
-#: Width of a grid [m] to which surfaces are coarsened while a viewpoint is chosen, and pixels on a side.
-_GRID: Final = 3e-3
-_SMALL: Final = 90
-#: The object is shown as far from the hand as this share of its size [-].
-_NEAR: Final = 0.25
-#: A contact is hidden when all of the surface within so many pixels of its mark lies before it.
-_MARK: Final = 3
-#: What a contact behind the object counts, next to one that is seen; one behind hand or obstacles counts nothing.
-_BEHIND_OBJECT: Final = 0.6
 
 
 def draw_grasps(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held: Sequence[bool] | None = None) -> Path:
@@ -84,65 +68,58 @@ def draw_grasps(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held:
     top_of_all = _TOP + _LINE * len(text)
     height = top_of_all + rows * (_PANEL + _CAPTION + _GAP) + (_BOTTOM if width >= _LEGEND else _BOTTOM + _LINE)
     figure = style.new_figure(width, height)
-    scenes = [_Scene(hand, obj, grasp.solution) for grasp in shown]
-    scale = min((scene.scale for scene in scenes), default=1.0)
-    for k, (grasp, scene) in enumerate(zip(shown, scenes, strict=True)):
+    panels = _photographs(hand, obj, shown)
+    for k, (grasp, panel) in enumerate(zip(shown, panels, strict=True)):
         left = _GAP + (k % columns) * (_PANEL + _GAP)
         top = top_of_all + (k // columns) * (_PANEL + _CAPTION + _GAP)
         axes = figure.add_axes((left / width, 1.0 - (top + _PANEL) / height, _PANEL / width, _PANEL / height))
-        _draw_panel(axes, scene, scale)
+        _draw_panel(axes, panel)
         _caption(axes, k + 1, grasp, None if held is None else held[k])
     _explain(figure, hand, obj, (len(shown), len(plan)), text)
     if shown:
-        scale_bar(figure.axes[0], scale, (_PANEL, _PANEL))
+        scale_bar(figure.axes[0], panels[0].camera.scale, (_PANEL, _PANEL))
     return style.save_figure(figure, path)
 
 
-class _Scene:
-    """Hand and object of one grasp, and the camera that shows its contacts best."""
+@dataclass(frozen=True, eq=False)
+class _Panel:
+    """The picture of one grasp: its image, the camera, and the contacts that last, with those that are hidden."""
 
-    def __init__(self, hand: Hand, obj: GraspObject, solution: GraspSolution) -> None:
-        self.body = without_forearm(hand, hand_surface(hand, solution))
-        self.things = object_surface(obj, solution)
-        self.points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
-        in_the_way = np.isin(self.things.groups, _obstacles(obj))
-        body, grasped = self.body.coarse(_GRID), self.things.taken(~in_the_way).coarse(_GRID)
-        self.focus = focus_of(body, grasped, _NEAR)
-        opaque = np.concatenate([body, self.things.taken(in_the_way).corners])
-        cameras = [fitted_camera(d, self.focus, (_SMALL, _SMALL)) for d in around()]
-        best = int(np.argmax([self._score(opaque, grasped, camera) for camera in cameras]))
-        self.towards = around()[best]
-        self.scale = fitted_camera(self.towards, self.focus, (_PANEL, _PANEL)).scale
-
-    def _score(self, opaque: FloatArray, grasped: FloatArray, camera: Camera) -> float:
-        """Return how well a view shows the contacts: seen, and spread over the picture."""
-        if not len(self.points):
-            return 0.0
-        away = is_hidden(rasterise(opaque, camera).nearness, camera, self.points)
-        behind = is_hidden(rasterise(grasped, camera).nearness, camera, self.points)
-        seen = np.where(away, 0.0, np.where(behind, _BEHIND_OBJECT, 1.0))
-        spread = float(np.ptp(camera.project(self.points)[:, :2], axis=0).sum()) / camera.width
-        return float(seen.mean()) + 0.5 * spread
+    image: Image
+    camera: Camera
+    points: FloatArray
+    hidden: NDArray[np.bool_]
 
 
-def _obstacles(obj: GraspObject) -> list[int]:
-    """Return the groups of the triangles of obstacles."""
-    return [OBJECT_GROUP + k for k, body in enumerate(obj.bodies) if body.role is BodyRole.OBSTACLE]
+def _photographs(hand: Hand, obj: GraspObject, grasps: Sequence[PlannedGrasp]) -> list[_Panel]:
+    """Return the pictures of grasps, all at one scale, each from the side that shows its contacts best."""
+    if not grasps:
+        return []
+    solutions = [grasp.solution for grasp in grasps]
+    solids = solution_solids(hand, obj, solutions[0])
+    poses = [solution_poses(hand, solids, solution) for solution in solutions]
+    contacts = [[c.position for c in solution.contacts if not c.passed] for solution in solutions]
+    points = [np.array(places).reshape(-1, 3) for places in contacts]
+    with Stage(solids, poses[0]) as stage:
+        views = []
+        for posed, touched in zip(poses, points, strict=True):
+            stage.pose(posed)
+            focus = focus_of(stage)
+            views.append((viewpoints(stage, focus, touched, 1)[0], focus))
+        scale = min(fitted_camera(towards, focus, (_PANEL, _PANEL)).scale for towards, focus in views)
+        panels = []
+        for posed, touched, (towards, focus) in zip(poses, points, views, strict=True):
+            stage.pose(posed)
+            camera = fitted_camera(towards, focus, (_PANEL, _PANEL), scale)
+            image, _, hidden = photograph(stage, camera, touched)
+            panels.append(_Panel(image, camera, touched, hidden))
+    return panels
 
 
-def _draw_panel(axes: Axes, scene: _Scene, scale: float) -> None:
-    from scipy.ndimage import minimum_filter
-
-    double = fitted_camera(scene.towards, scene.focus, (2 * _PANEL, 2 * _PANEL), 2.0 * scale)
-    image, nearness = render(scene.body, scene.things, double, _THROUGH)
-    axes.imshow(halved(image), extent=(0, _PANEL, _PANEL, 0), interpolation="nearest")
-    farthest = minimum_filter(nearness, 4 * _MARK + 1, mode="nearest")
-    hidden = is_hidden(farthest, double, scene.points)
-    for (x, y), behind in zip(0.5 * double.project(scene.points)[:, :2], hidden, strict=True):
-        face, edge = (style.PAPER, style.CONTACT) if behind else (style.CONTACT, style.PAPER)
-        axes.plot(x, y, "o", ms=6.5, mfc=face, mec=edge, mew=1.5, zorder=6)
-    axes.set_xlim(0, _PANEL)
-    axes.set_ylim(_PANEL, 0)
+def _draw_panel(axes: Axes, panel: _Panel) -> None:
+    show(axes, panel.image, (_PANEL, _PANEL))
+    for (x, y), hidden in zip(panel.camera.project(panel.points)[:, :2], panel.hidden, strict=True):
+        dot(axes, float(x), float(y), bool(hidden), 6.5)
     frame_panel(axes)
 
 
@@ -173,7 +150,7 @@ def _explain(figure: Figure, hand: Hand, obj: GraspObject, counts: tuple[int, in
     style.write(figure, _GAP / width, 1.0 - 14 / height, title, fontsize=14, fontweight="bold", va="top")
     style.write(figure, _GAP / width, 1.0 - 38 / height, "\n".join(text), fontsize=10, va="top", color=style.CHOSEN)
     if shown:
-        _legend(figure, width, height, bool(_obstacles(obj)))
+        _legend(figure, width, height, any(body.role is BodyRole.OBSTACLE for body in obj.bodies))
 
 
 def _legend(figure: Figure, width: float, height: float, has_obstacles: bool) -> None:

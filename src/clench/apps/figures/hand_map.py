@@ -11,15 +11,16 @@ import numpy as np
 
 from clench.closing.finger_plan import closing_joints, plan_finger
 from clench.core.pose import FloatArray
+from clench.models.appearance import PALM_COLOR
 from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.hand.understanding.finger_geometry import finger_line
 from clench.models.shapes import CollisionSource
 
 from . import style
+from .camera import Camera, Image, fitted_camera, halved
 from .preshape_sheet import draw_preshapes, sheet_height
-from .raster import Camera, halved, rasterise
-from .surfaces import PALM_COLOR, Surface, posed_surface
-from .views import GAP, VIEW, fitted_camera, frame_axes, lit, palm_views, scale_bar, two_views
+from .stage import Stage
+from .views import GAP, VIEW, frame_axes, palm_views, scale_bar, show, two_views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,25 +67,32 @@ def draw_hand_map(
         FileError: the file cannot be written.
     """
     chosen = hand.default_source if source is None else CollisionSource(source)
-    surface = posed_surface(hand, hand.open_angles(), chosen, np.eye(4))
-    own = [hand.palm, *(i for finger in hand.fingers for i in finger.links)]  # an arm may leave the picture
-    corners = surface.corners[np.isin(surface.groups, own)].reshape(-1, 3)
-    size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.1
-    maps = [_map_finger(hand, finger, chosen, _AXIS * size) for finger in hand.fingers]
-    focus = np.concatenate([corners, *(m.paths.reshape(-1, 3) for m in maps), *(m.axes.reshape(-1, 3) for m in maps)])
-    below = sheet_height(len(preshapes))
-    figure, views = two_views(_TEXT, below)
-    directions, above = _directions(hand, maps)
-    scale = min(fitted_camera(d, focus, VIEW, above=above).scale for d in directions)
-    for axes, direction in zip(views, directions, strict=True):
-        camera = fitted_camera(direction, focus, VIEW, scale, above)
-        _draw_view(axes, hand, maps, surface, camera, _NORMAL * size)
+    with Stage.open(hand, chosen) as stage:
+        corners = _own_points(hand, stage)
+        size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.1
+        maps = [_map_finger(hand, finger, chosen, _AXIS * size) for finger in hand.fingers]
+        lines = [points.reshape(-1, 3) for m in maps for points in (m.paths, m.axes)]
+        focus = np.concatenate([corners, *lines])
+        below = sheet_height(len(preshapes))
+        figure, views = two_views(_TEXT, below)
+        directions, above = _directions(hand, maps)
+        scale = min(fitted_camera(d, focus, VIEW, above=above).scale for d in directions)
+        for axes, direction in zip(views, directions, strict=True):
+            camera = fitted_camera(direction, focus, VIEW, scale, above)
+            image = halved(stage.picture(camera.doubled()).outlined())
+            _draw_view(axes, hand, maps, image, camera, _NORMAL * size)
     for m in maps:
         _name_finger(views[0], m, fitted_camera(directions[0], focus, VIEW, scale, above))
     scale_bar(views[0], scale)
     _explain(figure, hand, maps, below)
     draw_preshapes(figure, hand, preshapes, chosen, directions, above)
     return style.save_figure(figure, path)
+
+
+def _own_points(hand: Hand, stage: Stage) -> FloatArray:
+    """Return points of palm and fingers, shape (N, 3): an arm may leave the picture."""
+    own = [hand.palm, *(i for finger in hand.fingers for i in finger.links)]
+    return stage.points_of([k for k, solid in enumerate(stage.solids) if solid.index in own])
 
 
 def _map_finger(hand: Hand, finger: Finger, source: CollisionSource, half: float) -> FingerMap:
@@ -121,12 +129,8 @@ def _directions(hand: Hand, maps: list[FingerMap]) -> tuple[list[FloatArray], Fl
     return palm_views(hand.palm_normal, stretch)
 
 
-def _draw_view(axes: Axes, hand: Hand, maps: list[FingerMap], surface: Surface, camera: Camera, normal: float) -> None:
-    double = Camera(
-        camera.right, camera.up, camera.towards, camera.center, 2.0 * camera.scale, 2 * camera.width, 2 * camera.height
-    )
-    image = halved(lit(rasterise(surface.corners, double), surface, double))
-    axes.imshow((1.0 - _PALE) * image + _PALE, extent=(0, VIEW[0], VIEW[1], 0), interpolation="nearest")
+def _draw_view(axes: Axes, hand: Hand, maps: list[FingerMap], image: Image, camera: Camera, normal: float) -> None:
+    show(axes, (1.0 - _PALE) * image + _PALE, VIEW)
     for m in maps:
         _draw_finger(axes, hand, m, camera)
     start, end = camera.project(np.array([hand.palm_center, hand.palm_center + normal * hand.palm_normal]))[:, :2]
@@ -134,9 +138,6 @@ def _draw_view(axes: Axes, hand: Hand, maps: list[FingerMap], surface: Surface, 
     axes.annotate("", tuple(end), tuple(start), arrowprops=arrow, zorder=7)
     axes.plot(*start, "o", ms=5, color=style.CHOSEN, zorder=7)
     frame_axes(axes, camera)
-    axes.set_xlim(0, VIEW[0])
-    axes.set_ylim(VIEW[1], 0)
-    axes.set_axis_off()
 
 
 def _draw_finger(axes: Axes, hand: Hand, m: FingerMap, camera: Camera) -> None:

@@ -9,14 +9,15 @@ import numpy as np
 
 from clench.closing.motion import open_posture
 from clench.core.pose import FloatArray, Pose
+from clench.models.appearance import Solid, hand_solids
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 
 from . import style
-from .raster import Camera, halved, rasterise
-from .surfaces import COARSE, Surface, posed_surface
-from .views import GAP, fitted_camera, lit
+from .camera import Camera, fitted_camera, halved
+from .stage import Stage
+from .views import GAP, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,6 +30,8 @@ _TILE: Final = (220, 220)
 _TEXT: Final = 38
 _HEAD: Final = 40
 _PER_ROW: Final = 7
+#: Round shapes are off by at most this in so small pictures [m].
+_COARSE: Final = 5e-4
 
 
 def sheet_height(count: int) -> int:
@@ -57,25 +60,33 @@ def draw_preshapes(
     top = float(sheet_height(len(preshapes)))
     title = "preshapes, before the fingers close: the axis along which the pads oppose best on the way"
     style.write(figure, GAP / width, (top - 8) / height, title, fontsize=12, fontweight="bold", va="top")
+    solids = hand_solids(hand, source, _COARSE)
+    poses = [_posed(hand, solids, shape) for shape in preshapes]
     own = [hand.palm, *(i for finger in hand.fingers for i in finger.links)]
-    surfaces = [
-        posed_surface(
-            hand, open_posture(hand, GraspCommand(Pose.identity(), preshape=shape.angles)), source, np.eye(4), COARSE
-        )
-        for shape in preshapes
-    ]
-    focus = np.concatenate([s.corners[np.isin(s.groups, own)].reshape(-1, 3) for s in surfaces])
-    if not len(focus):
+    kept = [k for k, solid in enumerate(solids) if solid.index in own]
+    points = [p[k][:3, :3] @ solids[k].mesh.vertices.T + p[k][:3, 3:] for p in poses for k in kept]
+    if not points:
         return
+    focus = np.concatenate([corners.T for corners in points])
     scale = min(fitted_camera(d, focus, _TILE, above=above).scale for d in directions)
-    for number, (shape, surface) in enumerate(zip(preshapes, surfaces, strict=True)):
-        row, column = divmod(number, _PER_ROW)
-        left = GAP + column * (_TILE[0] + GAP)
-        bottom = top - _HEAD - row * (_TILE[1] + _TEXT) - _TILE[1]
-        axes = figure.add_axes((left / width, bottom / height, _TILE[0] / width, _TILE[1] / height))
-        camera = fitted_camera(_best_view(shape, directions), focus, _TILE, scale, above)
-        _draw_tile(axes, shape, surface, camera)
-        style.write(figure, left / width, (bottom - 2) / height, _caption(shape), fontsize=8, va="top")
+    with Stage(solids, poses[0]) as stage:
+        for number, (shape, posed) in enumerate(zip(preshapes, poses, strict=True)):
+            stage.pose(posed)
+            row, column = divmod(number, _PER_ROW)
+            left = GAP + column * (_TILE[0] + GAP)
+            bottom = top - _HEAD - row * (_TILE[1] + _TEXT) - _TILE[1]
+            axes = figure.add_axes((left / width, bottom / height, _TILE[0] / width, _TILE[1] / height))
+            camera = fitted_camera(_best_view(shape, directions), focus, _TILE, scale, above)
+            show(axes, halved(stage.picture(camera.doubled()).outlined()), _TILE)
+            _draw_axis(axes, shape, camera)
+            style.write(figure, left / width, (bottom - 2) / height, _caption(shape), fontsize=8, va="top")
+
+
+def _posed(hand: Hand, solids: Sequence[Solid], shape: Preshape) -> FloatArray:
+    """Return where solids are in the palm's frame at a preshape, shape (N, 4, 4)."""
+    poses = hand.link_poses(open_posture(hand, GraspCommand(Pose.identity(), preshape=shape.angles)))
+    found: FloatArray = poses[[solid.index for solid in solids]]
+    return found
 
 
 def best_zone(shape: Preshape) -> int | None:
@@ -91,21 +102,13 @@ def _best_view(shape: Preshape, directions: Sequence[FloatArray]) -> FloatArray:
     return min(directions, key=lambda d: abs(float(d @ shape.axis[zone])) / float(np.linalg.norm(d)))
 
 
-def _draw_tile(axes: Axes, shape: Preshape, surface: Surface, camera: Camera) -> None:
-    double = Camera(
-        camera.right, camera.up, camera.towards, camera.center, 2.0 * camera.scale, 2 * camera.width, 2 * camera.height
-    )
-    image = halved(lit(rasterise(surface.corners, double), surface, double))
-    axes.imshow(image, extent=(0, _TILE[0], _TILE[1], 0), interpolation="nearest")
+def _draw_axis(axes: Axes, shape: Preshape, camera: Camera) -> None:
     zone = best_zone(shape)
     if zone is not None:
         half = 0.5 * shape.aperture[zone] * shape.axis[zone]
         ends = camera.project(np.array([shape.center[zone] - half, shape.center[zone] + half]))[:, :2]
         axes.plot(*ends.T, "-", color=style.PAPER, lw=4.5, solid_capstyle="round")
         axes.plot(*ends.T, "-o", color=style.CONTACT, lw=2.2, ms=5)
-    axes.set_xlim(0, _TILE[0])
-    axes.set_ylim(_TILE[1], 0)
-    axes.set_axis_off()
 
 
 def _caption(shape: Preshape) -> str:

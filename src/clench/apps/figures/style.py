@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 from clench.core.errors import FileError
 from clench.core.files.json_files import check_writable
 from clench.core.visible_text import visible
+from clench.models.appearance import JOINT_COLORS as JOINT_COLORS
+from clench.models.appearance import joint_color as joint_color
+from clench.models.appearance import mixed as mixed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,19 +28,6 @@ OBSTACLE_EDGE: Final = "#6f6f6f"
 PALM_FILL: Final = "#d9d9d9"
 CONTACT: Final = "#d55e00"
 CHOSEN: Final = "#0b7a53"
-#: One colour per joint and the link that it moves, palm side first (after Okabe and Ito).
-JOINT_COLORS: Final = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f5539")
-
-
-def joint_color(position: int) -> str:
-    """Return the colour of a finger's joint by its place from the palm outwards."""
-    return JOINT_COLORS[position % len(JOINT_COLORS)]
-
-
-def mixed(color: str, other: str, share: float) -> str:
-    """Return a colour with a share [-] of another one, both as ``"#rrggbb"``."""
-    pairs = ((int(color[i : i + 2], 16), int(other[i : i + 2], 16)) for i in (1, 3, 5))
-    return "#" + "".join(f"{round((1.0 - share) * a + share * b):02x}" for a, b in pairs)
 
 
 def new_figure(width: int, height: int) -> Figure:

@@ -1,4 +1,4 @@
-"""What figures of a hand from two sides share: layout, camera, light, axes and scale."""
+"""What figures of a hand from several sides share: layout, axes and scale."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from clench.core.pose import FloatArray
+from clench.models.hand.hand import Hand
+from clench.models.hand.understanding.finger_geometry import finger_line
 
 from . import style
-from .raster import Camera, Image, Picture, borders, look_along, shade
-from .surfaces import Surface
+from .camera import Camera, Image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,6 +39,15 @@ def palm_views(normal: FloatArray, stretch: FloatArray) -> tuple[list[FloatArray
     return [normal + 0.25 * side + 0.2 * above, side + 0.35 * normal + 0.2 * above], above
 
 
+def hand_sides(hand: Hand) -> tuple[list[FloatArray], FloatArray]:
+    """Return from where an open hand is seen, a little aslant of its palm and of its side, and what is up."""
+    q = hand.open_angles()
+    fingers = [finger for finger in hand.fingers if not finger.is_thumb] or list(hand.fingers)
+    lines = [finger_line(hand, finger, q) for finger in fingers]
+    stretch = np.mean([line.tip - line.anchors[0] for line in lines], axis=0)
+    return palm_views(hand.palm_normal, stretch)
+
+
 def two_views(text: int, below: int = 0) -> tuple[Figure, list[Axes]]:
     """Return a figure with two square views, room for text to the right of them, and room below, in pixels."""
     width, height = 2 * VIEW[0] + text + 4 * GAP, VIEW[1] + _TOP + _BOTTOM + below
@@ -56,34 +66,13 @@ def two_views(text: int, below: int = 0) -> tuple[Figure, list[Axes]]:
     return figure, views
 
 
-def fitted_camera(
-    towards: FloatArray,
-    focus: FloatArray,
-    size: tuple[int, int],
-    scale: float | None = None,
-    above: FloatArray | None = None,
-) -> Camera:
-    """Return a camera that shows all points of the focus, as large as the picture allows or at a given scale.
-
-    Args:
-        towards: from the scene to the viewer. focus: shape (N, 3) [m]. size: in pixels. scale: pixels per metre.
-        above: what is up in the picture; the world's z axis by default.
-    """
-    right, up, back = look_along(towards, np.array([0.0, 0.0, 1.0]) if above is None else above)
-    across = np.column_stack([focus @ right, focus @ up])
-    low, high = across.min(axis=0), across.max(axis=0)
-    fitting = float((0.9 * np.array(size) / np.maximum(high - low, 1e-6)).min())
-    middle = 0.5 * (low + high)
-    center = right * middle[0] + up * middle[1]
-    return Camera(right, up, back, center, scale or fitting, *size)
-
-
-def lit(picture: Picture, surface: Surface, camera: Camera) -> Image:
-    """Return a surface shaded, with dark lines around its bodies."""
-    image = shade(picture, surface.normals, surface.colors, camera)
-    edge = borders(picture, surface.groups, 4e-3) & (picture.triangle >= 0)
-    image[edge] *= np.float32(0.45)
-    return image
+def show(axes: Axes, image: Image, size: tuple[int, int]) -> None:
+    """Fill axes with an image; their coordinates are pixels of a view of this size, rows downwards."""
+    width, height = size
+    axes.imshow(image, extent=(0, width, height, 0), interpolation="nearest")
+    axes.set_xlim(0, width)
+    axes.set_ylim(height, 0)
+    axes.set_axis_off()
 
 
 def frame_axes(axes: Axes, camera: Camera, height: int = VIEW[1]) -> None:

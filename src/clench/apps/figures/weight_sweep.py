@@ -9,9 +9,11 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 import clench
 from clench.core.errors import CommandError
+from clench.core.pose import FloatArray
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -20,9 +22,11 @@ from clench.solver.analysis.examples import solve_scores
 from clench.solver.solution import GraspSolution
 
 from . import style
-from .hand_view import render, viewpoints
-from .surfaces import COARSE, hand_surface, object_surface
-from .views import fitted_camera
+from .camera import Image, fitted_camera
+from .contact_labels import dot, photograph
+from .stage import Stage, solution_poses, solution_solids
+from .viewpoints import focus_of, viewpoints
+from .views import show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,13 +84,14 @@ def draw_sweep(
     title = f"{hand.name} on {obj.name}: how much {criteria[0]} counts decides which grasp is chosen"
     style.write(figure, 0.5, 1.0 - 22 / height, title, fontsize=13, ha="center")
     ends = (0, len(solutions) - 1)
-    surfaces = [(hand_surface(hand, s, COARSE).corners, object_surface(obj, s, COARSE).corners) for s in solutions]
-    focus = np.concatenate([surfaces[k][0].reshape(-1, 3) for k in ends] + [surfaces[0][1].reshape(-1, 3)])
-    towards = viewpoints(*surfaces[-1], focus, solutions[-1])[0]
+    panels = _photographs(hand, obj, [solutions[k] for k in ends])
     for place, k in enumerate(ends):
         left = _PLOT + 20 + place * (_PICTURE[0] + 40)
         axes = figure.add_axes((left / width, 5 / height, _PICTURE[0] / width, _PICTURE[1] / height))
-        _draw_grasp(axes, hand, obj, solutions[k], towards, focus)
+        image, points, hidden = panels[place]
+        show(axes, image, _PICTURE)
+        for (x, y), behind in zip(points, hidden, strict=True):
+            dot(axes, float(x), float(y), bool(behind), 7.0)
         scores = solve_scores(solutions[k])
         told = ", ".join(f"{n} {scores[n]:.3g} {find_criterion(n, 'sweep').unit}" for n in criteria)
         head = f"{letters[k]}, chosen at weight {weights[k]:g}" + (_changed(solutions) if place else "")
@@ -132,15 +137,21 @@ def _draw_values(plot: Axes, values: Sequence[float], weights: Sequence[float], 
     plot.grid(alpha=0.3, axis="y")
 
 
-def _draw_grasp(
-    axes: Axes, hand: Hand, obj: GraspObject, solution: GraspSolution, towards: np.ndarray, focus: np.ndarray
-) -> None:
-    camera = fitted_camera(towards, focus, _PICTURE)
-    image, _ = render(hand_surface(hand, solution), object_surface(obj, solution), camera)
-    axes.imshow(image, extent=(0, _PICTURE[0], _PICTURE[1], 0), interpolation="nearest")
-    points = np.array([c.position for c in solution.contacts if not c.passed]).reshape(-1, 3)
-    at = camera.project(points)[:, :2]
-    axes.plot(at[:, 0], at[:, 1], "o", ms=7, mfc=style.CONTACT, mec=style.PAPER, mew=1.4)
-    axes.set_xlim(0, _PICTURE[0])
-    axes.set_ylim(_PICTURE[1], 0)
-    axes.set_axis_off()
+def _photographs(
+    hand: Hand, obj: GraspObject, solutions: Sequence[GraspSolution]
+) -> list[tuple[Image, FloatArray, NDArray[np.bool_]]]:
+    """Return the image of every grasp from one side, and where its contacts are in it, with those that are hidden."""
+    solids = solution_solids(hand, obj, solutions[0])
+    poses = [solution_poses(hand, solids, solution) for solution in solutions]
+    places = [np.array([c.position for c in s.contacts if not c.passed]).reshape(-1, 3) for s in solutions]
+    found = []
+    with Stage(solids, poses[-1]) as stage:
+        focus = focus_of(stage)
+        towards = viewpoints(stage, focus, places[-1], 1)[0]
+        stage.pose(poses[0])
+        camera = fitted_camera(towards, np.concatenate([focus, focus_of(stage)]), _PICTURE)
+        for posed, points in zip(poses, places, strict=True):
+            stage.pose(posed)
+            image, _, hidden = photograph(stage, camera, points)
+            found.append((image, camera.project(points)[:, :2], hidden))
+    return found

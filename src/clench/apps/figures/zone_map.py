@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from clench.core.pose import FloatArray
+from clench.models.appearance import SolidKind
 from clench.models.hand.hand import Hand
-from clench.models.hand.understanding.finger_geometry import finger_line
 from clench.solver.preshapes.preshapes import APERTURES, Preshape, opposition_zones
 
 from . import style
-from .raster import Camera, halved, rasterise
-from .surfaces import posed_surface, without_forearm
-from .views import GAP, VIEW, fitted_camera, frame_axes, lit, palm_views, scale_bar, two_views
+from .camera import Camera, fitted_camera, halved
+from .stage import Stage
+from .views import GAP, VIEW, frame_axes, hand_sides, scale_bar, show, two_views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,22 +44,18 @@ def draw_zones(hand: Hand, path: Path) -> Path:
     style.check_figure(path)
     shapes = opposition_zones(hand)
     zones = np.array([zone for shape in shapes for zone in _best(shape)]).reshape(-1, 7)
-    surface = without_forearm(hand, posed_surface(hand, hand.open_angles(), hand.default_source, np.eye(4)))
     ends = _ends(zones)
-    focus = np.concatenate([surface.coarse(2e-3).reshape(-1, 3), ends.reshape(-1, 3)])
     figure, views = two_views(_TEXT)
-    directions, above = _sides(hand)
-    scale = min(fitted_camera(d, focus, VIEW, above=above).scale for d in directions)
-    for axes, direction in zip(views, directions, strict=True):
-        double = fitted_camera(direction, focus, (2 * VIEW[0], 2 * VIEW[1]), 2.0 * scale, above)
-        image = halved(lit(rasterise(surface.corners, double), surface, double))
-        axes.imshow((1.0 - _PALE) * image + _PALE, extent=(0, VIEW[0], VIEW[1], 0), interpolation="nearest")
-        camera = fitted_camera(direction, focus, VIEW, scale, above)
-        _draw(axes, zones, ends, camera)
-        frame_axes(axes, camera)
-        axes.set_xlim(0, VIEW[0])
-        axes.set_ylim(VIEW[1], 0)
-        axes.set_axis_off()
+    directions, above = hand_sides(hand)
+    with Stage.open(hand) as stage:
+        focus = np.concatenate([stage.points(SolidKind.HAND), ends.reshape(-1, 3)])
+        scale = min(fitted_camera(d, focus, VIEW, above=above).scale for d in directions)
+        for axes, direction in zip(views, directions, strict=True):
+            camera = fitted_camera(direction, focus, VIEW, scale, above)
+            image = halved(stage.picture(camera.doubled(), without=(SolidKind.FOREARM,)).outlined())
+            show(axes, (1.0 - _PALE) * image + _PALE, VIEW)
+            _draw(axes, zones, ends, camera)
+            frame_axes(axes, camera)
     scale_bar(views[0], scale)
     _explain(figure, hand, shapes, len(zones))
     return style.save_figure(figure, path)
@@ -78,15 +74,6 @@ def _ends(zones: FloatArray) -> FloatArray:
     """Return where the pads of zones are [m], shape (Z, 2, 3)."""
     half = 0.5 * zones[:, 6:] * zones[:, 3:6]
     return np.stack([zones[:, :3] - half, zones[:, :3] + half], axis=1)
-
-
-def _sides(hand: Hand) -> tuple[list[FloatArray], FloatArray]:
-    """Return from where the hand is seen, a little aslant of its palm and of its side, and what is up."""
-    q = hand.open_angles()
-    fingers = [finger for finger in hand.fingers if not finger.is_thumb] or list(hand.fingers)
-    lines = [finger_line(hand, finger, q) for finger in fingers]
-    stretch = np.mean([line.tip - line.anchors[0] for line in lines], axis=0)
-    return palm_views(hand.palm_normal, stretch)
 
 
 def _draw(axes: Axes, zones: FloatArray, ends: FloatArray, camera: Camera) -> None:

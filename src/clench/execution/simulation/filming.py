@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import io
-import os
-import sys
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +13,8 @@ import numpy as np
 
 from clench.core.errors import ClenchError, FileError
 from clench.core.files.json_files import check_folder, check_writable, write_atomically
-from clench.core.opengl import import_mujoco, why_not_drawn
+from clench.core.offscreen import Offscreen
+from clench.core.opengl import OpenGLError, import_mujoco, open_context
 from clench.core.short_repr import short_repr
 
 from .mujoco_scene import Scene
@@ -23,9 +22,7 @@ from .mujoco_scene import Scene
 #: Time between two pictures [s]; a GIF counts hundredths.
 FRAME: Final = 0.04
 _WIDTH, _HEIGHT = 640, 480
-_NO_OPENGL: Final = (
-    "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1 and set MUJOCO_GL=egl."
-)
+_NO_OPENGL: Final = "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1."
 #: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
 _DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
 #: How much higher it looks where the palm moves up [m].
@@ -36,7 +33,7 @@ _UP: Final = 0.05
 class Film:
     """Take pictures of a simulation and write them.
 
-    Drawing needs OpenGL: without a screen set MUJOCO_GL=egl before anything of MuJoCo is imported.
+    Drawing needs OpenGL. Without a screen, Mesa's EGL or OSMesa draws.
 
     Args:
         video: a GIF or MP4 file, at the speed of the simulation; MP4 needs `clench[video]`.
@@ -68,9 +65,11 @@ class Film:
             check_writable(self.video)
         if self.stills is not None:
             check_folder(self.stills)
-        problem = why_not_drawn() if self.video or self.stills else None
-        if problem is not None:
-            raise ClenchError(_NO_OPENGL.format(problem))
+        if self.video or self.stills:
+            try:
+                open_context(_WIDTH, _HEIGHT).free()
+            except OpenGLError as error:
+                raise ClenchError(_NO_OPENGL.format(error)) from None
 
     def begin(self, scene: Scene, data: Any) -> None:
         """Point the camera at the hand and the object.
@@ -79,14 +78,9 @@ class Film:
             ClenchError: there is no OpenGL to draw with.
         """
         mujoco = import_mujoco()
-        headless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-        if headless and mujoco.GLContext.__module__ == "mujoco.glfw":
-            # The engine's default, unless told otherwise when it was imported: it needs a screen, and ends the program
-            # where there is none.
-            raise ClenchError(_NO_OPENGL.format("there is no screen"))
         try:
-            self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
-        except Exception as error:  # whatever the graphics library raises
+            self._renderer = Offscreen(scene.model, _WIDTH, _HEIGHT)
+        except OpenGLError as error:
             raise ClenchError(_NO_OPENGL.format(error)) from None
         links = [body for body in scene.link_bodies if body >= 0]
         places = np.vstack([data.xipos[links], *(_corners(scene.model, data, geom) for geom in scene.object_geoms)])
@@ -141,8 +135,8 @@ class Film:
     def _drawn(self, data: Any) -> Any:
         from PIL import Image
 
-        self._renderer.update_scene(data, self._camera)
-        return Image.fromarray(self._renderer.render())
+        self._renderer.update(data, self._camera)
+        return Image.fromarray(self._renderer.draw()[0])
 
 
 def _corners(model: Any, data: Any, geom: int) -> Any:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.core import display
+from clench.core.display import Displayed
 from clench.core.errors import CommandError, UnknownNameError
 from clench.core.keeping import Keeper
 from clench.core.pose import FloatArray
@@ -159,7 +161,7 @@ class Finger:
 
 
 @dataclass(frozen=True)
-class Hand(Keeper):
+class Hand(Keeper, Displayed):
     """A robot hand, as read from a model file: links, joints, couplings, and the fingers found in them.
 
     Links are sorted so that parents come first. Palm-frame quantities are at the reference posture.
@@ -199,6 +201,10 @@ class Hand(Keeper):
     findings: tuple[Finding, ...] = ()
     spec_xml: str = ""
     assets: Mapping[str, bytes] = field(default_factory=dict)
+
+    def show(self) -> Path | None:
+        """Show the hand as a page, on which it closes; see `GraspSolution.show`."""
+        return display.show(self)
 
     def __repr__(self) -> str:
         return described(

@@ -1,0 +1,1 @@
+"""Pages that show grasps in a browser: one file each, with everything in it."""
