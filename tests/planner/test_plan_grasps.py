@@ -1,6 +1,7 @@
 """Planned grasps are what they are said to be, judged without the planner."""
 
 import itertools
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from clench.execution.simulation.hold import Hold
 from clench.execution.simulation.pulling import hold_and_pull
 from clench.models.objects.obstacles import table
 from clench.planner.options import PlanOptions
+from clench.planner.rejections import Rejection
 from clench.planner.search import GraspSearch
 
 
@@ -310,3 +312,17 @@ def test_a_search_without_a_grasp_still_has_a_plan(hand, mug):
     search = GraspSearch(hand, mug, PlanOptions(count=1, most=64, min_fingers=5, kinds=["precision"], path=False))
     list(search)
     assert search.plan().proposed == 64 or len(search.plan())
+
+
+def test_every_rejected_proposal_is_told_with_its_place(hand, mug):
+    search = clench.iter_grasps(hand, mug, 3, path=False, seed=3)
+    told = []
+    search.tell_rejected(told.append)
+    assert len([*search]) == 3
+    later = {Rejection.ALIKE, Rejection.NO_SQUEEZE, Rejection.NO_WAY, Rejection.NOT_ROBUST}
+    expected = {reason: n for reason, n in search.plan().rejected.items() if n and Rejection(reason) not in later}
+    assert Counter(each.reason.value for each in told) == expected
+    stopped = [each for each in told if each.reason is Rejection.STOPPED]
+    assert stopped
+    far = [np.linalg.norm(each.T_object_palm.position) for each in stopped]
+    assert max(far) < 0.5, "the place is where the hand stopped, near the object"

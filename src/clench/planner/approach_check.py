@@ -25,15 +25,15 @@ SHORT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Approached:
-    """Proposals that arrive, and how many were stopped.
+    """Proposals that arrive, and those that are stopped, all with the palm where it stops.
 
     Args:
-        proposals: with the palm where it stops. stopped: by the object before its place. obstacle: by an obstacle.
+        proposals: that arrive. stopped: by the object before their place. obstacle: by an obstacle.
     """
 
     proposals: Proposals
-    stopped: int
-    obstacle: int
+    stopped: Proposals
+    obstacle: Proposals
 
 
 @dataclass(eq=False)
@@ -79,5 +79,5 @@ class Approach:
         arrives = (go >= -SHORT) & ~obstacle
         moved = proposals.T_object_palm.copy()
         moved[:, :3, 3] += go[:, None] * (moved[:, :3, :3] @ self.hand.palm_normal)
-        placed = Proposals(proposals.arm, moved, proposals.center).taken(arrives)
-        return Approached(placed, int((~arrives & ~obstacle).sum()), int(obstacle.sum()))
+        placed = Proposals(proposals.arm, moved, proposals.center)
+        return Approached(placed.taken(arrives), placed.taken(~arrives & ~obstacle), placed.taken(obstacle))

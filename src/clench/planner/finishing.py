@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -25,7 +24,7 @@ from clench.solver.solve import solve
 from .confidence import shipped_table
 from .grasp_plan import PlannedGrasp, UnfinishedGrasp
 from .options import PlanOptions
-from .rejections import Rejection
+from .rejections import Fallen, Rejection
 from .trials import FRICTION_SHARES, Closer, Trial
 
 #: A squeeze under gravity also resists pulls and twists of at least this multiple of the weight [-].
@@ -51,7 +50,7 @@ class Finisher:
         """Note how contacts are modelled."""
         self._model: dict[str, Any] = {"contact_model": self.asked.model, "torsion": self.asked.torsion}
 
-    def finish(self, trial: Trial, rejected: Counter[Rejection]) -> PlannedGrasp | None:
+    def finish(self, trial: Trial, rejected: Fallen) -> PlannedGrasp | None:
         """Return the completed grasp; None where something is missing, which is counted."""
         T_world_palm = Pose.from_matrix(self.obj.pose.matrix @ trial.T_object_palm)
         command = replace(self.closer.command(trial.arm), hand_pose=T_world_palm)

@@ -109,6 +109,21 @@ class UnfinishedGrasp:
 
 
 @dataclass(frozen=True, eq=False)
+class RejectedProposal:
+    """A proposal that came to nothing, where it did.
+
+    Args:
+        T_object_palm: where the palm was. preshape: its name. angles: what it sets [rad], by joint name.
+        reason: what it fell for.
+    """
+
+    T_object_palm: Pose
+    preshape: str
+    angles: Mapping[str, float]
+    reason: Rejection
+
+
+@dataclass(frozen=True, eq=False)
 class GraspPlan(Displayed):
     """Grasps of an object, the best ones first, and what became of all proposals.
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable
 from enum import StrEnum
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from .proposals import Proposals
 
 
 class Rejection(StrEnum):
@@ -59,3 +64,16 @@ HELP: Final = {
     Rejection.NO_SQUEEZE: "A lighter object, more friction or stronger joints would help.",
     Rejection.NO_WAY: "Links meet on the way; the grasps may be used without a path: path=False.",
 }
+
+
+class Fallen(Counter[Rejection]):
+    """Count the proposals that came to nothing, and tell a listener which they are."""
+
+    #: Is called with the reason and the proposals that fell for it.
+    tell: Callable[[Rejection, Proposals], None] | None = None
+
+    def fall(self, reason: Rejection, proposals: Proposals) -> None:
+        """Count proposals for a reason."""
+        self[reason] += len(proposals)
+        if self.tell is not None and len(proposals):
+            self.tell(reason, proposals)

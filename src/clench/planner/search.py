@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from bisect import insort
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -25,11 +25,11 @@ from clench.solver.preshapes.preshapes import Preshape, opposition_zones
 
 from .approach_check import Approach
 from .finishing import Finisher
-from .grasp_plan import GraspPlan, PlannedGrasp, UnfinishedGrasp
+from .grasp_plan import GraspPlan, PlannedGrasp, RejectedProposal, UnfinishedGrasp
 from .options import PlanOptions, is_reached
 from .pairs import opposing_pairs
 from .proposals import Arm, Proposals, Proposer
-from .rejections import Rejection
+from .rejections import Fallen, Rejection
 from .trials import Closer, Trial
 
 #: Proposals of the first round, and of a round at most; every round has twice as many as the one before.
@@ -55,7 +55,7 @@ class GraspSearch:
     hand: Hand
     obj: GraspObject
     asked: PlanOptions
-    rejected: Counter[Rejection] = field(default_factory=Counter)
+    rejected: Fallen = field(default_factory=Fallen)
     proposed: int = 0
     closed: int = 0
     force_closed: int = 0
@@ -110,6 +110,16 @@ class GraspSearch:
         """Call a function from now on with every grasp that lacks a squeeze or a path, which the plan leaves out."""
         self._finisher.tell = tell
 
+    def tell_rejected(self, tell: Callable[[RejectedProposal], None]) -> None:
+        """Call a function from now on with every proposal that comes to nothing before it is a grasp."""
+
+        def describe(reason: Rejection, proposals: Proposals) -> None:
+            for number, T_object_palm in zip(proposals.arm.tolist(), proposals.T_object_palm, strict=True):
+                shape = self.shapes[self.arms[number].shape]
+                tell(RejectedProposal(Pose.from_matrix(T_object_palm), shape.name, shape.angles, reason))
+
+        self.rejected.tell = describe
+
     def plan(self) -> GraspPlan:
         """Return what was found so far, the best grasps first."""
         return GraspPlan(
@@ -142,8 +152,8 @@ class GraspSearch:
         first, self.proposed = self.proposed, self.proposed + count
         marks.append(time.perf_counter())
         came = self._approach.bring_up(proposals, self.arms, self.threads)
-        self.rejected[Rejection.STOPPED] += came.stopped
-        self.rejected[Rejection.OBSTACLE] += came.obstacle
+        self.rejected.fall(Rejection.STOPPED, came.stopped)
+        self.rejected.fall(Rejection.OBSTACLE, came.obstacle)
         arrived = self._reached(came.proposals)
         marks.append(time.perf_counter())
         trials, scores = self._closer.close(arrived, first, self.rejected)
@@ -163,14 +173,14 @@ class GraspSearch:
         way = np.asarray(self.asked.approach, dtype=np.float64)
         along = (self.obj.pose.rotation @ proposals.T_object_palm[:, :3, :3]) @ self.hand.palm_normal
         fits = along @ way / np.linalg.norm(way) >= np.cos(self.asked.approach_angle)
-        self.rejected[Rejection.DIRECTION] += int((~fits).sum())
+        self.rejected.fall(Rejection.DIRECTION, proposals.taken(~fits))
         return proposals.taken(fits)
 
     def _reached(self, proposals: Proposals) -> Proposals:
         if self.asked.reachable is None or not len(proposals):
             return proposals
         reached = is_reached(self.asked.reachable, self.obj.pose.matrix @ proposals.T_object_palm)
-        self.rejected[Rejection.UNREACHABLE] += int((~reached).sum())
+        self.rejected.fall(Rejection.UNREACHABLE, proposals.taken(~reached))
         return proposals.taken(reached)
 
     def _finish(self, due: int) -> Iterator[PlannedGrasp]:

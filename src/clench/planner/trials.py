@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,7 +23,7 @@ from clench.solver.solution import FingerStatus, SolutionStatus
 
 from .options import PlanOptions
 from .proposals import Arm, Proposals, vary
-from .rejections import Rejection
+from .rejections import Fallen, Rejection
 
 #: The score is a mean of bounds at these shares of the lowest friction, so that a margin in it counts [-].
 FRICTION_SHARES = (0.5, 1.0)
@@ -90,7 +89,7 @@ class Closer:
         angles = self.shapes[arm.shape].angles
         return GraspCommand(hand_pose=Pose.identity(), preshape=angles, fingers=fingers, planes=1)
 
-    def close(self, proposals: Proposals, first: int, rejected: Counter[Rejection]) -> tuple[list[Trial], FloatArray]:
+    def close(self, proposals: Proposals, first: int, rejected: Fallen) -> tuple[list[Trial], FloatArray]:
         """Close at proposals; return those that may be grasps, and a score of every proposal, 0 for no use, (N,).
 
         Args:
@@ -101,7 +100,7 @@ class Closer:
         for a in np.unique(proposals.arm).tolist():
             rows = np.flatnonzero(proposals.arm == a)
             batch = self.solve(self.arms[a], proposals.T_object_palm[rows])
-            found = self._tried(batch, self.arms[a], proposals.T_object_palm[rows], first + rows, rejected)
+            found = self._tried(batch, self.arms[a], proposals.taken(rows), first + rows, rejected)
             for trial in found:
                 scores[trial.number - first] = trial.score
             trials += found
@@ -145,7 +144,7 @@ class Closer:
         return np.mean(found, axis=0), found[-1]
 
     def _tried(
-        self, batch: GraspBatch, arm: Arm, T: FloatArray, numbers: NDArray[np.intp], rejected: Counter[Rejection]
+        self, batch: GraspBatch, arm: Arm, proposals: Proposals, numbers: NDArray[np.intp], rejected: Fallen
     ) -> list[Trial]:
         score, bound = self.bounds(batch)
         kinds = contact_kinds(self.hand, batch.contacts.first, batch.contacts.link, self._counted(batch)[1])
@@ -165,9 +164,9 @@ class Closer:
         )
         left = np.ones(len(batch), dtype=np.bool_)
         for falls, reason in checks:
-            rejected[reason] += int((left & falls).sum())
+            rejected.fall(reason, proposals.taken(left & falls))
             left &= ~falls
-        rows = np.flatnonzero(left)
+        rows, T = np.flatnonzero(left), proposals.T_object_palm
         places = self._places(batch.joint_angles[rows], T[rows])
         return [
             Trial(

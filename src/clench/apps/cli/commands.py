@@ -20,6 +20,7 @@ from .objects import object_
 from .parsing import as_range
 from .plan_command import plan
 from .scene_options import with_scene
+from .view import view
 
 if TYPE_CHECKING:
     from clench.models.command import GraspCommand
@@ -339,6 +340,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "solve": solve,
     "plan": plan,
+    "view": view,
     "batch": batch,
     "generate": generate,
     "hand": hand,

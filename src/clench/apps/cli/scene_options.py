@@ -44,6 +44,27 @@ def with_scene(
     return scene
 
 
+def scene_code(
+    obj: GraspObject, object_pose: Pose | None, table: tuple[float, ...] | None, obstacles: Sequence[str]
+) -> tuple[str, ...]:
+    """Return Python that adds to `obj` what `with_scene` adds, which has checked it."""
+    from clench.apps.viewer.scene_code import pose_code
+
+    if table is None and not obstacles:
+        return ()
+    posed = obj if object_pose is None else obj.posed(object_pose)
+    lines = [f"T_object_world = {pose_code(posed.pose)}.inverse()"]
+    if table is not None:
+        x, y, _ = posed.pose.position.tolist()
+        place = f"T_object_world @ clench.Pose([{x!r}, {y!r}, 0.0])"
+        lines.append(f"obj = obj.with_body(clench.table({_height(posed, table)!r}).moved({place}))")
+    for number, text in enumerate(obstacles, start=1):
+        _, pose = _obstacle(text, number)
+        other = f"clench.GraspObject.load({text.rpartition('@')[0]!r})"
+        lines.append(f'obj = obj.with_object({other}, T_object_world @ {pose_code(pose)}, "obstacle")')
+    return tuple(lines)
+
+
 def _height(obj: GraspObject, table: tuple[float, ...]) -> float:
     from clench.execution.simulation.mujoco_scene import lowest
 

@@ -38,7 +38,7 @@ def hold_as_collided(
     collided = _collided(obj, show)
     if collided is None:
         return hold_and_pull(solution, hand, obj, hold, trajectory, **options)
-    again = solve(hand, collided, _command(solution, hand))
+    again = solve(hand, collided, command_of(solution, hand))
     if again.status is not SolutionStatus.GRASP:
         report = hold_and_pull(solution, hand, obj, hold, trajectory, **options)
         note = "Solved again on the convex pieces that the simulation collides, it is no grasp: this is of the mesh's."
@@ -63,8 +63,8 @@ def _collided(obj: GraspObject, show_progress: bool) -> GraspObject | None:
     return None if same else collided
 
 
-def _command(solution: GraspSolution, hand: Hand) -> GraspCommand:
-    """Return the command that a solution answers, over the full width."""
+def command_of(solution: GraspSolution, hand: Hand) -> GraspCommand:
+    """Return the command that a solution of a hand answers, over the full width, without its next steps."""
     followers = {coupling.follower for coupling in hand.couplings}
     free = [name for number, name in enumerate(hand.joint_names) if number not in followers]
     best = [finger.best for finger in solution.fingers.values()]

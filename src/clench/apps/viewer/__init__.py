@@ -1,0 +1,1 @@
+"""A page in the browser that solves while the user drags."""
