@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from clench.core.errors import ObjectError
+from clench.execution.simulation import decomposing
 from clench.execution.simulation.convex_pieces import SETTINGS
-from clench.execution.simulation.simulated_hand import decomposing
 from clench.models.mesh import TriangleMesh
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

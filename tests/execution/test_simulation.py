@@ -13,10 +13,10 @@ from clench.core.errors import CommandError, HandError, ObjectError
 from clench.core.pose import Pose
 from clench.execution.executing import execute
 from clench.execution.report import ExecutionReport
+from clench.execution.simulation import convex_pieces as convex_pieces_module
 from clench.execution.simulation.convex_pieces import convex_pieces
 from clench.execution.simulation.mujoco_scene import body_pose, build_scene
 from clench.execution.simulation.simulated_hand import SimulatedHand, nearest
-from clench.execution.simulation.simulated_hand import convex_pieces as convex_pieces_module
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh

@@ -6,7 +6,8 @@ from kernel_entries import entry
 from scipy.spatial.transform import Rotation
 
 from clench.core.pose import Pose
-from clench.kernels.geometry import closest, crossing
+from clench.kernels.geometry import core_distance as closest
+from clench.kernels.geometry import crossing
 from clench.kernels.geometry.crossing import DEEP
 from clench.models.shapes import Shape, ShapeKind
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.kernels.closing.close_item import cuda_closing
+from clench.kernels.closing import cuda_closing
 
 
 def test_the_simulator_gives_the_answers_of_the_cpu() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from kernel_solids import ball, box, hull, moved, star, torus
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.geometry import distance
+from clench.kernels.geometry import mesh_distance as distance
 from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.geometry.mesh_distance import (
     closest_on_triangle,

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.toi import earliest
+from clench.kernels.toi import toi_bounds as earliest
 from kernels.kernel_entries import entry
 
 turn_measure, measure_of = entry(earliest.turn_measure), entry(earliest.measure_of)

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.toi import parting, stage_sweep
+from clench.kernels.toi import separating_planes as parting
+from clench.kernels.toi import toi_links as stage_sweep
 from kernels.kernel_entries import entry
 
 lane_of, lanes_apart = entry(stage_sweep.lane_of), entry(parting.lanes_apart)

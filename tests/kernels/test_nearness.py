@@ -10,7 +10,7 @@ from clench.core.pose import rotation_about
 from clench.kernels.geometry.bodies import Elements, pack_bodies
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.smallest_gap import link_gap, smallest_gap
-from clench.kernels.toi import sweeping
+from clench.kernels.toi import toi_work as sweeping
 from kernels.kernel_entries import entry
 
 make_sweep_work, bodies_overlap = entry(sweeping.make_sweep_work), entry(sweeping.bodies_overlap)

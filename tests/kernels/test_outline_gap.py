@@ -8,7 +8,8 @@ from kernel_entries import entry
 from scipy.spatial import cKDTree
 
 from clench.kernels.closing.layout import KIND_EDGE, KIND_SIDE, KIND_TIP, RUN, Outline, SectionArrays, Work
-from clench.kernels.sections import family_section, outline_gap
+from clench.kernels.sections import outline_gap
+from clench.kernels.sections import plane_sections as family_section
 
 outline_distance, core_distance = entry(outline_gap.outline_distance), entry(outline_gap.core_distance)
 round_distance, put_circles = entry(outline_gap.round_distance), entry(family_section.put_circles)

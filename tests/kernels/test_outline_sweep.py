@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from clench.closing.outlines import RoundedOutline
 from clench.closing.plan_packing import enclosing
 from clench.kernels.closing.layout import Outline, SectionArrays, Work
-from clench.kernels.sections import family_section, outline_sweep
+from clench.kernels.sections import outline_sweep
+from clench.kernels.sections import plane_sections as family_section
 from kernels.kernel_entries import entry
 from oracle.adapter import solve_planar
 from oracle.cases import placed_vertices, random_finger

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.closing.close_item import touches
+from clench.kernels.closing import contact_reading as touches
 from clench.kernels.closing.layout import RoundArrays
 from kernels.kernel_entries import entry
 

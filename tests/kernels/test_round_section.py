@@ -6,7 +6,8 @@ from kernel_entries import entry
 
 from clench.core.pose import Pose
 from clench.kernels.closing.layout import RoundArrays
-from clench.kernels.sections import conics, family_section
+from clench.kernels.sections import conics
+from clench.kernels.sections import plane_sections as family_section
 from clench.kernels.sections.section import cut_mesh
 from clench.models.shapes import Shape, ShapeKind
 

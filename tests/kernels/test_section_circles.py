@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from clench.kernels.closing.layout import RUN
-from clench.kernels.sections import family_section
+from clench.kernels.sections import plane_sections as family_section
 from clench.kernels.sections.plane_sections import make_sections
 from kernels.kernel_entries import entry
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.closing.close_item import segments
+from clench.kernels.closing import segments
 from clench.kernels.closing.layout import ChainArrays
 from clench.kernels.closing.segments import ALL
 from kernels.kernel_entries import entry

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.toi import earliest
+from clench.kernels.toi import toi_bounds as earliest
 from clench.kernels.toi.separating import OVERLAP
 from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry

@@ -8,8 +8,8 @@ import pytest
 import clench
 from clench.apps.cli.demo import MUG_POSE
 from clench.core.pose import Pose
-from clench.kernels.closing.close_item import contact_reading as touches
-from clench.kernels.closing.close_item import solve_poses
+from clench.kernels.closing import contact_reading as touches
+from clench.kernels.closing import solve_poses
 from clench.kernels.geometry import link_frames as frames
 from clench.kernels.geometry import link_meshes
 from clench.kernels.runtime import warming

@@ -15,7 +15,8 @@ from clench.closing.packed_problem import pack_problem
 from clench.core.errors import CommandError
 from clench.core.pose import Pose
 from clench.scoring import criterion_registry
-from clench.solver import alternatives, single
+from clench.solver import alternatives
+from clench.solver import pose_solver as single
 from clench.solver.planning import plan_hand
 from clench.solver.problem import make_problem
 

@@ -11,10 +11,10 @@ import pytest
 import clench
 from clench.core.errors import ClenchError, CommandError
 from clench.core.pose import Pose
+from clench.solver.batch import batch_progress
 from clench.solver.batch.batch_solver import BatchSolver
 from clench.solver.batch.grasp_batch import GraspBatch
-from clench.solver.batch.solve_batch import batch_progress
-from clench.solver.preshapes.preshapes import posture_choice
+from clench.solver.preshapes import posture_choice
 
 HANDS = {name: clench.Hand.load(name) for name in ("robonaut2", "patent15")}
 BOX = "box:x=0.05,y=0.06,z=0.08"

@@ -8,7 +8,7 @@ import pytest
 import clench
 from clench import ClosingOrder, GraspCommand, Pose
 from clench.core.errors import ClenchError
-from clench.solver import checked as module
+from clench.solver import checked_command as module
 from clench.solver.checked_command import checked
 
 HAND = clench.Hand.load("patent15")

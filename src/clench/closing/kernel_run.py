@@ -63,10 +63,12 @@ def solve_packed(
         _close_on_device(problem, T_palm_object, answers.closed)
     first = BLOCK if on_device else CLOSE | BLOCK
     # A few more parts than threads, as poses that touch nothing are quick.
-    ends = np.linspace(0, count, (1 if threads == 1 else max(min(count, 4 * threads), 1)) + 1).astype(int).tolist()
+    parts = 1 if threads == 1 else max(min(count, 4 * threads), 1)
+    ends = [count * k // parts for k in range(parts + 1)]
 
     def run(span: tuple[int, int]) -> None:
-        some, T = answers.at(slice(*span)), T_palm_object[slice(*span)]
+        some = answers if parts == 1 else answers.at(slice(*span))
+        T = T_palm_object[slice(*span)]
         if choose is None:
             run_stages(problem, T, some, first | CHOOSE | FINISH)
             return
