@@ -78,3 +78,16 @@ def test_pads_may_be_indented():
         assert judged.feasible is feasible
     (rigid,) = judge([at(touch + 0.015)], measure=True)
     assert rigid.feasible is False
+
+
+def test_joints_that_close_at_once_may_pass_through_something_on_the_way():
+    """The bead lies on the second link when both joints are half closed; the end is far from it."""
+    hand = chain([CLOSING, CLOSING])
+    plan = plan_finger(hand, hand.fingers[0], np.zeros(2), 3, CollisionSource.ENGINE)
+    travel = np.array([1.4, 1.4])
+    candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
+    place = 0.04 * np.array([np.cos(0.7), 0.0, np.sin(0.7)]) + 0.02 * np.array([np.cos(1.4), 0.0, np.sin(1.4)])
+    bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose(place))
+    judge_sets(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
+    assert candidate.feasible is False
+    assert candidate.penetration == pytest.approx(0.006, abs=1e-4)

@@ -64,8 +64,9 @@ def test_out_of_reach_ahead():
     assert solution.reason["nearest"]["link"] == found["nearest_link"]
 
 
-def test_out_of_reach_to_the_side():
-    found = cause(solved(three_links(upper=1.2), ball([0.05, 0.05, 0.02])))
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_out_of_reach_to_either_side(side):
+    found = cause(solved(three_links(upper=1.2), ball([0.05, side * 0.05, 0.02])))
     assert (found["code"], found["direction"]) == ("reach", "aside")
     assert found["shortfall"] == pytest.approx(0.05 - 0.01 - RADIUS, abs=5e-5)
 
