@@ -183,3 +183,10 @@ def test_causes_survive_saving(tmp_path):
     loaded = clench.GraspSolution.load(tmp_path / "s.json")
     assert loaded.fingers["index"].cause == solution.fingers["index"].cause
     assert loaded.reason == solution.reason
+
+
+def test_a_finger_that_closes_in_two_directions_has_nothing_to_its_side():
+    """Its last joint turns sideways, towards what the planes of the first would not reach."""
+    shapes = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.05)]
+    hand = HandBuilder().finger("index", shapes, [0.05, 0.05], axes=[-Y, Z], upper=0.3).hand()
+    assert cause(solved(hand, ball([0.06, 0.05, 0.0])))["code"] == "limit"

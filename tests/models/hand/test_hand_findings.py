@@ -78,6 +78,8 @@ def test_limits_of_no_width_hold_the_joint(tmp_path, capfd, form: str, angle: fl
 def test_missing_limits(tmp_path, limit: str) -> None:
     loaded = Hand.load(urdf(tmp_path, limit))
     assert found(loaded, FindingCode.LIMITS_MISSING).joints == ("a1",)
+    joint = loaded.joints[loaded.joint_index("a1")]
+    assert (joint.lower, joint.upper) == (-np.pi, np.pi)
     assert "under [joints.a1]: limits = [lower, upper]" in found(loaded, FindingCode.LIMITS_MISSING).advice
 
 
