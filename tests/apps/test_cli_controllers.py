@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
@@ -18,7 +16,6 @@ import pytest
 import clench
 from clench.apps.cli import actuators
 from clench.apps.cli.exchange import Format
-from clench.apps.cli.interrupts import stopped_by_signals
 from clench.apps.cli.main import main
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.execution.drivers.ros2 import RosInterface
@@ -364,38 +361,3 @@ def test_an_interrupt_before_anything_moves_leaves_no_report(
     assert main(["execute", str(tmp_path / "s.json"), *options]) == 130
     assert capsys.readouterr().err == "clench: error: interrupted.\n"
     assert not (tmp_path / "r.json").exists()
-
-
-@pytest.mark.parametrize(("number", "heeded"), [(signal.SIGINT, True), (signal.SIGHUP, False)])
-def test_of_signals_that_were_ignored_only_a_hangup_stays_so(number: signal.Signals, heeded: bool) -> None:
-    """A script ignores Ctrl-C for what it runs in the background; `nohup` ignores hangups."""
-    before = signal.signal(number, signal.SIG_IGN)
-    stops: list[bool] = []
-    try:
-        with suppress(KeyboardInterrupt), stopped_by_signals(lambda: stops.append(True)):
-            signal.raise_signal(number)
-        assert signal.getsignal(number) is signal.SIG_IGN
-    finally:
-        signal.signal(number, before)
-    assert stops == [True] * heeded
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_being_told_to_end_stops_the_hand(tmp_path: Path, number: int) -> None:
-    program = (
-        "import time\n"
-        "from clench.apps.cli.interrupts import stopped_by_signals\n"
-        "try:\n"
-        "    with stopped_by_signals():\n"
-        "        print('moving', flush=True)\n"
-        "        time.sleep(20)\n"
-        "except KeyboardInterrupt:\n"
-        "    print('stopped', flush=True)\n"
-    )
-    run = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-    assert run.stdout is not None
-    assert run.stdout.readline() == "moving\n"
-    time.sleep(0.1)
-    run.send_signal(number)
-    out, _ = run.communicate(timeout=10)
-    assert out == "stopped\n"

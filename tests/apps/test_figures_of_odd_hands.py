@@ -22,3 +22,12 @@ def test_joints_in_one_place_are_drawn(second: list[float], tmp_path: Path) -> N
     ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.01, 0.05]))
     command = clench.GraspCommand(hand_pose=Pose.identity(), order=clench.ClosingOrder.TOGETHER, preshape="open")
     assert draw_solution(hand, ball, command, clench.solve(hand, ball, command), tmp_path)
+
+
+def test_names_of_fingers_that_are_no_names_of_files_are_changed(tmp_path: Path) -> None:
+    hand = HandBuilder().finger("r2/index: tip", [along_x(0.006, 0.05)], [0.05], upper=1.5).hand()
+    ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.01, 0.05]))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open")
+    files = draw_solution(hand, ball, command, clench.solve(hand, ball, command), tmp_path / "new")
+    assert [f.name for f in files] == ["r2_index_tip_plane.png", "r2_index_tip_sets.png", "grasp.png"]
+    assert sorted(tmp_path.rglob("*.png")) == sorted(files)

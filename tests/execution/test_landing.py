@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import clench
+from chain_hands import HandBuilder, along_x
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.collision.path_check import find_path_overlap
 from clench.closing.collision.reach import nearest_link
-from clench.core.pose import FloatArray, invert
+from clench.core.pose import FloatArray, Pose, invert
 from clench.execution.landing import LANDING_SPEED, plan_landing
 from clench.execution.step_check import placed_object
 from clench.execution.trajectory import Trajectory, plan_trajectory
@@ -125,3 +126,38 @@ def test_a_joint_without_room_to_open(grip: Grip) -> None:
     hand, _, solution = grip
     joints = tuple(replace(j, lower=a, upper=a) for j, a in zip(hand.joints, touch(grip), strict=True))
     assert plan_landing(solution, replace(hand, joints=joints), CLEARANCE) is None
+
+
+def coupled_grip(upper: float, *, breakaway: bool) -> tuple[Hand, GraspSolution]:
+    """Return a finger whose first link touches a bar at 0.307 rad; the second joint follows up to a limit."""
+    builder = HandBuilder().finger("index", [along_x(0.006, 0.05), along_x(0.006, 0.04)], [0.05, 0.04], upper=1.5)
+    hand = builder.couple("index_0", "index_1", 1.0, breakaway=breakaway).hand()
+    hand = replace(hand, joints=(hand.joints[0], replace(hand.joints[1], upper=upper)))
+    half = np.sqrt(0.5)
+    bar = GraspObject.load("cylinder:r=0.004,h=0.1", pose=Pose([0.03, 0.0, 0.02], wxyz=[half, half, 0, 0]))
+    return hand, clench.solve(hand, bar, clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open"))
+
+
+def test_a_follower_that_has_broken_away_does_not_land_on_a_straight_line() -> None:
+    """It would first have to wait for its leader to come to where it is."""
+    hand, solution = coupled_grip(1.5, breakaway=True)
+    assert solution.joint_angles["index_1"] > solution.joint_angles["index_0"] + 1.0
+    assert plan_landing(solution, hand, CLEARANCE) is None
+
+
+def test_a_follower_that_has_broken_away_stays_where_nothing_moves_it() -> None:
+    hand, solution = coupled_grip(1.5, breakaway=True)
+    landing = plan_landing(replace(solution, contacts=()), hand, CLEARANCE)
+    assert landing is not None
+    np.testing.assert_array_equal(landing, list(solution.joint_angles.values()))
+
+
+def test_a_follower_at_its_limit_waits_only_while_its_leader_is_beyond() -> None:
+    """The leader is 0.107 rad beyond the follower's limit: enough for 3 mm, and too little for 5 mm."""
+    hand, solution = coupled_grip(0.2, breakaway=False)
+    assert list(solution.joint_angles.values()) == pytest.approx([0.307, 0.2], abs=1e-4)
+    landing = plan_landing(solution, hand, 0.003)
+    assert landing is not None
+    assert 0.2 < landing[0] < 0.24
+    assert landing[1] == 0.2
+    assert plan_landing(solution, hand, 0.005) is None

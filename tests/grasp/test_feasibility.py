@@ -12,6 +12,7 @@ from clench.closing.collision.packed_object import pack_object
 from clench.closing.feasibility import judge_sets
 from clench.closing.finger_plan import plan_finger
 from clench.core.pose import Pose
+from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.models.shapes import CollisionSource
 
 HAND = chain([CLOSING], upper=2.0)
@@ -78,3 +79,42 @@ def test_pads_may_be_indented():
         assert judged.feasible is feasible
     (rigid,) = judge([at(touch + 0.015)], measure=True)
     assert rigid.feasible is False
+
+
+def test_joints_that_close_at_once_may_pass_through_something_on_the_way():
+    """The bead lies on the second link when both joints are half closed; the end is far from it."""
+    hand = chain([CLOSING, CLOSING])
+    plan = plan_finger(hand, hand.fingers[0], np.zeros(2), 3, CollisionSource.ENGINE)
+    travel = np.array([1.4, 1.4])
+    candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
+    place = 0.04 * np.array([np.cos(0.7), 0.0, np.sin(0.7)]) + 0.02 * np.array([np.cos(1.4), 0.0, np.sin(1.4)])
+    bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose(place))
+    judge_sets(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
+    assert candidate.feasible is False
+    assert candidate.penetration == pytest.approx(0.006, abs=1e-4)
+
+
+def test_a_path_is_looked_at_at_the_speeds_of_its_joints():
+    """The first joint closes twice as fast; the bead lies on the second link after nine of sixteen equal times."""
+    hand = chain([CLOSING, CLOSING])
+    plan = replace(plan_finger(hand, hand.fingers[0], np.zeros(2), 3, CollisionSource.ENGINE), speeds=(2.0, 1.0))
+    travel = np.array([1.4, 0.7])
+    candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
+    first, second = 9 / 16 * travel[0], 9 / 16 * travel.sum()
+    place = 0.04 * np.array([np.cos(first), 0.0, np.sin(first)])
+    place += 0.03 * np.array([np.cos(second), 0.0, np.sin(second)])
+    bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose(place))
+    judge_sets(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
+    assert candidate.penetration == pytest.approx(0.006, abs=1e-4)
+
+
+def test_a_set_that_was_swept_over_the_whole_width_needs_no_measuring():
+    (judged,) = judge([replace(at(1.9), exact=True)], measure=True)
+    assert (judged.clear, judged.feasible, judged.penetration) == (True, True, 0.0)
+
+
+def test_a_little_more_than_is_allowed_is_infeasible():
+    touch = first_touch()
+    for share, feasible in ((0.5, True), (1.5, False)):
+        (judged,) = judge([at(touch + share * ALLOWED_PENETRATION / np.hypot(0.03, 0.02))], measure=True)
+        assert judged.feasible is feasible

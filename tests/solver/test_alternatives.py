@@ -15,8 +15,7 @@ from clench.closing.packed_problem import pack_problem
 from clench.core.errors import CommandError
 from clench.core.pose import Pose
 from clench.scoring import criterion_registry
-from clench.solver import alternatives
-from clench.solver import pose_solver as single
+from clench.solver import alternatives, pose_solver
 from clench.solver.planning import plan_hand
 from clench.solver.problem import make_problem
 
@@ -38,7 +37,7 @@ def in_full(monkeypatch: pytest.MonkeyPatch) -> None:
         packed = pack_problem(plan_hand(problem), problem.packed, (), tip_only)
         return alternatives.Candidates(packed, by_kernel=False)
 
-    monkeypatch.setattr(single, "candidates_of", all_sets)
+    monkeypatch.setattr(pose_solver, "candidates_of", all_sets)
 
 
 def documents(hand: clench.Hand, obj: clench.GraspObject, commands: list[clench.GraspCommand]) -> list[dict[str, Any]]:
@@ -102,9 +101,9 @@ def test_only_what_may_be_chosen_is_closed(
 
     monkeypatch.setattr(alternatives, "close_items", counted)
     made: list[int] = []
-    first = single.candidates_of
+    first = pose_solver.candidates_of
     monkeypatch.setattr(
-        single, "candidates_of", lambda *given: made.append(len((c := first(*given)).plan.items.entry)) or c
+        pose_solver, "candidates_of", lambda *given: made.append(len((c := first(*given)).plan.items.entry)) or c
     )
     every, fingers = len(plan_hand(make_problem(hand, obj, command)).items.entry), len(hand.fingers)
     numbers = {"all": every, "full width": fingers, "planes": every - fingers}

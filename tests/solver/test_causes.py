@@ -64,8 +64,9 @@ def test_out_of_reach_ahead():
     assert solution.reason["nearest"]["link"] == found["nearest_link"]
 
 
-def test_out_of_reach_to_the_side():
-    found = cause(solved(three_links(upper=1.2), ball([0.05, 0.05, 0.02])))
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_out_of_reach_to_either_side(side):
+    found = cause(solved(three_links(upper=1.2), ball([0.05, side * 0.05, 0.02])))
     assert (found["code"], found["direction"]) == ("reach", "aside")
     assert found["shortfall"] == pytest.approx(0.05 - 0.01 - RADIUS, abs=5e-5)
 
@@ -182,3 +183,10 @@ def test_causes_survive_saving(tmp_path):
     loaded = clench.GraspSolution.load(tmp_path / "s.json")
     assert loaded.fingers["index"].cause == solution.fingers["index"].cause
     assert loaded.reason == solution.reason
+
+
+def test_a_finger_that_closes_in_two_directions_has_nothing_to_its_side():
+    """Its last joint turns sideways, towards what the planes of the first would not reach."""
+    shapes = [along_x(RADIUS, 0.05), along_x(RADIUS, 0.05)]
+    hand = HandBuilder().finger("index", shapes, [0.05, 0.05], axes=[-Y, Z], upper=0.3).hand()
+    assert cause(solved(hand, ball([0.06, 0.05, 0.0])))["code"] == "limit"

@@ -13,10 +13,10 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
-from clench.solver.preshapes import preshapes
+from clench.solver.preshapes import preshape_cache, preshapes
 from clench.solver.preshapes.preshape_cache import MOST_FILES, cache_key, keep_preshapes, read_preshapes
 from clench.solver.preshapes.preshape_names import name_preshapes
-from clench.solver.preshapes.preshapes import Preshape, opposition_zones, preshape_cache
+from clench.solver.preshapes.preshapes import Preshape, opposition_zones
 
 
 def zones(best: float, bent: bool = False) -> tuple[np.ndarray, np.ndarray, bool]:

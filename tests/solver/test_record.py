@@ -7,7 +7,7 @@ import sqlite3
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -256,3 +256,33 @@ def test_tables_that_only_look_like_ours(statement: str, what: str, tmp_path: Pa
     raw.close()
     with pytest.raises(FileError, match=f"it has the {what}, which clench never makes"):
         Record(tmp_path / "r.db")
+
+
+def test_nobody_else_writes_while_many_are_appended(tmp_path: Path) -> None:
+    """The transaction locks the file before the first solution is made, so that the ids are in a row."""
+    Record(tmp_path / "r.db").close()
+    other = sqlite3.connect(tmp_path / "r.db", timeout=0.0)
+
+    def solutions() -> Iterator[GraspSolution]:
+        for _ in range(3):
+            with pytest.raises(sqlite3.OperationalError, match="locked"):
+                other.execute("DELETE FROM solves")
+            yield make_solution()
+
+    with Record(tmp_path / "r.db") as record:
+        assert record.extend(solutions()) == [1, 2, 3]
+    other.close()
+
+
+def test_a_record_that_another_process_is_making_is_waited_for(tmp_path: Path) -> None:
+    other = sqlite3.connect(tmp_path / "r.db", isolation_level=None, check_same_thread=False)
+    other.execute("PRAGMA journal_mode = WAL")
+    other.execute("BEGIN IMMEDIATE")
+    ends = threading.Timer(0.2, lambda: other.execute("COMMIT"))
+    ends.start()
+    try:
+        with Record(tmp_path / "r.db") as record:
+            assert len(record) == 0
+    finally:
+        ends.join()
+        other.close()

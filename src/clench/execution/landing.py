@@ -55,7 +55,7 @@ def plan_landing(
         wanted = np.clip(
             c.ratio * start[c.leader] + c.offset, hand.joints[c.follower].lower, hand.joints[c.follower].upper
         )
-        if start[c.follower] != q[c.follower] and abs(start[c.follower] - wanted) > _UNCOUPLED:
+        if start[c.leader] != q[c.leader] and abs(start[c.follower] - wanted) > _UNCOUPLED:
             return None
     return start
 

@@ -133,3 +133,30 @@ def test_open_postures_obey_couplings(tmp_path) -> None:
     q = loaded.open_angles()
     np.testing.assert_allclose(q, [j.open_value for j in loaded.joints], atol=1e-15)
     assert q[loaded.joint_index("a2")] == pytest.approx(0.8 * q[loaded.joint_index("a1")] + 0.1)
+
+
+def test_a_leader_is_known_through_its_follower(tmp_path) -> None:
+    """The middle joint follows both ends, so that one of them follows the other, with the inverse coupling."""
+    relations = [Relation(0, 1, 2.0, 0.3, "first"), Relation(2, 1, 0.5, -0.2, "second")]
+    for given_order in (relations, relations[::-1]):
+        found = {c.follower: c for c in flatten(given_order, ["a", "b", "c"], "hand")}
+        assert {c.leader for c in found.values()} == {0}
+        assert (found[1].ratio, found[1].offset) == (2.0, 0.3)
+        assert (found[2].ratio, found[2].offset) == (pytest.approx(4.0), pytest.approx(1.0))
+
+
+@pytest.mark.parametrize(("ratio", "offset"), [(1.0, 0.1), (2.0, 0.0)])
+def test_couplings_that_differ_in_ratio_or_offset_contradict_each_other(ratio: float, offset: float) -> None:
+    relations = [Relation(0, 1, 1.0, 0.0, "first"), Relation(0, 1, ratio, offset, "second")]
+    with pytest.raises(HandError, match=r"'b' is coupled in two ways that contradict each other \(second\)"):
+        flatten(relations, ["a", "b"], "hand")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_offsets_and_ratios_beyond_what_can_be_computed_with_are_refused(sign: float) -> None:
+    for ratio, offset in ((1.0, 2e6 * sign), (2e6 * sign, 0.0), (5e-7 * sign, 0.0)):
+        with pytest.raises(HandError, match="'b' is coupled by a ratio of"):
+            flatten([Relation(0, 1, ratio, offset, "given")], ["a", "b"], "hand")
+    for ratio, offset in ((sign, 1e6), (1e6 * sign, 0.0), (1e-6 * sign, 0.0), (0.0, sign)):
+        (found,) = flatten([Relation(0, 1, ratio, offset, "given")], ["a", "b"], "hand")
+        assert (found.ratio, found.offset) == (ratio, offset)

@@ -78,6 +78,8 @@ def test_limits_of_no_width_hold_the_joint(tmp_path, capfd, form: str, angle: fl
 def test_missing_limits(tmp_path, limit: str) -> None:
     loaded = Hand.load(urdf(tmp_path, limit))
     assert found(loaded, FindingCode.LIMITS_MISSING).joints == ("a1",)
+    joint = loaded.joints[loaded.joint_index("a1")]
+    assert (joint.lower, joint.upper) == (-np.pi, np.pi)
     assert "under [joints.a1]: limits = [lower, upper]" in found(loaded, FindingCode.LIMITS_MISSING).advice
 
 
@@ -213,3 +215,33 @@ def test_links_that_are_only_drawn_close_like_those_that_collide(tmp_path) -> No
     assert first.contacts
     assert first.joint_angles == pytest.approx(second.joint_angles, abs=1e-5)
     assert first.status == second.status
+
+
+def test_of_limits_that_are_too_wide_the_widest_is_told(tmp_path) -> None:
+    text = hand(finger("a", limits=["-4 4", "-5 6"]), finger("b", (0.03, 0, 0.05)))
+    finding = found(Hand.load(written(tmp_path, text)), FindingCode.LIMITS_TOO_WIDE)
+    assert finding.joints == ("a_j0", "a_j1")
+    assert finding.numbers == {"widest_rad": pytest.approx(11.0)}
+
+
+def test_a_whole_turn_is_no_placeholder(tmp_path) -> None:
+    text = urdf(tmp_path, f'<limit lower="{-np.pi}" upper="{np.pi}"/>')
+    assert not [f for f in Hand.load(text).findings if f.code is FindingCode.LIMITS_TOO_WIDE]
+
+
+def test_of_efforts_that_are_placeholders_the_largest_is_told(tmp_path) -> None:
+    text = urdf_hand(mimic="")
+    for effort in ("2e4", "5e3", "1000"):
+        text = text.replace('effort="2.5"', f'effort="{effort}"', 1)
+    finding = found(Hand.load(written(tmp_path, text, "two.urdf")), FindingCode.EFFORT_PLACEHOLDER)
+    assert finding.joints == ("a1", "a2")
+    assert finding.numbers == {"largest_Nm": 2e4}
+
+
+def test_limits_in_radians_that_are_read_as_degrees_are_told_by_the_widest_joint(tmp_path) -> None:
+    narrow = three_fingers().replace('angle="radian"', 'angle="degree"')
+    finding = found(Hand.load(written(tmp_path, narrow.replace("0 1.6", "0 1", 1))), FindingCode.LIMITS_TOO_NARROW)
+    assert finding.numbers == {"widest_rad": pytest.approx(np.deg2rad(1.6))}
+    one_wide = narrow.replace("0 1.6", "0 90", 1)
+    codes = [f.code for f in Hand.load(written(tmp_path, one_wide, "wide.xml")).findings]
+    assert FindingCode.LIMITS_TOO_NARROW not in codes

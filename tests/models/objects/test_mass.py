@@ -49,3 +49,16 @@ def test_open_meshes_are_taken_as_their_hulls() -> None:
     assert not found.exact
     assert np.allclose(found.center, 5.0, atol=1e-12)
     assert found.volume == pytest.approx(8.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_centre_of_a_tetrahedron_is_a_quarter_of_the_way_up(closed: bool) -> None:
+    """One edge has a vertex in between, so that the mean of the vertices is not the centre."""
+    corners = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.4], [0.1, 0.0, 0.0]])
+    triangles = [[0, 2, 4], [4, 2, 1], [0, 4, 3], [4, 1, 3], [0, 3, 2], [1, 2, 3]]
+    obj = clench.GraspObject.from_meshes([(corners + 2.0, triangles if closed else triangles[:-1])])
+    found = mass_properties(obj)
+    assert found.exact is closed
+    assert found.center == pytest.approx(np.array([0.075, 0.05, 0.1]) + 2.0, abs=1e-12)
+    assert found.volume == pytest.approx(0.3 * 0.2 * 0.4 / 6.0, rel=1e-12)
+    assert found.length == pytest.approx(np.linalg.norm([0.075, 0.05, 0.3]), rel=1e-12)
