@@ -1,4 +1,4 @@
-"""Bring proposed hands up to the object, and leave out those that something stops (docs/method.md section 9)."""
+"""Bring proposed hands up to the object, and reject those that are stopped too early (docs/method.md section 9)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Approached:
     """Proposals that arrive, and how many were stopped.
 
     Args:
-        proposals: with the palm where it stops. stopped: by the object before its place. obstacle: by an obstacle.
+        proposals: with the palm at its stop. stopped: by the object before its place. obstacle: by an obstacle.
     """
 
     proposals: Proposals

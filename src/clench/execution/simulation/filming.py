@@ -26,9 +26,9 @@ _WIDTH, _HEIGHT = 640, 480
 _NO_OPENGL: Final = (
     "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1 and set MUJOCO_GL=egl."
 )
-#: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
+#: Distance of the camera, as a multiple of its subject's size, and its direction [degrees].
 _DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
-#: How much higher it looks where the palm moves up [m].
+#: Rise of the camera's target if the palm moves up [m].
 _UP: Final = 0.05
 
 
@@ -54,10 +54,10 @@ class Film:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be written.
+        """Refuse files that cannot be written.
 
         Raises:
-            FileError: another kind of file than GIF or MP4, one that is a folder, or in none.
+            FileError: the file is not GIF or MP4, is a folder, or its folder does not exist.
             ClenchError: MP4 without the library that writes it; an OpenGL that cannot be loaded.
         """
         if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
@@ -81,8 +81,7 @@ class Film:
         mujoco = import_mujoco()
         headless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
         if headless and mujoco.GLContext.__module__ == "mujoco.glfw":
-            # The engine's default, unless told otherwise when it was imported: it needs a screen, and ends the program
-            # where there is none.
+            # The engine's default, if nothing else was set at import, needs a screen, and ends the program without one.
             raise ClenchError(_NO_OPENGL.format("there is no screen"))
         try:
             self._renderer = mujoco.Renderer(scene.model, _HEIGHT, _WIDTH)
@@ -116,7 +115,7 @@ class Film:
             self._kept[name] = self._drawn(data)
 
     def finish(self) -> tuple[Path, ...]:
-        """Write what was taken; return the files.
+        """Write the pictures; return the files.
 
         Raises:
             FileError: a file cannot be written.
