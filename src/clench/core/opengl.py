@@ -1,4 +1,4 @@
-"""Import MuJoCo where it cannot draw: it looks for OpenGL when it is imported, and only films need that."""
+"""Import MuJoCo on machines that cannot draw: its import looks for OpenGL, which only films need."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import os
 from typing import Any, Final
 
 _VARIABLE: Final = "MUJOCO_GL"
-#: What MuJoCo takes as: do not look for OpenGL.
+#: MuJoCo's value for: do not look for OpenGL.
 _OFF: Final = ("disable", "disabled", "off", "false", "0")
 #: Why the OpenGL that MUJOCO_GL names could not be loaded, once that was tried.
 _failed: list[str] = []
 
 
 def import_mujoco() -> Any:
-    """Return MuJoCo, imported without OpenGL where what MUJOCO_GL names cannot be loaded."""
+    """Return MuJoCo, imported without OpenGL if the library that MUJOCO_GL names cannot be loaded."""
     try:
         import mujoco
     except Exception as error:  # whatever the graphics library raises

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
-#: Where the palm of the built-in hand holds the built-in mug: around its wall, away from the handle.
+#: Pose of the built-in hand's palm for the built-in mug: around its wall, away from the handle.
 MUG_POSE = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 STEPS = 6
 
 
 def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, json: bool) -> int:
-    """Load, solve, draw, carry out and record; print what happened and where the files are.
+    """Load, solve, draw, execute and record; print the results and the paths of the files.
 
     Returns:
         0 when the hand grasps and the simulated hand reaches the computed angles, else 1.
@@ -48,7 +48,7 @@ def run_demo(hand_model: str, object_model: str, out: Path, seed: int | None, js
         step("Solving (the first run compiles the kernels, which takes most of a minute; later runs load them)")
         warm_up()
         command = choose_command(hand, obj, (hand_model, object_model), seed)
-        # The first call of a process loads the compiled kernels; this one shows what a solve takes.
+        # The first call of a process loads the compiled kernels; this call shows the time of a solve.
         solution = clench.solve(hand, obj, command)
         solution = replace(solution, hand_model=loadable(hand_model), object_model=loadable(object_model))
         solution = clench.execution.complete(solution, hand, obj)
@@ -75,8 +75,8 @@ def choose_command(hand: Hand, obj: GraspObject, models: tuple[str, str], seed: 
     """Return the command kept for the built-in hand and mug, else that of a planned grasp.
 
     Args:
-        hand, obj: what is solved. models: what they were loaded from.
-        seed: of the planned grasp; None keeps to the built-in pose where there is one.
+        hand, obj: hand and object. models: their model names or paths.
+        seed: of the planned grasp; None takes the built-in pose if there is one.
 
     Raises:
         CommandError: no grasp was found.

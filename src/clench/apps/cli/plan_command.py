@@ -54,10 +54,10 @@ def plan(
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         count: how many grasps are wanted.
-        hand_file: TOML file that overrides what was found in the hand's model.
+        hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
-        friction: of links on the object; two numbers are a range; by default what hand file and object say, else 0.6.
+        friction: of links on the object; two numbers are a range; by default that of hand file and object, else 0.6.
         mass: of the object [kg]; 0.1 by default; two numbers are a range.
         gravity: its direction in the world; by default the object is held in any direction.
         kinds: of grasps; any by default.
@@ -76,8 +76,8 @@ def plan(
         threads: how many are used; all cores by default.
         without_path: leave out the free paths, which take longest.
         hold: try every grasp in simulation: close on the free object, squeeze, pull in six directions (docs/hold.md).
-        out: folder for plan.json, the solution and trajectory of every grasp, and pictures: the best grasps, where
-            all of them touch the object, and the zones in which the hand grasps.
+        out: folder for plan.json, the solution and trajectory of every grasp, and pictures: the best grasps, the
+            contacts of all grasps on the object, and the zones in which the hand grasps.
         json: print one JSON document on standard output.
     """
     from math import radians

@@ -50,7 +50,7 @@ _LETTER: Final = 8
 #: Width of the figure at least, for the text above and below the panels, and of a legend in one row, in pixels.
 _NARROWEST: Final = 960
 _LEGEND: Final = 1400
-#: How much of the hand shows through the object [-].
+#: Opacity of the hand behind the object [-].
 _THROUGH: Final = 0.42
 #: Width of a grid [m] to which surfaces are coarsened while a viewpoint is chosen, and pixels on a side.
 _GRID: Final = 3e-3
@@ -59,7 +59,7 @@ _SMALL: Final = 90
 _NEAR: Final = 0.25
 #: A contact is hidden when all of the surface within so many pixels of its mark lies before it.
 _MARK: Final = 3
-#: What a contact behind the object counts, next to one that is seen; one behind hand or obstacles counts nothing.
+#: Weight of a contact behind the object, next to a visible one; a contact behind hand or obstacles counts nothing.
 _BEHIND_OBJECT: Final = 0.6
 
 
@@ -67,7 +67,7 @@ def draw_grasps(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held:
     """Write a sheet of the best grasps of a plan, at most `MOST_GRASPS`, all at one scale.
 
     Args:
-        plan: the grasps. hand, obj: what was planned for. path: of the file.
+        plan: the grasps. hand, obj: the hand and object of the plan. path: of the file.
         held: whether each grasp held the object when it was tried; None: not tried.
 
     Raises:

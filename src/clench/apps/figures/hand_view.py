@@ -27,7 +27,7 @@ _TEXT: Final = 330
 #: A contact farther than this behind the nearest surface is hidden [m].
 _HIDDEN: Final = 2e-3
 _ARROW: Final = 0.016
-#: How much of the hand shows through the object in front of it [-].
+#: Opacity of the hand behind the object [-].
 _THROUGH: Final = 0.3
 
 
@@ -55,7 +55,7 @@ def draw_hand(hand: Hand, obj: GraspObject, solution: GraspSolution, path: Path)
 
 
 def focus_of(body: FloatArray, things: FloatArray, near: float = 0.5) -> FloatArray:
-    """Return the points that must be seen: the hand, and the object as far as it is near the hand, shape (N, 3).
+    """Return the points that must be visible: the hand, and the part of the object near the hand, shape (N, 3).
 
     Args:
         body, things: corners of hand and object [m]. near: how far from the hand, as a share of its size [-].
@@ -105,7 +105,7 @@ def _score(corners: FloatArray, hand: int, camera: Camera, points: FloatArray) -
 
 
 def is_hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArray[np.bool_]:
-    """Say which points lie behind what is seen at their pixel, shape (N,)."""
+    """Say which points lie behind the visible surface at their pixel, shape (N,)."""
     p = camera.project(points)
     column = np.clip(p[:, 0].astype(np.int64), 0, camera.width - 1)
     row = np.clip(p[:, 1].astype(np.int64), 0, camera.height - 1)
@@ -114,7 +114,7 @@ def is_hidden(nearness: FloatArray, camera: Camera, points: FloatArray) -> NDArr
 
 
 def render(body: Surface, things: Surface, camera: Camera, through: float = _THROUGH) -> tuple[Image, FloatArray]:
-    """Return the picture, shape (H, W, 3), and the nearness of what is seen [m].
+    """Return the picture, shape (H, W, 3), and the nearness of the visible surface [m].
 
     Args:
         body, things: hand and object. camera: see `Camera`. through: how much the hand shows through the object [-].

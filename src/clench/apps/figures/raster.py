@@ -12,7 +12,7 @@ from clench.core.pose import FloatArray
 
 #: Red, green and blue per pixel, 0 to 1, shape (H, W, 3).
 Image = NDArray[np.float32]
-#: Rows of pixels that are worked on at once, which bounds the memory.
+#: Rows of pixels per step, which bounds the memory.
 _CHUNK: Final = 1 << 21
 _DEPTH_STEPS: Final = (1 << 31) - 1
 _NOTHING: Final = np.uint64(0xFFFFFFFFFFFFFFFF)
@@ -46,7 +46,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Hold the nearest surface per pixel.
+    """The nearest surface per pixel.
 
     Args:
         triangle: index of the triangle that is seen, -1 for none, shape (H, W).
@@ -138,7 +138,7 @@ def shade(picture: Picture, normals: FloatArray, colors: FloatArray, camera: Cam
     """Return lit colours per pixel, white where nothing is seen, shape (H, W, 3) in 0 to 1.
 
     Args:
-        picture: what is seen. normals: unit, per triangle, either side up, shape (T, 3).
+        picture: the nearest surfaces. normals: unit, per triangle, either side up, shape (T, 3).
         colors: per triangle, shape (T, 3).
     """
     facing = np.where((normals @ camera.towards)[:, None] < 0.0, -normals, normals)

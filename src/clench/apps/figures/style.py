@@ -25,7 +25,7 @@ OBSTACLE_EDGE: Final = "#6f6f6f"
 PALM_FILL: Final = "#d9d9d9"
 CONTACT: Final = "#d55e00"
 CHOSEN: Final = "#0b7a53"
-#: One colour per joint and the link that it moves, palm side first (after Okabe and Ito).
+#: One colour per joint and its link, palm side first (after Okabe and Ito).
 JOINT_COLORS: Final = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f5539")
 
 
@@ -54,7 +54,7 @@ def check_figure(path: Path) -> None:
     """Refuse a file to which no figure can be written, before anything is drawn.
 
     Raises:
-        FileError: nothing can be written there, or no figure has its ending.
+        FileError: the file cannot be written, or its ending is no figure's.
     """
     check_writable(path)
     format_of_figure(path)

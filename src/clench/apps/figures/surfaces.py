@@ -1,4 +1,4 @@
-"""Triangles of hand and object where a solution has them, coloured by what they are."""
+"""The triangles of hand and object at the poses of a solution, coloured by kind."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PALM_COLOR: Final = "#a9b0b7"
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Hold triangles to draw.
+    """The triangles of a picture.
 
     Args:
         corners: in the world [m], shape (T, 3, 3). normals: unit, shape (T, 3). colors: shape (T, 3).

@@ -1,4 +1,4 @@
-"""What figures of a hand from two sides share: layout, camera, light, axes and scale."""
+"""The shared parts of figures of a hand from two sides: layout, camera, light, axes and scale."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _BOTTOM: Final = 60
 
 
 def palm_views(normal: FloatArray, stretch: FloatArray) -> tuple[list[FloatArray], FloatArray]:
-    """Return from where a hand is seen, a little aslant of its palm and of its side, and what is up.
+    """Return the viewing direction of a hand, oblique to its palm and its side, and the up direction.
 
     Args:
         normal: of the palm, unit, shape (3,). stretch: along the fingers, shape (3,).
@@ -67,7 +67,7 @@ def fitted_camera(
 
     Args:
         towards: from the scene to the viewer. focus: shape (N, 3) [m]. size: in pixels. scale: pixels per metre.
-        above: what is up in the picture; the world's z axis by default.
+        above: the up direction of the picture; the world's z axis by default.
     """
     right, up, back = look_along(towards, np.array([0.0, 0.0, 1.0]) if above is None else above)
     across = np.column_stack([focus @ right, focus @ up])
@@ -87,7 +87,7 @@ def lit(picture: Picture, surface: Surface, camera: Camera) -> Image:
 
 
 def frame_axes(axes: Axes, camera: Camera, height: int = VIEW[1]) -> None:
-    """Draw the directions of the axes of the frame of what is drawn in the lower left corner of so high a view."""
+    """Draw the axes of the scene's frame in the lower left corner of a view of the given height."""
     origin = np.array([46.0, height - 46.0])
     for name, axis in zip("xyz", np.eye(3), strict=True):
         step = 32.0 * np.array([axis @ camera.right, -(axis @ camera.up)])

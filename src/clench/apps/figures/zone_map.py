@@ -32,8 +32,8 @@ _COLORS: Final = "viridis"
 def draw_zones(hand: Hand, path: Path) -> Path:
     """Write a picture of the opposition zones of a hand's preshapes, from two sides, on the open hand.
 
-    Of every preshape and every step of aperture the zone that opposes best is drawn: a line from pad to pad, and a dot
-    at its middle, coloured by the aperture.
+    For every preshape and every step of aperture, the zone that opposes best is drawn. A line runs from pad to pad, and
+    a dot marks its middle, coloured by the aperture.
 
     Args:
         hand: the hand. path: of the file.
@@ -81,7 +81,7 @@ def _ends(zones: FloatArray) -> FloatArray:
 
 
 def _sides(hand: Hand) -> tuple[list[FloatArray], FloatArray]:
-    """Return from where the hand is seen, a little aslant of its palm and of its side, and what is up."""
+    """Return the viewing direction of the hand, oblique to its palm and its side, and the up direction."""
     q = hand.open_angles()
     fingers = [finger for finger in hand.fingers if not finger.is_thumb] or list(hand.fingers)
     lines = [finger_line(hand, finger, q) for finger in fingers]
