@@ -150,7 +150,7 @@ def group_family(hand: HandArrays, group: int) -> int:
 
 @inner_kernel
 def stops_same(chain: ChainArrays, hit: Ints, group: int, joint: int) -> bool:
-    """Say whether a contact stops what another one stops: a group, or its joints up to one that later ones leave."""
+    """Say whether two contacts stop the same joints: a group, or its joints up to the ones that break away."""
     return hit[HIT_GROUP] == group and (not chain.breaks[group] or hit[HIT_JOINT] == joint)
 
 
@@ -223,7 +223,7 @@ def close_item(
         for link in range(sweep.poses.shape[0]):
             copy_pose(exact.link_pose[entry, link], sweep.poses[link])
     sweep.skipped[0] = 0
-    # Those of other entries' joints are never written: they would go on with what the item before left there.
+    # Travels of other entries' joints are never written: they would continue with the values of the item before.
     for j in range(work.rates.shape[0]):
         work.rates[j] = 0.0
     for _ in range(times):

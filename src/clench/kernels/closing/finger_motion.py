@@ -146,7 +146,7 @@ def approach_along(
     end: float,
     room: MeetingWork,
 ) -> tuple[float, float, float]:
-    """Return the sums of what `motion_along` returns for two links, one of either entry."""
+    """Return the sums of the results of `motion_along` for two links, one of either entry."""
     way, speed, bend = motion_along(exact, fingers, entries[0], rows[0], n, at, end, room)
     other, more, further = motion_along(exact, fingers, entries[1], rows[1], n, at, end, room)
     return way + other, speed + more, bend + further

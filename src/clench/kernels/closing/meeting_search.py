@@ -24,9 +24,9 @@ from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shor
 NEAR = 1e-5
 #: Up to which gap elements are measured at first, and how that grows while they are farther apart [m, -].
 REACH, WIDER = 1e-4, 4.0
-#: A pair that is looked at so often is taken for one that meets, which is safe.
+#: A pair counts as meeting after this many looks, which is safe.
 LOOKS = 20_000
-#: What a look tells: the pair goes on, it is free to the end, it meets.
+#: Result of a look: the pair continues, it is free to the end, it meets.
 ON, FREE, MEETS = 0, 1, 2
 
 

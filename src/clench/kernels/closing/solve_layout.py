@@ -37,7 +37,8 @@ class CommandArrays(NamedTuple):
 
     Args:
         start: posture before closing [rad], (J,). start_pose: `T_palm_link` of every link there, (L, 3, 4).
-        fixed: whether a mesh is on a link that no finger moves, (M,). fingers: on one that a finger moves, (M,).
+        fixed: whether a mesh is on a link that no finger moves, (M,). fingers: whether it is on a link that a finger
+            moves, (M,).
         own, resting: whether a mesh is on a link of the finger, and on one of these that closing does not move, (E, M).
         joints: joints of each entry's finger, palm side first, then -1, (E, K). finger: finger of each entry, (E,).
         thumb: whether a finger is a thumb, (F,). tip: the link that alone may touch, -1 where every link may, (F,).

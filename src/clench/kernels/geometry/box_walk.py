@@ -53,7 +53,7 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
 
 @inner_kernel
 def square_axes(u: Vector, v: Vector) -> tuple[Vector, Vector]:
-    """Return the unit vectors along u and across both, whatever their sizes, up to none."""
+    """Return the unit vectors along u and across both, for any sizes, up to none."""
     size = math.sqrt(dot(u, u))
     first = scaled(u, 1.0 / size) if size > 0.0 else (1.0, 0.0, 0.0)
     third = cross(first, v)
@@ -142,7 +142,7 @@ def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[flo
 
 @inner_kernel
 def clamped(x: float, half: float) -> float:
-    """Return what is closest to a coordinate within half a size to either side."""
+    """Return the nearest point to a coordinate within half a size to either side."""
     return min(max(x, -half), half)
 
 

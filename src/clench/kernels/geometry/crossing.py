@@ -14,7 +14,7 @@ from .vectors import Vector
 
 #: Surfaces that cross by no more than this touch [m].
 DEEP = 1e-9
-#: Directions shorter than this fraction of what they are made of are none [-].
+#: Directions shorter than this fraction of their factors count as none [-].
 _NONE = 1e-9
 
 

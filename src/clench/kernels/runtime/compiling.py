@@ -25,8 +25,8 @@ _IMPORTED: Final = re.compile(r"^\s*from (\.+|clench\.kernels\.)(\w[\w.]*) impor
 def kernel(function: Kernel) -> Kernel:
     """Compile a function on its first call; it keeps its signature. It may not allocate.
 
-    Without counts of references, which would be kept for every view of an array: counting takes most of the time
-    of a kernel that reads many rows. What such a kernel reads is alive as long as its caller holds it.
+    Without counts of references, which would be kept for every view of an array: counting takes most of the time of a
+    kernel that reads many rows. The arrays that such a kernel reads live as long as its caller holds them.
     """
     return _compiled(function, _nrt=False)
 

@@ -20,7 +20,7 @@ from .toi_work import ball_gap, body_gap
 
 #: Two bodies may overlap by this much and still count as touching: the tolerance of the proof [m].
 OVERLAP: Final = 1e-5
-#: A look finds an overlap from this depth on [m]. What is left of `OVERLAP` is the least motion between two looks.
+#: A look finds an overlap from this depth on [m]. The rest of `OVERLAP` is the least motion between two looks.
 FOUND: Final = 5e-6
 #: The sweep takes a pair up to this gap [m].
 TOUCH: Final = 1e-6
