@@ -54,7 +54,7 @@ def bench_confidence(
     """Plan grasps of all scores for every hand and object, try them, and tabulate the share that held.
 
     Args:
-        hands, objects: the loaded models. asked: settings of the trial. out: file for the table (JSON). show: show a bar.
+        hands, objects: the loaded models. asked: settings of the trial. out: file for the table (JSON). show: a bar.
     """
     from rich.console import Console
     from rich.progress import track
