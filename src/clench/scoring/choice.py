@@ -65,8 +65,8 @@ class HandChoice:
         fingers: one per finger. calibration: weights and limits. used, unused: names of its criteria with and without a
             value for some set. hand_scores: values of the hand's criteria for the chosen sets.
         runner_up: the second best combination, as indices, with its total and hand scores; None when there is none.
-        total: weighted sum over the chosen sets [-]. tried: how many combinations were compared; 0 when no criterion
-            is about the whole hand, and every finger has its own best. proved: no other combination is better.
+        total: weighted sum over the chosen sets [-]. tried: number of compared combinations; 0 if no criterion is about
+            the whole hand and every finger has its own best. proved: no other combination is better.
     """
 
     fingers: tuple[FingerChoice, ...]

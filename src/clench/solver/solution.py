@@ -188,7 +188,7 @@ class GraspSolution(LateFields):
         choice: why these sets: criteria, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the whole width and all links [m], None when not computed.
         speeds: relative closing speeds of free joints in an order where all move simultaneously; 1 if not named.
-        rounds: how often the joints were gone through, 0 for until rest.
+        rounds: number of passes through the joints, 0 for until rest.
         next_steps: postures [rad] by joint name that the hand goes to after the grasp, as commanded.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """

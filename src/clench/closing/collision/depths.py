@@ -34,7 +34,7 @@ class LinkDepth:
         link: index of the link in the hand.
         depth: [m], 0 when disjoint or just touching.
         place: the deepest point in the object's frame [m], shape (3,); None when the depth is 0.
-        at_least: the link lies inside with all of its size; how much deeper is not measured.
+        at_least: the link lies inside completely; the further depth is not measured.
     """
 
     link: int
@@ -171,7 +171,7 @@ def retreat_distance(
     T_palm_object: FloatArray,
     source: CollisionSource | None = None,
 ) -> float:
-    """Return how far back along its palm normal the hand is free, from there all the way out [m].
+    """Return the retreat along the palm normal from which on the hand is free [m].
 
     The search starts outside: the hand comes in along the normal from a clear position, up to its first touch. The
     distance is 0 if the hand reaches its pose without touching.

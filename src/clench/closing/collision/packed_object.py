@@ -116,7 +116,7 @@ def pack_object(obj: GraspObject) -> PackedObject:
 
 
 def set_object_cache(size: int) -> None:
-    """Set how many bytes of packed objects stay in memory, 512 MB by default; those used last stay.
+    """Set the memory for packed objects [bytes], 512 MB by default; the latest ones stay.
 
     The first solve with an object packs its triangles into trees, which takes some ten milliseconds. Later solves use
     the packed object. A mesh takes about 200 bytes per triangle. The object used last stays, however large it is.

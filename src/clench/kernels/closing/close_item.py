@@ -1,8 +1,8 @@
 """Close a finger, one degree of freedom after another, or all at once (docs/method.md section 4).
 
-The groups of a finger are gone through up to `times` over, fewer where nothing moves any more. Where joints of several
-families move at once, or in several rounds, an item has no planes: those of later families are cut where the earlier
-joints are at rest.
+The groups of a finger are gone through up to `times` over, fewer where nothing moves any more. If joints of several
+families move simultaneously, or in several rounds, an item has no planes: the planes of later families are cut with the
+earlier joints at rest.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def write_contact(
 ) -> None:
     """Write a contact that stops the group of `joint`, up to it; in a further round it takes the earlier one's place.
 
-    Where a plane's contact and an exact one are the same touch, the plane describes it: it says more.
+    If a plane's contact and an exact one are the same touch, the plane describes it, because it has more data.
     """
     family, group = hand.chain.joint_family[joint], hand.chain.joint_group[joint]
     n = 0

@@ -195,7 +195,7 @@ def read_exact_touch(
         z += pose[r, 2] * point[3 + r]
         offset += pose[r, 1] * (point[r] - pose[r, 3])
     value[TOUCH_GAP], value[TOUCH_CURVE], value[TOUCH_OFFSET] = point[HIT_GAP], math.atan2(x, -z), offset
-    # Where the side of a round link touches, the two surfaces have one tangent.
+    # At a contact with the side of a round link, the two surfaces have one tangent.
     value[TOUCH_SIDE] = value[TOUCH_CURVE] if hit[HIT_KIND] == KIND_SIDE else math.nan
 
 

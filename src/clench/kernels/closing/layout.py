@@ -189,7 +189,7 @@ class ItemArrays(NamedTuple):
 
     Args:
         entry: (I,). low, high: range of planes, counted from the first plane of each family of the entry, (I,).
-        until: where in the motion each joint is held from outside, infinite where it is not, (I, J).
+        until: place in the motion from which each joint is held from outside, infinite without one, (I, J).
     """
 
     entry: Ints

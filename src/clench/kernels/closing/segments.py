@@ -34,7 +34,7 @@ def next_segment(
     along: float,
     rates: Floats,
 ) -> float:
-    """Write how fast every joint moves from here; return for how long it stays so, 0 when nothing moves any more.
+    """Write the present speed of every joint; return how long it lasts, 0 when nothing moves any more.
 
     Args:
         joints: range of the finger's. group: the moving one, or `ALL`. travel: of every group [rad], (G,).

@@ -168,7 +168,7 @@ def walk_to_box(
 ) -> float:
     """Return a travel up to which a core, that is apart from a box until `begin`, stays farther than `w` from it.
 
-    It is infinite where it does until `best`. Every step goes to a plane between the two, see `step_to_plane`, but ends
+    It is infinite if it does until `best`. Every step goes to a plane between the two, see `step_to_plane`, but ends
     where they are nearer than `near`, or after some steps.
     """
     s = begin

@@ -178,7 +178,7 @@ def part_nodes(
     areas: Floats,
     todo: Any,
 ) -> int:
-    """Part the triangles into nodes until leaves are left; write `order` and the nodes, return how many there are.
+    """Split the triangles into nodes down to leaves; write `order` and the nodes, return their number.
 
     Args:
         boxes, centers: see `triangle_boxes`. order: triangles, 0 ... T - 1 at the start, (T,).

@@ -1,4 +1,4 @@
-"""Where the links of a hand are, and its joints' angles when groups have travelled: kinematics for kernels."""
+"""Compute the frames of a hand's links, and its joints' angles from the travel of groups: kinematics for kernels."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ def depth_of(
     mesh, closed = mesh_of(meshes, k), meshes.closed[k] != 0
     if boxes_apart(mesh, 0, solid.tree, 0, T):
         return 0.0, 0.0, 0.0, 0.0
-    # Where an open mesh has an inside, a surface gets into it without crossing.
+    # A surface can get into an open mesh without crossing it.
     apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, work.pairs)
     if apart and not has_contained(meshes, k, T, solid, work.points[0]):
         return 0.0, 0.0, 0.0, 0.0

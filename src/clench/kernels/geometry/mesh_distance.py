@@ -119,7 +119,7 @@ def is_inside(tree: MeshTree, p: Any, closed: bool) -> bool:
 
 @kernel
 def winding_number(tree: MeshTree, p: Any) -> float:
-    """Return how often the mesh winds around a point: its exact solid angle over 4π (van Oosterom and Strackee)."""
+    """Return the winding number around a point: the exact solid angle over 4π (van Oosterom and Strackee)."""
     vertices, triangles = tree.vertices, tree.triangles
     total = 0.0
     for t in range(triangles.shape[0]):

@@ -15,7 +15,7 @@ from clench.kernels.toi.toi_translation import PAIRS, first_contact
 
 
 class Placed(NamedTuple):
-    """Where hands stop, for N proposals.
+    """Find the stops of hands that approach, for N proposals.
 
     Args:
         travel: distance that each hand may go past its place before it touches anything [m], shape (N,). It is below 0

@@ -1,6 +1,6 @@
 """How two bodies of a hand move relative to each other while its joints move on lines (docs/method.md section 7).
 
-Joints that move both bodies leave their gap as it is. So only the joints that move one of them count.
+Joints that move both bodies leave their gap as it is. Only the joints that move one of them count.
 """
 
 from __future__ import annotations

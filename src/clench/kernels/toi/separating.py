@@ -1,8 +1,9 @@
-"""Whether two convex cores that touch may move on, and how far (docs/method.md section 3, touching at the start).
+"""Decide whether two convex cores that touch may move on, and how far (docs/method.md section 3, touching at the
+start).
 
-They may when a plane separates them now and goes on to do so. Planes that rest are looked at first: those of faces and
-those along two edges. A core that tilts off a corner, or rolls off an edge, takes its plane along; that is probed by
-a step so short that nothing is missed on it.
+They may if a plane separates them now and continues to do so. Planes that rest are looked at first: those of faces and
+those along two edges. A core that tilts off a corner, or rolls off an edge, takes its plane along; that is probed by a
+step so short that nothing is missed on it.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def leave_plane(
     touch: float,
     best: float,
 ) -> float:
-    """Return for how long after `s` a plane that permits the motion goes on to separate, at most `best`."""
+    """Return for how long after `s` a plane that permits the motion keeps separating, at most `best`."""
     step = best
     rate = abs(chain[count - 1, 0])
     for k in range(corners):

@@ -121,7 +121,7 @@ def walk_item(
 ) -> float:
     """Return a travel up to which a pair of items, of which one is a node at least, is farther apart than `touch`.
 
-    It is infinite where it is until `best`.
+    It is infinite if it is until `best`.
 
     Args:
         ka, wa: corners and radius of the moving item `a`, which is in `work`. since: a travel before which it is known.

@@ -76,7 +76,7 @@ def step_to_plane(
     if is_spatial(chain):
         return float(fall_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best))
     rate, step, across = chain[count - 1, 0], best, math.sqrt(nx * nx + nz * nz)
-    # Where the last pivot is and how it moves is the same for all corners; where they are is known.
+    # The position and motion of the last pivot are the same for all corners, and the corners' positions are known.
     px, pz, base_slope, _, _, base_bound = base_motion(chain, count, nx, nz, s)
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
@@ -172,9 +172,9 @@ def sweep_pair(
         chain, count: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
             see `spatial_motion`.
         touch: gaps up to this touch [m]. begin: a travel up to which they are known to be farther apart, or 0.
-        placed: scratch space, (6, 3); its first rows are the moving core at the contact. Where nothing is
-            met before a positive `best`, its last row is the normal of a plane that keeps the cores apart all the way
-            from `begin`, or zero.
+        placed: scratch space, (6, 3); its first rows are the moving core at the contact. If nothing is met before a
+            positive `best`, its last row is the normal of a plane that keeps the cores apart all the way from `begin`,
+            or zero.
     """
     s, level, leap = begin, -1.0, 1.0
     for turn in range(PLANES):

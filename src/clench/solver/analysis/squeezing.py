@@ -184,7 +184,7 @@ def plan_squeeze(
 
 
 def angle_offsets(hand: Hand, grasp: HeldSolution, torques: FloatArray) -> dict[str, float]:
-    """Return by how much position servos are to be told more than the touch, `tau / k_p`, by joint [rad].
+    """Return the target offset of position servos beyond the touch, `tau / k_p`, by joint [rad].
 
     A servo that pulls a fixed tendon gives each of its joints a share of the tendon's target: see `Joint.stiffness`.
 

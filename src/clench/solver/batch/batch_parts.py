@@ -28,7 +28,7 @@ _UNUSED: Final = frozenset({"path", "findings", "spec_xml", "assets"})
 
 
 class PartsNote(msgspec.Struct):
-    """Describe the parts in a folder: of which question, by its fingerprint, and how many poses each has at most."""
+    """Describe the parts in a folder: fingerprint of their question, and the largest number of poses of each."""
 
     schema: str
     question: str

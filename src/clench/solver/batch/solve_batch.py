@@ -66,7 +66,8 @@ def solve_batch(
         device: "cpu" or "cuda" closes the fingers. Without a CUDA device, clench warns and uses the CPU. Answers of a
             device differ in their last bits.
         out: NumPy file (.npz) to write, see `GraspBatch.save`. Every chunk is written when it is solved, to the folder
-            `OUT.parts`. The same call goes on where an ended one stopped, and the folder goes when the file is whole.
+            `OUT.parts`. The same call continues an interrupted one, and the folder is removed when the file is
+            complete.
 
     Raises:
         CommandError: malformed poses or numbers, an unknown device, or see `clench.solve`. FileError: `out` cannot be

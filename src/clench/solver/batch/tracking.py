@@ -20,7 +20,7 @@ from clench.solver.preshapes.posture_choice import first_choice
 from .batch_solver import BatchSolver
 from .grasp_batch import GraspBatch
 
-#: By how much another plane's weighted sum has to be better before a finger leaves the one it has [-].
+#: A finger leaves its plane only if another plane's weighted sum is better by this [-].
 MARGIN: Final = 0.05
 
 

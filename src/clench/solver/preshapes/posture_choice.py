@@ -63,7 +63,7 @@ def first_choice(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspCo
 
 
 def with_posture(solution: GraspSolution, said: Mapping[str, Any], seconds: float) -> GraspSolution:
-    """Return a solution whose `choice` says why the posture was chosen, and how long that took [s]."""
+    """Return a solution whose `choice` gives the reason for the posture, and the time of its choice [s]."""
     choice, timing = solution.choice, dict(solution.timing)
     timing["total"] = timing.get("total", 0.0) + seconds
     return solution.with_known(

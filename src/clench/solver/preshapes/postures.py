@@ -92,7 +92,7 @@ def _kept(hand: Hand) -> dict[tuple[str, ...], list[tuple[str, dict[str, float]]
 
 
 def distance_from_open(hand: Hand, option: PostureOption, first: PostureOption) -> float:
-    """Return the sum of how far joints are set apart by a posture and by the open one [rad]."""
+    """Return the sum of the joints' absolute differences between a posture and the open one [rad]."""
     names = dict.fromkeys([*option.angles, *first.angles])
     opened = {name: hand.joints[hand.joint_index(name)].open_value for name in names}
     return float(np.sum([abs(option.angles.get(n, opened[n]) - first.angles.get(n, opened[n])) for n in names]))

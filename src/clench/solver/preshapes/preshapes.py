@@ -1,4 +1,5 @@
-"""The opposition zones of a hand: where, and how far apart, pads come to face each other (docs/method.md section 9).
+"""Find the opposition zones of a hand: places and distances at which pads come to face each other (docs/method.md
+section 9).
 
 A preshape fixes the posture joints and bends the outer joints. The first closing joint of every finger then closes. A
 zone describes two opposing sides of the hand on the way: the middle between their pads, the axis from one side to the
@@ -36,7 +37,7 @@ WELL = 0.25
 #: Preshapes that are drawn, and shares of the first closing joint's range at which pads are looked at.
 _DRAWS = 700
 _SHARES = np.linspace(0.05, 0.95, 10)
-#: By how much the outer joints of a finger are bent before it closes, as shares of their ranges [-].
+#: Bend of a finger's outer joints before it closes, as shares of their ranges [-].
 _BENT = (0.0, 0.0, 0.15, 0.3, 0.45)
 #: In a hand with a thumb, side-to-side finger joints stay within this share of their range around the open value.
 _SPREAD = 0.3
