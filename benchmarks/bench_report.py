@@ -1,4 +1,4 @@
-"""What a benchmark reports: flat keys and values, and where it was measured."""
+"""The report of a benchmark: flat keys and values, and the machine of the measurement."""
 
 from __future__ import annotations
 

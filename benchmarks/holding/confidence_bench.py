@@ -25,7 +25,7 @@ from .proportions import roc_auc, wilson
 
 @dataclass(frozen=True)
 class ConfidenceBench:
-    """Say what is tried.
+    """The settings of the trial.
 
     Args:
         proposals: per hand and object. grasps: tried of them, spread evenly over the scores. seed: of the proposals.
@@ -40,7 +40,7 @@ class ConfidenceBench:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a grasp: its object, its score, and whether it held."""
+    """The outcome of a grasp: its object, its score, and whether it held."""
 
     hand: str
     object: str
@@ -54,7 +54,7 @@ def bench_confidence(
     """Plan grasps of all scores for every hand and object, try them, and tabulate the share that held.
 
     Args:
-        hands, objects: what is loaded. asked: what is tried. out: file for the table (JSON). show: show a bar.
+        hands, objects: the loaded models. asked: settings of the trial. out: file for the table (JSON). show: a bar.
     """
     from rich.console import Console
     from rich.progress import track

@@ -27,7 +27,7 @@ TURN = float(np.deg2rad(0.6))
 
 @dataclass(frozen=True)
 class DisplacementBench:
-    """Say what is tried.
+    """The settings of the trial.
 
     Args:
         grasps: of each plan. proposals: of each plan. draws: directions of every displacement, the same for all grasps.
@@ -48,7 +48,7 @@ def bench_displacement(case: Case, asked: DisplacementBench, *, show: bool) -> B
     """Plan the best grasps for an object in place and for a displaced one, and hold displaced objects with both.
 
     Args:
-        case: what is loaded. asked: what is tried. show: show a bar.
+        case: the loaded models. asked: settings of the trial. show: show a bar.
     """
     hand, loaded = case.load()
     obj = in_pieces(loaded, show_progress=show)

@@ -52,7 +52,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class HoldBench:
-    """Say what is tried.
+    """The settings of the trial.
 
     Args:
         proposals: of the planner per hand and object. best: grasps by score that are tried. others: tried besides,
@@ -85,7 +85,7 @@ def bench_hold(
     """Plan and try grasps for every hand and object.
 
     Args:
-        hands, objects: what is loaded. asked: what is tried. files: where it is written.
+        hands, objects: the loaded models. asked: settings of the trial. files: where it is written.
         show_progress: show a bar.
     """
     loaded_hands = hands.load()

@@ -27,7 +27,7 @@ def roc_auc(scores: Sequence[float] | FloatArray, yes: Sequence[bool]) -> float 
     """Return the probability that a yes has a higher score than a no, ties counted half; None without one of each.
 
     Args:
-        scores: of every case. yes: what they are to tell.
+        scores: of every case. yes: the outcomes to predict.
     """
     values, is_yes = np.asarray(scores, dtype=np.float64), np.asarray(yes, dtype=bool)
     high, low = values[is_yes], values[~is_yes]

@@ -48,7 +48,7 @@ class GraspMeasures:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Hold what came of a grasp.
+    """The outcome of a trial of a grasp.
 
     Args:
         solution: the grasp. grasp_kind: by the links that touch. score: our own, see `PlannedGrasp`.
@@ -66,7 +66,7 @@ class Trial:
 
     @property
     def outcome(self) -> str:
-        """What happened, for counting."""
+        """The outcome, for counting."""
         limits = self.report.settings.max_distance, self.report.settings.max_angle
         if self.report.held:
             return "held"
@@ -81,7 +81,7 @@ class Trial:
         return "lost_in_the_pull"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is kept of a trial: the grasp, what was measured, and the reports of all tests."""
+        """Return the record of a trial: the grasp, the measurements, and the reports of all tests."""
         return {
             "hand_pose": self.solution.hand_pose.to_dict(),
             "joint_angles": dict(self.solution.joint_angles),
@@ -102,7 +102,7 @@ def try_grasp(
     """Simulate a grasp.
 
     Args:
-        solution: the grasp. score: its own. hand, obj: what it is of. hold: the test. harder: also other settings.
+        solution: the grasp. score: its own. hand, obj: hand and object. hold: the test. harder: also other settings.
     """
     trajectory = plan_trajectory(solution, hand, obj=obj, force=True)
     return Trial(

@@ -1,4 +1,4 @@
-"""Every way of closing one hand around one object that the benchmark of peers compares, and what is wrong with ends."""
+"""All ways of closing one hand around one object that the benchmark of peers compares, and checks of their ends."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Closer = Callable[[int], Answer]
 
 
 class Ended(NamedTuple):
-    """Hold how one closing ended: posture [rad], fingers that touch, and how many queries and distances it took."""
+    """The end of one closing: posture [rad], fingers that touch, and the numbers of queries and distances."""
 
     q: FloatArray
     touching: frozenset[str]
@@ -52,7 +52,7 @@ class Ended(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PeerCase:
-    """Hold one hand, one object and the poses that everything starts from."""
+    """One hand, one object and the poses from which all ways start."""
 
     hand: Hand
     obj: GraspObject
@@ -66,7 +66,7 @@ class PeerCase:
 
     @cached_property
     def stepper(self) -> Stepper:
-        """What closes in steps, from the open hand."""
+        """The stepper that closes from the open hand."""
         return Stepper(self.hand, self.obj, self.hand.open_angles(), self.hand.default_source)
 
     @cached_property
@@ -130,7 +130,7 @@ class PeerCase:
 
 
 def wrong_ends(case: PeerCase) -> Iterator[str]:
-    """Yield a sentence for whatever is wrong with how closings end, or with what the steppers were told on the way."""
+    """Yield a sentence for every error in the ends of closings, or in the answers that the steppers got on the way."""
     for k in range(len(case.poses)):
         for sentence in (*_wrong_queries(case, k), *_wrong_steps(case, k), *_wrong_solve(case, k)):
             yield f"{case.obj.name}, pose {k}: {sentence}"
@@ -145,7 +145,7 @@ def _wrong_queries(case: PeerCase, k: int) -> Iterator[str]:
         asked = np.flatnonzero(log.queries[:, 0] >= 0)[::_EVERY]
         for (link, kind, hit), q in zip(log.queries[asked], log.postures[asked], strict=True):
             gap = case.engine.link_gap(int(link), case.hand.link_poses(q)[link], T, q)
-            # What was noted of a distance is whether it is below a bound: that of the rule, or twice that.
+            # A recorded distance says whether it is below a bound: that of the rule, or twice that.
             right = gap < 2.0 * rule.fine or not hit if kind == 1 else (gap < 0.0) == bool(hit)
             if not right and abs(gap) > _ROUNDING:
                 name = case.hand.links[link].name
@@ -154,7 +154,7 @@ def _wrong_queries(case: PeerCase, k: int) -> Iterator[str]:
 
 
 def _wrong_steps(case: PeerCase, k: int) -> Iterator[str]:
-    """Hold the ends of the steppers against their rules."""
+    """Check the ends of the steppers against their rules."""
     for rule in RULES[:2]:
         ended = case.ended(k, case.step(rule, k))
         gaps = case.gaps(k, ended.q)
@@ -165,7 +165,7 @@ def _wrong_steps(case: PeerCase, k: int) -> Iterator[str]:
 
 
 def _wrong_solve(case: PeerCase, k: int) -> Iterator[str]:
-    """Hold certified answers against the engine, and against fine steps: these end at the first collision or later."""
+    """Check certified answers against the engine and against fine steps, which end at the first collision or later."""
     solution = case.solve(True, k)
     if not solution.certified:
         return

@@ -22,7 +22,7 @@ MOST: Final = 1000
 
 
 class Rested(NamedTuple):
-    """Hold where a simulated closing came to rest: posture [rad], and steps of the engine."""
+    """The rest of a simulated closing: posture [rad], and steps of the engine."""
 
     q: FloatArray
     steps: int

@@ -30,7 +30,7 @@ _FAR: Final = 1e3
 
 @dataclass(frozen=True, eq=False)
 class _Core:
-    """Hold a core with its radius, as the library's tree over triangles, and the ball around it."""
+    """A core with its radius, as the library's tree over triangles, and the ball around it."""
 
     placed: Any
     radius: float

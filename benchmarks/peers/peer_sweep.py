@@ -36,7 +36,7 @@ _TURNS: Final = ((0.5**0.5, 0.0, 0.5**0.5, 0.0), (0.5**0.5, -(0.5**0.5), 0.0, 0.
 
 @dataclass(frozen=True)
 class Swept:
-    """Hold median time of a closing [s] and median gap that is left [m]: for every factor of a rule, or for one way."""
+    """Median time of a closing [s] and median remaining gap [m]: for every factor of a rule, or for one way."""
 
     seconds: Mapping[str, list[float]]
     residual: Mapping[str, list[float]]
@@ -44,10 +44,10 @@ class Swept:
 
 @dataclass(frozen=True)
 class Misses:
-    """Hold which share of touches of a blade each rule steps through, for every factor.
+    """The share of contacts with a blade that each rule steps through, for every factor.
 
     Args:
-        shares: by rule. values: what is reported. errors: sentences about certified answers that miss.
+        shares: by rule. values: the reported values. errors: sentences about certified answers that miss.
     """
 
     shares: Mapping[str, list[float]]

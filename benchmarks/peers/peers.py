@@ -30,7 +30,7 @@ _LOGGED: Final = 20000
 
 @dataclass(frozen=True)
 class PeerBench:
-    """Say what is compared: poses and passes, planes per finger, the seed of the poses, whether MuJoCo closes."""
+    """The settings: poses and passes, planes per finger, the seed of the poses, whether MuJoCo closes."""
 
     runs: Runs
     planes: int
@@ -43,7 +43,7 @@ def bench_peers(hand_model: str, objects: Objects, asked: PeerBench, pages: Page
     """Check closings of every kind against an independent engine, then time them in turn.
 
     Args:
-        hand_model, objects: what is loaded. asked: see there. pages: files for a picture and a table.
+        hand_model, objects: the loaded models. asked: see there. pages: files for a picture and a table.
 
     Returns:
         the report; with errors, and without times, when an answer is wrong.
@@ -177,8 +177,8 @@ def _report_ratios(
 ) -> None:
     """Add how many times longer peers take than we do: the median over passes, in each of which all take turns.
 
-    A stepper counts with the least of what it took and what python-fcl takes for its collision queries alone, without
-    calls, distances or anything else, so that slow queries cannot flatter us.
+    A stepper counts with the smaller of two times: its own, and python-fcl's time for its collision queries alone,
+    without calls, distances or anything else. Thus slow queries cannot flatter us.
     """
     for peer in [rule.name for rule in RULES] + ([SIMULATED] if SIMULATED in wall else []):
         bare = float(report.values.get(f"{key}_{peer}_fcl_bare_ms", np.inf)) * 1e-3

@@ -55,7 +55,7 @@ RULES: Final = (
 
 
 class Closing(NamedTuple):
-    """Hold where a closing ended: posture [rad], what stopped each degree of freedom, and the tally of queries."""
+    """The end of a closing: posture [rad], the stop of each degree of freedom, and the tally of queries."""
 
     q: FloatArray
     stops: NDArray[np.int64]

@@ -37,7 +37,7 @@ def bench_choice(case: Case, runs: Runs, alternatives: int, seed: int) -> BenchR
     """Check choices against trying everything, then time them.
 
     Args:
-        case: what is loaded. runs: how many poses, and how often. seed: of the poses.
+        case: the loaded models. runs: how many poses, and how often. seed: of the poses.
         alternatives: sets per finger, each from an open value of its own.
     """
     hand, obj = case.load()

@@ -77,7 +77,7 @@ def bench_steadiness(contacts: int, grasps: int, passes: int, seed: int, plot: P
 
 
 def draw_bound(grasps: Sequence[_Grasp], path: Path) -> Path:
-    """Draw the fast lower bound against the exact epsilon, and what it reaches of it by the number of contacts."""
+    """Draw the fast lower bound against the exact epsilon, and the ratio of both by the number of contacts."""
     closed = [g for g in grasps if g.exact > 0.0]
     exact, bound = (np.array([getattr(g, key) for g in closed]) for key in ("exact", "bound"))
     counts = np.array([len(g.held.contacts) for g in closed])
@@ -135,7 +135,7 @@ def _describe_bound(report: BenchReport, key: str, grasps: Sequence[_Grasp]) -> 
 
 
 def _time_forces(report: BenchReport, passes: int) -> None:
-    """Time the least torque for one load, and the squeeze, of the built-in hand on a sphere; check what they keep."""
+    """Time the least torque for one load, and the squeeze, of the built-in hand on a sphere; check the results."""
     hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03")
     pose = clench.approach_poses(hand, ball, 1, 1)[0]
     solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))

@@ -34,7 +34,7 @@ def bench_batch(case: Case, runs: Runs, planes: int, stream: int, seed: int) -> 
     """Check the answers for many poses against single solves, then time them.
 
     Args:
-        case: what is loaded. runs: how many poses, and how often. planes: per finger.
+        case: the loaded models. runs: how many poses, and how often. planes: per finger.
         stream: number of poses streamed. seed: of the poses.
 
     Returns:

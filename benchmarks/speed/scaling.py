@@ -35,14 +35,14 @@ BATCHES: Final = (1, 4, 16, 64, 256, 1024)
 AT_ONCE: Final = 64
 #: Triangles of the coarsest mesh, about.
 COARSEST: Final = 1000
-#: What counts as the same angle for other triangles of the same surface [rad].
+#: Tolerance of an angle for other triangles of the same surface [rad].
 SAME_SURFACE: Final = 1e-6
 SAME: Final = 1e-9
 
 
 @dataclass
 class Axis:
-    """Hold one axis: its name, where it was measured, and times there by part of the work [s]."""
+    """One axis: its name, its sizes, and the times there by part of the work [s]."""
 
     name: str
     at: list[int] = field(default_factory=list)
@@ -63,7 +63,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class ScalingBench:
-    """Say what is measured: poses and passes, triangles at most, poses at once at most, poses of the stream, seed."""
+    """The settings: poses and passes, most triangles, most poses per call, poses of the stream, seed."""
 
     runs: Runs
     triangles: int
@@ -74,10 +74,10 @@ class ScalingBench:
 
 
 def bench_scaling(case: Case, asked: ScalingBench, pages: Pages) -> BenchReport:
-    """Measure each axis alone; every answer is compared with one that is known before its times count.
+    """Measure each axis alone; every answer is compared with a known answer before its times count.
 
     Args:
-        case: what is loaded. asked: see there. pages: files for a picture and a table.
+        case: the loaded models. asked: see there. pages: files for a picture and a table.
     """
     report = BenchReport(values={"benchmark": "scaling", **describe_place()})
     hand, given = case.load()

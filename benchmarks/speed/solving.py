@@ -34,7 +34,7 @@ def bench_solve(case: Case, asked: GraspCommand, runs: Runs) -> BenchReport:
     """Check the answers for many approach poses, then time them.
 
     Args:
-        case: what is loaded. asked: of every pose; its seed draws the poses. runs: how many poses, and how often.
+        case: the loaded models. asked: of every pose; its seed draws the poses. runs: how many poses, and how often.
 
     Returns:
         the report; with errors, and without times of solves, when an answer is wrong.
@@ -127,7 +127,7 @@ def _describe_answers(report: BenchReport, solutions: Sequence[GraspSolution]) -
 
 
 def _time_preparation(report: BenchReport, hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
-    """Time what is computed once per hand and posture, and once per object, with everything compiled."""
+    """Time the parts that are computed once per hand and posture, and once per object, with everything compiled."""
     fresh = clench.solve(replace(hand), obj, command)
     report.values["prepare_hand_ms"] = fresh.timing["plan"] * 1e3
     body = obj.bodies[0]

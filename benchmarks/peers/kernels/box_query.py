@@ -19,7 +19,7 @@ PAIRS = 512
 
 
 class BoxTrees(NamedTuple):
-    """Hold several solids, each in its own frame, one tree of boxes each; T elements, N nodes, B solids.
+    """Several solids, each in its own frame, one tree of boxes each; T elements, N nodes, B solids.
 
     Args:
         points: corners of each element [m], (T, 3, 3). corners: how many count, 1 to 3, (T,). radius: [m], (T,).
@@ -40,7 +40,7 @@ class BoxTrees(NamedTuple):
 
 
 class Query(NamedTuple):
-    """Hold the scratch space of queries: pose of the first solid in the second's frame, (3, 4), and what follows."""
+    """The scratch space of queries: pose of the first solid in the second's frame, (3, 4), and buffers."""
 
     pose: Floats
     spread: Floats

@@ -17,7 +17,7 @@ from clench.kernels.sections.plane_pose import compose_inverse
 
 from .box_query import BoxTrees, Query, make_query, within
 
-#: What became of a degree of freedom.
+#: States of a degree of freedom.
 MOVING, AT_LIMIT, AT_CONTACT = 0, 1, 2
 #: Rules of stepping.
 ALL_AT_ONCE, ROUND_ROBIN, ONE_BY_ONE = 0, 1, 2
@@ -30,7 +30,7 @@ ALSO_CONTACT = 2.0
 
 
 class SteppedHand(NamedTuple):
-    """Hold what stepping needs of a hand; L links, D free degrees of freedom.
+    """The data of a hand for stepping; L links, D free degrees of freedom.
 
     Args:
         frames: its kinematics.
@@ -59,7 +59,7 @@ class StepLog(NamedTuple):
 
 
 class _State(NamedTuple):
-    """Hold one closing: postures now and tried, (J,); states, (D,); poses of links; counts; log; scratch space."""
+    """State of one closing: postures now and tried, (J,); states, (D,); poses of links; counts; log; scratch space."""
 
     q: Floats
     trial: Floats
@@ -90,12 +90,12 @@ def close_in_steps(
     """Close a hand around a body by a rule of stepping.
 
     Args:
-        rule: `ALL_AT_ONCE`: a step that collides is halved until the gap is below `fine` [m]; what is within twice that
+        rule: `ALL_AT_ONCE`: a step that collides is halved until the gap is below `fine` [m]; a link within twice that
             stops the joints before it. `ROUND_ROBIN`: what collides goes back one step; once all stand, one more round.
             `ONE_BY_ONE`: steps until a hit, one back, then steps of `fine` [rad] until a hit, where it stays.
         target: one solid. T_root_target: its pose, (3, 4).
         q: the posture [rad], (J,), read and written. step: [rad]. most: rounds at most.
-        stops, tally: what became of each degree of freedom, (D,); how many queries of what kind, (3,). log: see there.
+        stops, tally: the state of each degree of freedom, (D,); the numbers of queries by kind, (3,). log: see there.
     """
     joints, links = q.shape[0], hand.frames.parent.shape[0]
     poses, turn, local = np.empty((links, 3, 4)), np.empty((3, 4)), np.empty((3, 4))
@@ -222,7 +222,7 @@ def copy_posture(q: Floats, out: Floats) -> None:
 
 @kernel
 def accept(hand: SteppedHand, state: _State) -> None:
-    """Go to the posture that was tried, and note what is at its limit."""
+    """Go to the tried posture, and note the joints at their limits."""
     copy_posture(state.trial, state.q)
     for d in range(hand.free.shape[0]):
         if state.stops[d] == MOVING and state.q[hand.free[d]] == hand.end[d]:
@@ -277,7 +277,7 @@ def hits(hand: SteppedHand, target: BoxTrees, state: _State, d: int) -> bool:
 
 @kernel
 def stop_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) -> bool:
-    """Stop whatever moves a link that is nearer than a bound; say whether there is such a link."""
+    """Stop the joints of links that are nearer than a bound; say whether there is such a link."""
     found = False
     for m in range(hand.frames.parent.shape[0]):
         if is_moving(hand, state, m) and near_of(hand, target, state, m, bound):
@@ -288,7 +288,7 @@ def stop_near(hand: SteppedHand, target: BoxTrees, state: _State, bound: float) 
 
 @kernel
 def stop_hit(hand: SteppedHand, target: BoxTrees, state: _State, step: float) -> None:
-    """Stop whatever moves a link that collides one step on, where no gap can be found before it."""
+    """Stop the joints of links that collide one step on, if no gap can be found before it."""
     move_all(hand, state, step)
     put_links(hand, state.trial, state, -1)
     for m in range(hand.frames.parent.shape[0]):
@@ -298,7 +298,7 @@ def stop_hit(hand: SteppedHand, target: BoxTrees, state: _State, step: float) ->
 
 @kernel
 def stop_link(hand: SteppedHand, state: _State, m: int) -> None:
-    """Stop whatever moves a link."""
+    """Stop the joints of a link."""
     for d in range(hand.free.shape[0]):
         if hand.moves[d, m] and state.stops[d] == MOVING:
             state.stops[d] = AT_CONTACT

@@ -1,1 +1,1 @@
-"""What people touch: command line and figures. Nothing imports these."""
+"""User interfaces: command line and figures. Nothing imports these."""

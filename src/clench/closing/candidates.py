@@ -1,4 +1,4 @@
-"""The alternative sets of a finger, read out of what the kernels computed (docs/method.md section 5)."""
+"""Read the alternative sets of a finger from the kernels' results (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Touch(NamedTuple):
     """Describe one contact, in the palm frame.
 
     Args:
-        link, joint: indices in the hand: the touching link, and the leader of the group it stopped (where joints break
-            away, the last one that it stopped).
+        link, joint: indices in the hand of the touching link, and of the leader of the group that it stopped. If joints
+            break away, the leader is the last joint that the link stopped.
         body: index of the touched body, or -1 - index of a touched link of the hand itself. graspable: whether that
             body is to be grasped.
         plane: of the family, None where the touch lies on none. offset: its place along y [m].
@@ -64,7 +64,7 @@ class Touch(NamedTuple):
 
 @dataclass(eq=False)
 class FingerCandidate:
-    """Hold one alternative set of a finger; the judgement is filled in once it is closed.
+    """One alternative set of a finger; the judgement is filled in after the closing.
 
     Args:
         plan: the finger at its posture. posture: index of the posture alternative.
@@ -143,7 +143,7 @@ def read_candidates(
     """Return one candidate per item, in item order.
 
     Args:
-        plan: what closed. packed, T_palm_object: the object, shape (4, 4). answer: what the kernels computed.
+        plan: of the fingers. packed: the object. T_palm_object: its pose, shape (4, 4). answer: results of the kernels.
         overlaps: as `start_overlaps` gives them, per entry.
     """
     from clench.kernels.closing.layout import SUNK
@@ -178,10 +178,10 @@ def read_candidates(
 
 
 def held_touches(plan: HandPlan, met: Meetings) -> dict[int, list[Touch]]:
-    """Return the touches of fingers that hold each other, by finger; those of a finger that rests are left out.
+    """Return the contacts of fingers that stop each other, by finger, without contacts of resting fingers.
 
     Args:
-        plan: of the hand. met: where fingers that close at once met, at one pose.
+        plan: of the hand. met: meetings of simultaneously closing fingers at one pose.
     """
     held: dict[int, list[Touch]] = {}
     for number, value in zip(met.number[: met.size[0]].tolist(), met.value[: met.size[0]], strict=True):

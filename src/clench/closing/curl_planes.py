@@ -37,9 +37,9 @@ def family_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> F
 def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
     """Place curl planes across a finger, shape (P,), ascending [m].
 
-    One plane lies in the middle; two lie at both edges, inset by 1e-4 of the width; from three on there are the
-    edges, even spacing between them, and the edges of every narrower shape that are farther than 2 % of the
-    width, and than half the spacing, from those.
+    One plane lies in the middle. Two lie at both edges, inset by 1e-4 of the width. Three or more lie at the edges,
+    evenly between them, and at the edges of every narrower shape. The edge of a narrower shape is left out if it is
+    nearer to another edge than 2 % of the width or half the spacing.
 
     Args:
         extents: least and greatest y of every shape of every link [m]. count: at least 1.

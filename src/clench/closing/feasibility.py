@@ -33,12 +33,13 @@ def judge_sets(
     """Fill `clear` of the candidates, and on request `feasible` and `penetration`.
 
     A set that was swept exactly passes through nothing. Without that, the full-width set passes through nothing on any
-    plane; a plane's own set that equals it is the same set. Every other one passes through what another plane would
-    have stopped at. What lies between the planes is measured.
+    plane; a plane's own set that equals it is the same set. Any other plane's set passes through the contacts of other
+    planes. The overlap between the planes is measured.
 
     Args:
         hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
-        source: geometry of the hand. measure: measure every set, along its path. together: all joints close at once.
+        source: geometry of the hand. measure: measure every set, along its path. together: all joints close
+            simultaneously.
     """
     whole = {id(c.plan): c for c in candidates if c.plane is None}
     for c in candidates:
@@ -83,7 +84,7 @@ def _path(travel: FloatArray) -> list[FloatArray]:
 
 
 def _path_at_once(candidate: FingerCandidate) -> list[FloatArray]:
-    """Return travels along the closing path where all groups move at once, the end last."""
+    """Return travels along a closing path on which all groups move simultaneously, the end last."""
     speeds = np.array(candidate.plan.speeds)
     last = float((candidate.travel / speeds).max(initial=0.0))
     parts = np.linspace(0.0, last, _LOOKS * len(speeds), endpoint=False)[1:]

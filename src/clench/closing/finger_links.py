@@ -1,4 +1,4 @@
-"""Pack what the search for meetings of fingers reads: their links, and how far joints can carry them."""
+"""Pack the input of the search for meetings of fingers: their links, and the reach of their joints."""
 
 from __future__ import annotations
 

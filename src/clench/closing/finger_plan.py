@@ -57,7 +57,7 @@ class LinkOutline:
 
 @dataclass(frozen=True, eq=False)
 class CurlFamily:
-    """Hold the parallel curl planes that consecutive joints share.
+    """The parallel curl planes that consecutive joints share.
 
     Args:
         T_palm_family: at the open posture, shape (4, 4); y is normal to the planes.
@@ -79,14 +79,14 @@ class CurlFamily:
 
 @dataclass(frozen=True, eq=False)
 class FingerPlan:
-    """Hold everything about closing one finger from one open posture.
+    """The plan for closing one finger from one open posture.
 
     Args:
         finger: the finger. posture: open angles of all joints of the hand [rad], shape (J,).
         joints: closing joints, palm side first. leaders: leader of each group (index in the hand).
         lengths: travel of each group to its limit [rad]. families: see `CurlFamily`.
-        speeds: of each group where all move at once, relative to each other. breaks: whether later joints of a group
-            go on when those before them are blocked.
+        speeds: relative speed of each group in simultaneous closing. breaks: whether later joints of a group continue
+            when earlier joints are blocked.
         length: of the finger [m].
     """
 
@@ -101,10 +101,11 @@ class FingerPlan:
     length: float
 
     def lies_in_planes(self, again: bool) -> bool:
-        """Say whether only joints of one family ever move at once, those before them resting: then planes tell all.
+        """Say whether the joints of only one family ever move together, with earlier joints at rest: then planes
+        suffice.
 
         Args:
-            again: all joints move at once, or in several rounds.
+            again: all joints move simultaneously, or in several rounds.
         """
         homes: dict[int, set[int]] = {}
         for p in self.joints:
@@ -142,7 +143,7 @@ def plan_finger(
         hand: the hand. finger: one of its fingers.
         posture: angles of all joints [rad], couplings hold, shape (J,).
         planes: number of curl planes. source: geometry of the links.
-        speeds: by name of a free joint, where all move at once; those not named have speed 1.
+        speeds: by name of a free joint, for simultaneous closing; the default is 1.
 
     Raises:
         HandError: a coupling that the method does not cover.
@@ -182,7 +183,7 @@ def plan_finger(
 
 
 def closing_joints(hand: Hand, finger: Finger) -> list[int]:
-    """Return the joints that closing moves, palm side first: free ones and those that follow them.
+    """Return the joints that closing moves, palm side first: free joints and their followers.
 
     Raises:
         HandError: a posture joint that follows a closing one, or coupling between fingers.

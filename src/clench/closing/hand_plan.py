@@ -1,6 +1,6 @@
-"""The plan of a hand at a posture: what closes, on which planes, and in which order (docs/method.md sections 1-5).
+"""The plan of a hand at a posture: closing joints, planes and order (docs/method.md sections 1-5).
 
-A plan knows neither the object nor the pose, so it serves every object and every pose.
+A plan is independent of the object and the pose, so every object and every pose can share it.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class HandPlan:
         items: of each entry its planes, one by one, then the full width, if wanted. An entry that does not lie in
             planes has the full width alone, without planes.
         whole: whether each item is the full width.
-        full: the command asks for the full width. together: all joints of the hand move at once. times: how often the
-            degrees of freedom are gone through.
+        full: the command asks for the full width. together: all joints of the hand move simultaneously. times: number
+            of passes through the degrees of freedom.
     """
 
     hand: Hand
@@ -98,7 +98,7 @@ class HandPlan:
 
     @cached_property
     def plane_counts(self) -> list[int]:
-        """How many items on single planes each entry has."""
+        """Number of items on single planes, per entry."""
         single = self.items.entry[~np.array(self.whole)]
         return [int((single == entry).sum()) for entry in range(len(self.plans))]
 
@@ -163,7 +163,7 @@ def make_hand_plan(
 
 
 def _with_resting(hand: Hand, plans: Sequence[FingerPlan], bodies: HandBodies) -> np.ndarray:
-    """Return which links may not overlap while all fingers close: those of fingers that rest are in the way."""
+    """Return the pairs of links that may not overlap while all fingers close: resting fingers are in the way."""
     closing = {plan.finger.name for plan in plans}
     resting = [link for f in hand.fingers if f.name not in closing for link in f.links]
     checked = bodies.within.copy()

@@ -24,7 +24,7 @@ Arrays = TypeVar("Arrays")
 
 
 class Answers(NamedTuple):
-    """What the kernels computed for N poses: how the fingers closed, and the answer."""
+    """The kernels' results for N poses: the closings of the fingers, and the answer."""
 
     closed: Closed
     solved: Solved
@@ -35,8 +35,8 @@ class Answers(NamedTuple):
         return Answers(closed, solved)
 
 
-#: Chooses an item for every finger at a pose that is closed: the number of the pose, its answers, and the items and
-#: whether links lie inside each other at their start, which it returns.
+#: Chooses an item for every finger at a closed pose. It gets the index of the pose, its answers, the items, and whether
+#: links overlap at their start; it returns the last two.
 Chooser = Callable[[int, Answers], tuple[list[int], bool]]
 
 

@@ -1,4 +1,4 @@
-"""Pack what the exact width needs: the hand's links and the object as bodies, and how the links move (section 5)."""
+"""Pack the input of the exact sweep: the links and the object as bodies, and the motion of the links (section 5)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _KEPT_HANDS: Final = 16
 
 
 class HandBodies(NamedTuple):
-    """Hold what exact sweeps need of a hand at any posture; L links.
+    """The data of a hand for exact sweeps at any posture; L links.
 
     Args:
         links: every link that can touch as a body, in its own frame.

@@ -43,8 +43,8 @@ def asked_fingers(hand: Hand, command: GraspCommand) -> tuple[Finger, ...]:
 def alternatives(hand: Hand, finger: Finger, q: FloatArray, command: GraspCommand) -> list[FloatArray]:
     """Return the open postures to try for a finger, the commanded one first, each inside the limits, shape (J,).
 
-    The yaw grid offsets the finger's last posture joint before its closing joints, the opposition grid the first one
-    of a thumb; the open-value variants close the finger's free joints by an offset before it starts.
+    The yaw grid offsets the finger's last posture joint before its closing joints. The opposition grid offsets the
+    first posture joint of a thumb. The open-value variants offset the finger's free joints before it starts to close.
     """
     postures = [q]
     first, last = _posture_joints(hand, finger)
@@ -82,7 +82,7 @@ def next_postures(hand: Hand, steps: Sequence[Mapping[str, float]]) -> tuple[Flo
 
 
 def task_wrenches(command: GraspCommand, T_world_palm: Pose) -> FloatArray:
-    """Return what acts on the object in its task in the palm frame: force [N] and torque [Nm], shape (N, 6)."""
+    """Return the task's wrenches on the object in the palm frame: force [N] and torque [Nm], shape (N, 6)."""
     parts = [[w.get(part, (0.0, 0.0, 0.0)) for part in ("force", "torque")] for w in command.task_wrenches]
     there: FloatArray = np.array(parts, dtype=np.float64).reshape(-1, 2, 3) @ T_world_palm.rotation
     return there.reshape(-1, 6)
@@ -101,7 +101,7 @@ def _with_zero(offsets: Sequence[float]) -> list[float]:
 
 
 def _posture_joints(hand: Hand, finger: Finger) -> tuple[int | None, int | None]:
-    """Return the first and the last posture joint before a finger's closing joints; None where one may not move."""
+    """Return the first and the last posture joint before the closing joints; None for a joint that may not move."""
     before = list(itertools.takewhile(lambda j: hand.joints[j].role is not JointRole.CLOSING, finger.joints))
     before = [j for j in before if hand.joints[j].role is JointRole.POSTURE]
     # A joint that another finger follows would move that finger too.

@@ -27,7 +27,7 @@ _ROUND = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, Shap
 
 @dataclass(frozen=True)
 class RoundedOutline:
-    """Hold the section of a shape: all points within `radius` of a core.
+    """The section of a shape: all points within `radius` of a core.
 
     Args:
         vertices: of the core [m], in the family's (x, z), shape (N, 2).
@@ -119,8 +119,8 @@ def _cut_mesh(mesh: TriangleMesh, T: FloatArray, offset: float) -> RoundedOutlin
 def without_seams(segments: FloatArray) -> FloatArray:
     """Join segments that go straight on: where two triangles of one flat face meet there is no corner.
 
-    With such corners an outline would depend on how the faces are split, and a mirrored box would not have those of
-    the box's image.
+    Otherwise an outline would depend on how the faces are split, and the outline of a mirrored box would not be the
+    mirrored outline.
 
     Args:
         segments: rows (a_x, a_z, b_x, b_z, n_x, n_z) [m], shape (S, 6); joined only where normals agree.
@@ -151,7 +151,7 @@ def without_seams(segments: FloatArray) -> FloatArray:
 
 
 def _followers(start: FloatArray, end: FloatArray, n: FloatArray, slack: float) -> np.ndarray:
-    """Return, for every segment, the one that goes on from its end in nearly the same line, or -1."""
+    """Return, for every segment, the segment that continues from its end in nearly the same line, or -1."""
     points, index = np.unique(np.vstack([start, end]), axis=0, return_inverse=True)
     first, last = np.split(index.ravel(), 2)
     count = len(points)
@@ -196,7 +196,7 @@ def _winds_outwards(mesh: TriangleMesh) -> bool:
 
 
 def _side_rows(segments: FloatArray) -> FloatArray:
-    """Return sides from segments (a_x, a_z, b_x, b_z, n_x, n_z), without those of no length."""
+    """Return sides from segments (a_x, a_z, b_x, b_z, n_x, n_z), without segments of length zero."""
     a, b, n = segments[:, 0:2], segments[:, 2:4], segments[:, 4:6]
     along = np.column_stack([-n[:, 1], n[:, 0]])
     ends = np.sort(np.column_stack([(a * along).sum(axis=1), (b * along).sum(axis=1)]), axis=1)

@@ -1,4 +1,4 @@
-"""Pack a plan, an object and what the command asks for into the arrays of the kernels (docs/method.md sections 4-6)."""
+"""Pack a plan, an object and the command's options into the arrays of the kernels (docs/method.md sections 4-6)."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 CAPACITY: Final = 512
 #: Packed problems that an object keeps, the latest used.
 KEPT_PROBLEMS: Final = 64
-#: Arenas that no thread uses, by what their arrays' shapes depend on, the latest used last.
+#: Arenas that no thread uses, by the sizes of their arrays, latest used last.
 _ARENAS: Final[OrderedDict[tuple[int, ...], list[Arena]]] = OrderedDict()
 _KEPT_ARENAS: Final = 16
 _LENDING: Final = Lock()
 
-#: Criteria that a sum is made of: which, and what one unit of each adds.
+#: Criteria in a sum: their codes, and what one unit of each adds.
 Terms = tuple[tuple[int, float], ...]
 
 
@@ -46,7 +46,7 @@ class PackedProblem:
     """A plan and an object, packed for the kernels at any poses.
 
     Args:
-        plan: of the hand. arrays: what the kernels read. capacity: see `Capacity`, the same for all plans of an object.
+        plan: of the hand. arrays: input of the kernels. capacity: see `Capacity`, the same for all plans of an object.
     """
 
     plan: HandPlan
@@ -113,12 +113,12 @@ def _make_arena(shape: tuple[int, ...]) -> Arena:
 
 @dataclass(eq=False)
 class Capacity:
-    """How many segments per plane have been enough for an object so far; no answer depends on it."""
+    """The largest number of segments per plane so far for an object; no answer depends on it."""
 
     segments: int = CAPACITY
 
     def grow(self, wanted: int) -> None:
-        """Make room for twice of what was wanted, so that the next pose hardly needs more."""
+        """Make room for twice the wanted number, so that the next pose rarely needs more."""
         self.segments = max(self.segments, 2 * wanted)
 
 
@@ -132,8 +132,8 @@ def pack_problem(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: b
     """Return a plan and an object packed for the kernels; packed once.
 
     Args:
-        plan: of the hand. packed: the object. terms: of the sum that chooses among planes; empty where there is nothing
-            to choose, or the caller chooses. tip_only: only fingertips are to touch.
+        plan: of the hand. packed: the object. terms: of the sum that chooses among planes; empty if there is no choice
+            or the caller chooses. tip_only: only fingertips may touch.
     """
     kept, key = _packed_with(packed), (id(plan), terms, tip_only)
     entry = kept.get(key)
@@ -214,8 +214,8 @@ def _own_joints(fingers: Sequence[Finger]) -> np.ndarray:
 def items_around(plan: HandPlan, packed: PackedObject) -> ItemArrays:
     """Return the items of a plan as they close around an object.
 
-    The full width needs no planes around what is swept exactly: the sweep alone is sooner done. Around cylinders
-    and ellipsoids, which are swept as polyhedra, it stops where a plane shows the true shape to be touched before.
+    The full width needs no planes around exactly swept shapes: the sweep alone is faster. Cylinders and ellipsoids are
+    swept as polyhedra, so a plane can show an earlier contact with the true shape.
     """
     if packed.is_curved:
         return plan.items

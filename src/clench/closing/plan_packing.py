@@ -122,5 +122,5 @@ def enclosing(outline: RoundedOutline) -> FloatArray:
 
 
 def _widened(reach: float, radius: float) -> float:
-    """Add an outline's radius to how far its vertices get, and what rounding may take away."""
+    """Add an outline's radius to the reach of its vertices, and a bound on rounding errors."""
     return float(reach + radius) * (1.0 + 1e-9)

@@ -22,7 +22,7 @@ _KEPT_PLANS = 64
 
 
 class LinkMasks(NamedTuple):
-    """Say which meshes are those of each entry's finger, and which of them closing does not move, (E, M) each."""
+    """Masks of meshes, (E, M) each: those of the entry's finger, and those of them that closing does not move."""
 
     own: NDArray[np.int64]
     resting: NDArray[np.int64]
@@ -44,7 +44,7 @@ def start_overlaps(
     """Return the link that overlaps the object deepest at the start, or None, for every entry.
 
     Args:
-        plan: of the hand. blocked: what the kernels found, see `Closed`, shape (E,).
+        plan: of the hand. blocked: blocked flags from the kernels, see `Closed`, shape (E,).
         packed, T_palm_object: the object, shape (4, 4).
     """
     from clench.kernels.closing.start_overlap import CROSSED, FREE, RESTING_LINK

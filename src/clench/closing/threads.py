@@ -1,4 +1,4 @@
-"""Share work among threads; kernels hold no lock, so they run at once."""
+"""Share work among threads; kernels hold no lock, so they run concurrently."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from typing import Final
 
 from .errors import CommandError
 
-#: How users make an object of each public type, by the name of the type.
+#: Ways to make an object of each public type, by the name of the type.
 _MADE_BY: Final = {
     "Hand": "clench.Hand.load",
     "GraspObject": "clench.GraspObject.load",

@@ -1,4 +1,4 @@
-"""The folder in which clench keeps what takes long to compute."""
+"""The folder in which clench keeps results that take long to compute."""
 
 from __future__ import annotations
 

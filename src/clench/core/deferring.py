@@ -10,13 +10,13 @@ Value = TypeVar("Value")
 
 
 class _Deferred:
-    """Hold what costs more to make than most readers want to wait for.
+    """A value that is made on first reading, because it costs more time than most readers want to wait.
 
     Args:
-        make: returns it; called once at most, unless two threads read it at once for the first time.
+        make: returns the value; called once at most, unless two threads read it simultaneously for the first time.
     """
 
-    #: What it is once it is made, and what a copy of it is.
+    #: Type of the made value, and of its copies.
     _kind: ClassVar[type[Any]]
 
     def __init__(self, make: Callable[[], Iterable[Any]]) -> None:
@@ -45,12 +45,12 @@ class _Deferred:
         return repr(self._all())
 
     def __reduce__(self) -> tuple[type[Any], tuple[Any]]:
-        """Be copied and pickled as what it holds."""
+        """Copy and pickle as the value."""
         return self._kind, (self._all(),)
 
 
 class DeferredMapping(_Deferred, Mapping[str, Any]):
-    """A mapping that is made when it is first read; it equals what it holds, and its copies are plain."""
+    """A mapping that is made on first reading; it compares equal to its content, and its copies are plain."""
 
     _kind = dict
 
@@ -82,7 +82,7 @@ class LateFields:
         return instance
 
     def with_known(self, **known: Any) -> Self:
-        """Return the same instance with other values of some fields; what is not made yet is not made for it."""
+        """Return the same instance with other values of some fields; unmade values stay unmade."""
         instance = object.__new__(type(self))
         instance.__dict__.update(self.__dict__, **known)
         return instance
@@ -100,7 +100,7 @@ class LateFields:
 
 
 def once(make: Callable[[], Value]) -> Callable[[], Value]:
-    """Return a function that makes a value when it is first called; threads that call it at once get the same."""
+    """Return a function that makes a value on its first call; concurrent callers get the same value."""
     waiting, made, lock = [make], list[Value](), Lock()
 
     def value() -> Value:
@@ -108,7 +108,7 @@ def once(make: Callable[[], Value]) -> Callable[[], Value]:
             with lock:
                 if not made:
                     made.append(waiting[0]())
-                    # What it was made of is not needed any more.
+                    # The source data are no longer needed.
                     waiting.clear()
         return made[0]
 

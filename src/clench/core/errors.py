@@ -1,4 +1,4 @@
-"""Exceptions for malformed input: each takes facts, writes one sentence and lists what exists.
+"""Exceptions for malformed input: each takes facts, writes one sentence and lists the existing names.
 
 "No contact", "blocked" and "out of reach" are answers of the solver, never exceptions.
 """
@@ -10,15 +10,15 @@ from collections.abc import Iterable
 
 from .visible_text import visible
 
-#: Longest message; what is longer has a name or a list in it that nobody reads.
+#: Longest message; a longer text contains a name or a list that nobody reads.
 _LONGEST = 2000
 
 
 class ClenchError(ValueError):
-    """Say what was wrong with an input, in one sentence (command line: exit code 2).
+    """Report an error of the input in one sentence (command line: exit code 2).
 
     Args:
-        sentence: one line; what cannot be printed is escaped, and what is too long is cut in its middle.
+        sentence: one line; unprintable characters are escaped, and a long line is cut in its middle.
     """
 
     def __init__(self, sentence: str) -> None:
@@ -36,7 +36,7 @@ class FileError(ClenchError):
 
     Args:
         path: the file as the user named it.
-        problem: what is wrong, and what was expected.
+        problem: the error, and the expected content.
     """
 
     def __init__(self, path: object, problem: str) -> None:
@@ -57,16 +57,16 @@ class CommandError(ClenchError):
 
 
 class MotionError(ClenchError):
-    """Say that no path of a hand is free, and what the hand would meet."""
+    """Report that no path of a hand is free, and name the obstruction."""
 
 
 class UnknownNameError(ClenchError):
-    """Say that a name does not exist, guess what was meant, and list what exists.
+    """Report an unknown name, guess the intended one, and list the existing ones.
 
     Args:
-        kind: what is named, e.g. ``"joint"``.
+        kind: kind of the name, e.g. ``"joint"``.
         name: the name that was given.
-        owner: where it was looked for, e.g. ``"hand 'robonaut2'"``.
+        owner: the place of the search, e.g. ``"hand 'robonaut2'"``.
         names: every name that exists there.
     """
 

@@ -1,4 +1,4 @@
-"""Keep what was found: by identity where arguments are costly to compare, and no more than a number of bytes."""
+"""Keep results: by identity for arguments that are costly to compare, and up to a number of bytes."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Arguments = ParamSpec("Arguments")
 def kept_by_identity(size: int) -> Callable[[Callable[Arguments, Found]], Callable[Arguments, Found]]:
     """Return a decorator that computes a function once for the same arguments, which must not change.
 
-    Arguments are positional. They are kept alive with what was found, so that their identity stays their own; equal
-    ones that are not the same count as others.
+    Arguments are positional. They are kept alive with their result, so that their identity stays unique; equal
+    arguments with another identity count as different.
 
     Args:
         size: how many results are kept; the oldest goes first.
@@ -73,15 +73,15 @@ def kept_while_alive(function: Callable[[Argument], Found]) -> Callable[[Argumen
 
 
 class Keeper:
-    """A frozen dataclass that holds what was made of it, for as long as it lives; copies and pickles start without."""
+    """A frozen dataclass that keeps its derived values as long as it lives; copies and pickles start without them."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def kept(self, key: tuple[Hashable, ...], make: Callable[[], Found]) -> Found:
-        """Return what was made under a key, and make it the first time.
+        """Return the value of a key, and make it the first time.
 
         Args:
-            key: says what it is, and what else it depends on. make: returns it.
+            key: name of the value, and its dependencies. make: returns it.
         """
         if key not in self._kept:
             self._kept[key] = make()
@@ -98,12 +98,12 @@ class Keeper:
 
 
 class KeptBySize(Generic[Found]):
-    """Keep what was found for keys, as much of it as fits into a number of bytes; what was asked for last stays.
+    """Keep results by key, up to a number of bytes; the latest result stays.
 
     Threads may share it. The latest stays however large it is.
 
     Args:
-        limit: [bytes]. measure: returns the size of what was found [bytes].
+        limit: [bytes]. measure: returns the size of a result [bytes].
     """
 
     def __init__(self, limit: int, measure: Callable[[Found], int]) -> None:
@@ -114,7 +114,7 @@ class KeptBySize(Generic[Found]):
         self.size = 0
 
     def get(self, key: Hashable, make: Callable[[], Found]) -> Found:
-        """Return what is kept for a key, or make and keep it."""
+        """Return the value of a key, or make and keep it."""
         with self._lock:
             entry = self._kept.get(key)
             if entry is not None:
@@ -131,7 +131,7 @@ class KeptBySize(Generic[Found]):
         return found
 
     def resize(self, limit: int) -> None:
-        """Set the limit [bytes], and forget what no longer fits."""
+        """Set the limit [bytes], and drop values beyond it."""
         with self._lock:
             self.limit = limit
             self._shrink()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Final
 
-#: What is smaller leaves too little behind to be worth a setting [bytes].
+#: A smaller mesh leaves too little behind to be worth a setting [bytes].
 LARGE: Final = 4_000_000
 #: Rows of an array that are worked on together.
 AT_ONCE: Final = 16384
@@ -18,9 +18,9 @@ _M_MMAP_THRESHOLD: Final = -3
 
 
 def expect(size: int) -> None:
-    """Prepare for a mesh that takes so many bytes: what is freed after work on it goes back to the system.
+    """Prepare for a mesh of this many bytes: memory freed after work on it returns to the system.
 
-    glibc raises the size of what it gives back to 32 MB by itself, and so keeps half a gigabyte after a mesh of a
+    glibc raises its threshold for returning memory to 32 MB by itself, and so keeps half a gigabyte after a mesh of a
     million triangles. Other C libraries are left alone.
     """
     if size >= LARGE:

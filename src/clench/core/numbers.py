@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 def is_finite_number(value: Any) -> bool:
-    """Say whether a value is a number that a double holds; true and false are none, nor are whole numbers too large."""
+    """Say whether a value is a number that a double holds; truth values and whole numbers out of range are not."""
     try:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(float(value))
     except OverflowError:
@@ -19,9 +19,9 @@ def is_finite_number(value: Any) -> bool:
 
 
 def real_array(values: Any) -> NDArray[np.float64] | None:
-    """Return values as an array of float64, the same one where they are that.
+    """Return values as an array of float64; such an array is returned unchanged.
 
-    None: they are no real numbers, but text, true and false, or complex numbers.
+    None: the values are text, truth values or complex numbers.
     """
     try:
         array = np.asarray(values)

@@ -10,7 +10,7 @@ from typing import Any, Final
 from .errors import ClenchError
 
 _VARIABLE: Final = "MUJOCO_GL"
-#: What MuJoCo takes as: do not look for OpenGL.
+#: MuJoCo's value for: do not look for OpenGL.
 _OFF: Final = ("disable", "disabled", "off", "false", "0")
 #: Libraries that draw without a screen on Linux, the better one first; each has a module of this name in MuJoCo.
 _WITHOUT_SCREEN: Final = ("egl", "osmesa")
@@ -27,7 +27,7 @@ class OpenGLError(ClenchError):
 
 
 def import_mujoco() -> Any:
-    """Return MuJoCo, imported without OpenGL where what MUJOCO_GL names cannot be loaded."""
+    """Return MuJoCo, imported without OpenGL if the library that MUJOCO_GL names cannot be loaded."""
     try:
         import mujoco
     except Exception as error:  # whatever the graphics library raises

@@ -154,7 +154,7 @@ class Pose:
             raise CommandError(f"{key}.{unknown[0]}: unknown key; expected 'position' and 'wxyz'.")
         if "position" not in data:
             raise CommandError(f"{key}.position: missing; expected [x, y, z] in metres.")
-        # A null is no rotation, which is what the constructor takes None for.
+        # A null is no rotation, but the constructor takes None as the identity.
         wxyz = checked_vector(data.get("wxyz", _PARALLEL), 4, f"{key}.wxyz", "[w, x, y, z]")
         return cls(data["position"], wxyz, key=key)
 
@@ -224,7 +224,7 @@ def checked_vector(value: ArrayLike | Sequence[object], length: int, key: str, e
     """Return finite numbers as an array, shape (length,).
 
     Args:
-        value: to check. length: how many. key: names it in messages. expected: says what it is.
+        value: to check. length: how many. key: names it in messages. expected: description of the value.
 
     Raises:
         CommandError: something else.

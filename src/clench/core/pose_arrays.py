@@ -20,7 +20,7 @@ _UNIT: Final = 4e-16
 
 
 def pose_rows(poses: Sequence[Pose] | ArrayLike, key: str) -> FloatArray:
-    """Return poses as rows of unit quaternion `wxyz` and position [m], shape (N, 7), to the bit those of `Pose`.
+    """Return poses as rows of unit quaternion `wxyz` and position [m], shape (N, 7), bit-identical to `Pose`.
 
     Args:
         poses: a sequence of poses, rows (N, 7), or homogeneous matrices (N, 4, 4). key: names it in messages.

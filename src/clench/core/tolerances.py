@@ -11,7 +11,7 @@ SWEEP_FRACTION: Final = 1e-10
 #: Foot points count as inside up to this fraction of the feature's length [-] (section 3).
 FOOT_FRACTION: Final = 1e-12
 #: Axes closer than this share one family of curl planes [rad] (section 1). With 1e-6, a finger of 0.1 m would be off by
-#: 1e-7 m: a hundred times what a contact's gap may be.
+#: 1e-7 m: a hundred times the gap tolerance of a contact.
 PARALLEL_ANGLE: Final = 1e-9
 #: Joints within this of the most distal joint's axis close the finger [rad] (section 1).
 CLOSING_ANGLE: Final = 0.08726646259971647  # 5 degrees
@@ -25,7 +25,7 @@ ALLOWED_PENETRATION: Final = 1e-6
 EDGE_INSET: Final = 1e-4
 #: Round shapes cut obliquely become outlines that deviate by at most this [m] (section 2).
 OUTLINE_DEVIATION: Final = 1e-6
-#: Lengths and coordinates outside of these are no hand's, no object's and no place's [m].
+#: Range of lengths and coordinates that hands, objects and places can have [m].
 SMALLEST_LENGTH: Final = 1e-13
 LARGEST_LENGTH: Final = 1e9
 #: Quaternions whose norm is off by more than this are refused [-].

@@ -1,4 +1,4 @@
-"""Text from files, made safe to show: what a terminal would obey is written out."""
+"""Make text from files safe to show: control characters for terminals are written out."""
 
 from __future__ import annotations
 

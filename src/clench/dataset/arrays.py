@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 Array = NDArray[Any]
-#: How a truth value that is not known is written where others are 0 and 1.
+#: Code of an unknown truth value beside 0 and 1.
 UNKNOWN: Final = -1
 
 

@@ -1,4 +1,4 @@
-"""The card of a dataset: what it holds, how it was made, statistics and pictures, in DATASET.md."""
+"""Write the card of a dataset: content, job, statistics and pictures, in DATASET.md."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def _pairs(counts: Counter[tuple[str, str, bool]]) -> list[tuple[Any, ...]]:
 
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
-    """Return the lines of a Markdown table, with an empty one at the end; nothing without rows."""
+    """Return the lines of a Markdown table with an empty line at the end, or nothing without rows."""
     if not rows:
         return []
     cells = [" | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in row) for row in rows]

@@ -14,15 +14,15 @@ SCHEMA: Final = "clench.grasps/1"
 
 
 class Column(NamedTuple):
-    """A column: its type, see `_arrow_type`, whether it may be null, and what it says."""
+    """A column: its type, see `_arrow_type`, whether it may be null, and its description."""
 
     type: str
     nullable: bool
     text: str
 
 
-#: All columns, in order. Types: text, whole, number, truth; pose is [w, x, y, z, X, Y, Z]; texts, numbers and points
-#: are lists, a point is [x, y, z].
+#: All columns, in order. Types: text, whole, number, truth. A pose is [w, x, y, z, X, Y, Z]. Texts, numbers and points
+#: are lists; a point is [x, y, z].
 COLUMNS: Final = {
     "hand": Column("text", False, "name of the hand"),
     "hand_model": Column("text", False, "its model, as the job names it"),

@@ -27,7 +27,7 @@ from .sources import load_hand, load_object
 
 #: Columns with as many numbers as the hand has joints.
 _JOINTS: Final = ("pregrasp", "touch", "squeeze")
-#: Rows that are written to HDF5 at once.
+#: Rows per write to HDF5.
 _ROWS: Final = 4096
 
 
@@ -93,7 +93,7 @@ def _pairs(dataset: GraspDataset) -> Iterator[tuple[str, list[int]]]:
 
 
 def _outgoing(dataset: GraspDataset, number: int, format: DatasetFormat | str) -> OutgoingGrasp:
-    """Return a row as what the formats write."""
+    """Return a row in the form that the formats write."""
     row = dataset.row(number)
     hand = load_hand(row["hand_model"])
     obj = load_object(row["object_model"], row["scale"], row["object_collision_source"] == "engine")
@@ -160,7 +160,7 @@ def _append_table(group: Any, table: Any, joints: int) -> None:
 
 
 def _append(group: Any, name: str, values: Any, is_text: bool) -> None:
-    """Append rows to a dataset of a group; it is made where it is not there."""
+    """Append rows to a dataset of a group; create it if missing."""
     import h5py
 
     if is_text:

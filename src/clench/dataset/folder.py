@@ -39,7 +39,7 @@ class DatasetFolder:
     """A folder that holds the dataset of a job, or is to hold it.
 
     Args:
-        path: the folder. job: what it holds.
+        path: the folder. job: its content.
     """
 
     def __init__(self, path: str | Path, job: DatasetJob) -> None:
@@ -88,7 +88,7 @@ class DatasetFolder:
         self.manifests()
 
     def prepare(self) -> None:
-        """Make the folder, and write the job where it is not there.
+        """Create the folder, and write the job if it is missing.
 
         Raises:
             FileError: it cannot be written.
@@ -115,7 +115,7 @@ class DatasetFolder:
             write_atomically(self.part(result.record.unit), result.part)
 
     def clear(self, units: Sequence[Unit]) -> None:
-        """Remove what ended runs left half-written of some units."""
+        """Remove half-written files of some units that interrupted runs left."""
         mine = {unit.key for unit in units}
         for file in (self.path / "parts").glob(".*.part"):
             if file.name[1:].partition(".")[0] in mine:
@@ -126,7 +126,7 @@ class DatasetFolder:
                 file.unlink(missing_ok=True)
 
     def manifests(self) -> dict[str, UnitRecord]:
-        """Return what the manifests of all shards say of units, by key; a unit that is done anywhere is done.
+        """Return the manifests' records of units, over all shards, by key; a unit that is done in any shard is done.
 
         Raises:
             FileError: a manifest cannot be read, or is of another job or version.
@@ -158,7 +158,7 @@ class DatasetFolder:
         return found
 
     def write_manifest(self, shard: Shard, records: Mapping[str, UnitRecord], units: Sequence[Unit]) -> None:
-        """Write what came of a shard's units so far.
+        """Write the records of a shard's units so far.
 
         Raises:
             FileError: it cannot be written.

@@ -22,22 +22,22 @@ from .unit_run import UnitRecord, UnitResult
 from .units import Unit
 from .workers import run_units
 
-#: A manifest is written at most this often [s], and at the end; parts say themselves what they hold.
+#: A manifest is written at most this often [s], and at the end; parts describe their own content.
 MANIFEST_INTERVAL: Final = 5.0
 #: A process that has had more memory than this is replaced [GB].
 MEMORY: Final = 4.0
 #: Units of a shard at most: its manifest is one file.
 MOST_UNITS: Final = 10_000
 
-#: What does units: yields what comes of each.
+#: Runs units and yields the result of each.
 Runner = Callable[[DatasetJob, list[Unit]], Iterator[UnitResult]]
-#: Called with every record, and with those of earlier runs at first.
+#: Called first with the records of earlier runs, then with every new record.
 Told = Callable[[UnitRecord], None]
 
 
 @dataclass
 class GenerateReport:
-    """Tell what came of a run.
+    """The result of a run.
 
     Args:
         folder: of the dataset. shard: of the run. units: of the shard. found: of them were done before.
@@ -96,17 +96,17 @@ def generate(
 ) -> GenerateReport:
     """Generate the grasps of a job, or of a shard of it, in a folder; go on where an ended run stopped.
 
-    Every unit that is done is a whole file. When all units of the job are there, the rows are merged into
-    `grasps.parquet`: the same bytes for any number of workers, shards and interruptions (docs/dataset.md).
+    Every unit that is done is a whole file. When all units of the job exist, the rows are merged into `grasps.parquet`.
+    Its bytes are the same for any number of workers, shards and interruptions (docs/dataset.md).
 
     Args:
-        job: what is generated. out: the folder; it is made. shard: which units are this run's; all by default.
+        job: content of the dataset. out: the folder; it is made. shard: which units are this run's; all by default.
         workers: processes; all cores by default, 0 works in this process.
         memory: a process that has had more is replaced after its unit [GB].
         tell: called with the record of every unit. runner: does the units instead of processes of this machine.
 
     Raises:
-        ClenchError: pyarrow is missing, a hand does not load, an object is not there, or the folder holds something
+        ClenchError: pyarrow is missing, a hand does not load, an object does not exist, or the folder holds something
             else. Nothing is written then.
     """
     need_pyarrow()
@@ -154,7 +154,7 @@ def _keep_all(
     results: Iterable[UnitResult],
     tell: Told | None,
 ) -> None:
-    """Write what comes of units, and the manifest from time to time and at the end, interrupted or not."""
+    """Write the results of units, and the manifest from time to time and at the end, even after an interruption."""
     written = time.monotonic()
     folder.write_manifest(shard, records, units)
     try:

@@ -1,4 +1,4 @@
-"""What a dataset is to hold: hands, objects, scales, the number of grasps, and the options of the planner."""
+"""Define the content of a dataset: hands, objects, scales, the number of grasps, and the options of the planner."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from clench.planner.options import APART, EFFORT, PlanOptions
 from .units import Unit
 
 SCHEMA: Final = "clench.dataset_job/1"
-#: Grasps of a unit at most, unless the job says otherwise: a minute of work.
+#: Default largest number of grasps per unit: a minute of work.
 UNIT: Final = 50
 #: The largest unit: its rows stay in memory.
 LARGEST_UNIT: Final = 1000
@@ -40,12 +40,12 @@ _PLANNED: Final = (
 
 
 class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Say what a dataset is to hold; a file of these keys is a job file (docs/dataset.md).
+    """The content of a dataset; a file of these keys is a job file (docs/dataset.md).
 
     Args:
         hands, objects: models as `Hand.load` and `GraspObject.load` take them. scales: of the objects [-].
         count: grasps per hand, object and scale. seed: the same seed gives the same grasps.
-        unit: grasps that are planned together at most; units are what is shared out, written and gone on with.
+        unit: number of grasps that are planned together at most; work is shared out, written and resumed in units.
         hold: test every grasp in simulation; the planner then works on the convex pieces that the simulation collides.
         friction, mass and the others: see `clench.plan_grasps`.
 
@@ -76,7 +76,7 @@ class DatasetJob(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     path: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be generated."""
+        """Refuse jobs that cannot be generated."""
         for key, what in (("hands", "hand"), ("objects", "object"), ("scales", "scale")):
             values = getattr(self, key)
             kinds = (int, float) if key == "scales" else str
@@ -136,7 +136,7 @@ def job_from(values: Mapping[str, Any], source: str) -> DatasetJob:
     """Return the job that some keys and values describe.
 
     Args:
-        values: by key; what is missing has its default. source: names them in messages.
+        values: by key; missing keys have their defaults. source: names them in messages.
 
     Raises:
         UnknownNameError: no such key. CommandError: a value of a wrong type or out of range.
@@ -183,7 +183,7 @@ def check_objects(job: DatasetJob) -> None:
 
 
 def _sentence(error: msgspec.ValidationError) -> str:
-    """Return what is wrong with a value, with its key first."""
+    """Return a sentence about a wrong value that begins with its key."""
     if isinstance(error.__cause__, ClenchError):
         return str(error.__cause__)
     text, _, place = str(error).partition(" - at `$.")

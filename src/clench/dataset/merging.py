@@ -22,9 +22,9 @@ from .units import Unit
 if TYPE_CHECKING:
     import pyarrow
 
-#: Rows of a group of the merged file: what readers read at once.
+#: Rows per group of the merged file: the unit of reading.
 GROUP: Final = 4096
-#: Bytes of a file that are hashed at once.
+#: Bytes of a file per step of hashing.
 _BLOCK: Final = 1 << 20
 
 
@@ -126,7 +126,7 @@ def _check_models(folder: DatasetFolder, records: list[UnitRecord]) -> None:
 
 
 def _hands(folder: DatasetFolder, units: list[Unit]) -> dict[str, Any]:
-    """Return what the parts say of hands, by model; those without a row say it, too."""
+    """Return the parts' data about hands, by model, including parts without a row."""
     found: dict[str, Any] = {}
     for unit in units:
         if unit.hand not in found:
@@ -163,7 +163,7 @@ def _write(path: Path, tables: Iterator[pyarrow.Table], schema: pyarrow.Schema) 
 
 
 def _copied(table: pyarrow.Table) -> pyarrow.Table:
-    """Return the rows in one piece: what is written must not depend on how they were pieced together."""
+    """Return the rows in one piece: the written bytes must not depend on the pieces."""
     return table.combine_chunks()
 
 

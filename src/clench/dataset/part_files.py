@@ -1,4 +1,4 @@
-"""Parts: the rows of a unit as the bytes of a Parquet file that says itself what it holds."""
+"""Parts: the rows of a unit as the bytes of a Parquet file that describes its own content."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
     from .rows import Row
 
-#: Keys of the metadata of a file: which schema, what it holds, and the hands whose joints the rows have.
+#: Keys of the metadata of a file: schema, content, and the hands whose joints the rows have.
 SCHEMA_KEY: Final = b"clench.schema"
 CONTENT_KEY: Final = b"clench.content"
 HANDS_KEY: Final = b"clench.hands"
-#: How rows are packed; the same bytes come of the same rows.
+#: Compression of rows; equal rows give equal bytes.
 WRITING: Final[dict[str, Any]] = {"compression": "zstd", "compression_level": 3, "write_page_checksum": True}
 
 
@@ -37,7 +37,7 @@ def with_metadata(content: Mapping[str, Any], hands: Mapping[str, Mapping[str, A
     """Return the schema with metadata.
 
     Args:
-        content: what the file holds. hands: names of the joints and links, by model.
+        content: description of the file. hands: names of the joints and links, by model.
     """
     return arrow_schema().with_metadata({SCHEMA_KEY: SCHEMA, CONTENT_KEY: _plain(content), HANDS_KEY: _plain(hands)})
 
@@ -56,7 +56,7 @@ def open_parquet(source: Any, name: str) -> pyarrow.parquet.ParquetFile:
     """Return a Parquet file of grasps, whose columns and sizes were checked; its rows were not read.
 
     Args:
-        source: bytes in memory, or a path. name: what messages call it.
+        source: bytes in memory, or a path. name: for messages.
 
     Raises:
         FileError: no Parquet file, of another schema, or larger than any that is written.
@@ -104,7 +104,7 @@ def read_rows(file: pyarrow.parquet.ParquetFile, name: str) -> pyarrow.Table:
 
 
 def metadata_of(file: pyarrow.parquet.ParquetFile, key: bytes, name: str) -> dict[str, Any]:
-    """Return what a file says of its content or of its hands.
+    """Return a file's description of its content or of its hands.
 
     Raises:
         FileError: nothing, or no JSON object.

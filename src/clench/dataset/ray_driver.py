@@ -29,11 +29,11 @@ def generate_on_ray(
 ) -> GenerateReport:
     """Generate a dataset on all cores of a Ray cluster; go on where an ended run stopped.
 
-    The merged file has the same bytes as one that `clench.dataset.generate` makes.
+    The merged file is byte-identical to the result of `clench.dataset.generate`.
 
     Args:
         job, out, tell: see `clench.dataset.generate`.
-        address: of the cluster; None is the one that Ray finds, or else this machine.
+        address: of the cluster; None: the cluster that Ray finds, or else this machine.
 
     Raises:
         ClenchError: Ray is missing, or no cluster is at the address; otherwise as `clench.dataset.generate`.
@@ -56,7 +56,7 @@ def generate_on_ray(
 
 
 def _run(job: DatasetJob, units: list[Unit]) -> Iterator[UnitResult]:
-    """Yield what comes of units, in the order in which they end."""
+    """Yield the results of units, in the order in which they end."""
     import ray
 
     environment = {"env_vars": dict.fromkeys(THREADS, "1")}

@@ -28,7 +28,7 @@ from .sources import load_hand, load_object
 if TYPE_CHECKING:
     import pyarrow
 
-#: Solved again, angles are those of the dataset but for this much on another machine [rad].
+#: Largest difference between the angles of a dataset and of a repeated solve on another machine [rad].
 _SAME = 1e-6
 
 
@@ -36,7 +36,7 @@ def open(path: str | Path) -> GraspDataset:
     """Return the dataset of a folder, or of a Parquet file of grasps; its rows are read when they are asked for.
 
     Raises:
-        ClenchError: pyarrow is missing. FileError: no dataset, one that is not merged, or a file of another schema.
+        ClenchError: pyarrow is missing. FileError: the file is no dataset, is not merged, or has another schema.
     """
     need_pyarrow()
     file = Path(path)
@@ -100,8 +100,8 @@ class GraspDataset:
         """Return the rows for which all conditions hold.
 
         Args:
-            conditions: by column. A value must be equal, `None` must be null, a list has allowed values, and a tuple
-                `(least, largest)` is a range, open where `None` stands.
+            conditions: by column. A value means equality, and `None` means null. A list has allowed values. A tuple
+                `(least, largest)` is a range; `None` in it is an open end.
 
         Raises:
             UnknownNameError: no such column. CommandError: a column of lists, or a range of text.
@@ -189,10 +189,10 @@ class GraspDataset:
         """Solve the command of a row again: the same answer, to the bit on the same kind of machine.
 
         Args:
-            number: of the row. hand, obj: what it is of; the models that the row names by default.
+            number: of the row. hand, obj: hand and object of the row; by default the models that the row names.
 
         Raises:
-            FileError: the models are others than those that the dataset was made from, or the answer is another one.
+            FileError: the models differ from those of the dataset, or the answer differs.
             ClenchError: a model cannot be loaded.
         """
         from clench.solver.solve import solve

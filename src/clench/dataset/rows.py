@@ -33,11 +33,11 @@ Row = dict[str, Any]
 def row_of(
     unit: Unit, hand: Hand, obj: GraspObject, grasp: PlannedGrasp | UnfinishedGrasp, report: HoldReport | None
 ) -> Row:
-    """Return the row of a grasp; what is not known is None.
+    """Return the row of a grasp; unknown values are None.
 
     Args:
-        unit: that it belongs to. hand, obj: what grasps what. grasp: the grasp. report: of the hold test, None
-            without one.
+        unit: that it belongs to. hand, obj: hand and object. grasp: the grasp. report: of the hold test, None without
+            one.
     """
     solution, command = grasp.solution, grasp.command
     hand_hash, _, object_hash = solution.geometry_hash.partition("+")
@@ -86,7 +86,7 @@ def row_of(
 
 
 def _planned(grasp: PlannedGrasp, hand: Hand) -> Row:
-    """Return what only a complete grasp has."""
+    """Return the columns that only a complete grasp has."""
     plan, pregrasp = grasp.squeeze, grasp.solution.pregrasp
     return {
         "pregrasp": None if pregrasp is None else [pregrasp[name] for name in hand.joint_names],
@@ -110,7 +110,7 @@ def _told(plan: SqueezePlan, hand: Hand, grasp: PlannedGrasp) -> list[float] | N
 
 
 def _tested(report: HoldReport) -> Row:
-    """Return what a hold test says; a grasp that was dropped failed."""
+    """Return the columns of a hold test; a dropped grasp failed."""
     moved = [pulled.farthest for pulled in report.pulls.values()]
     row: Row = {
         "held": report.held,

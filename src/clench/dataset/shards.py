@@ -30,7 +30,7 @@ class Shard:
     of: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse what is no shard."""
+        """Refuse invalid shards."""
         if not 1 <= self.number <= self.of:
             raise CommandError(f"shard: expected i/n with i from 1 to n, got {self}.")
 
@@ -57,7 +57,7 @@ class Shard:
     def of_environment(cls, environment: Mapping[str, str] | None = None) -> Shard:
         """Return the shard of a task of a SLURM array; without an array, the only one.
 
-        `SLURM_ARRAY_TASK_MIN` and `SLURM_ARRAY_TASK_STEP` are 0 and 1 where they are not set.
+        The defaults of `SLURM_ARRAY_TASK_MIN` and `SLURM_ARRAY_TASK_STEP` are 0 and 1.
 
         Raises:
             CommandError: a variable is no number, or tasks of the array are missing between the first and the last.

@@ -13,7 +13,7 @@ from clench.execution.simulation.convex_pieces import in_pieces
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
-#: How licences beside a model are called.
+#: Names of licence files beside a model.
 LICENSES: Final = ("LICENSE", "LICENSE.txt", "LICENSE.md", "LICENCE", "LICENCE.txt", "COPYING")
 #: The largest licence that is read [bytes], and the longest first line that is quoted.
 _LICENSE_BYTES: Final = 1 << 20
@@ -50,14 +50,14 @@ def load_object(model: str, scale: float, pieces: bool) -> GraspObject:
 
 
 def hand_source(hand: Hand, model: str) -> HandSource:
-    """Return what a dataset says of a hand."""
+    """Return a dataset's description of a hand."""
     links = tuple(link.name for link in hand.links)
     return HandSource(hand.name, model, tuple(hand.joint_names), links, license_beside(model))
 
 
 @lru_cache(maxsize=64)
 def license_beside(model: str) -> str | None:
-    """Return name and first line of the licence in the folder of a model's file; None where there is none."""
+    """Return name and first line of the licence in the folder of a model's file, or None."""
     path = expanded(model)
     try:
         if not path.is_file():

@@ -27,14 +27,14 @@ from .units import Unit
 
 @dataclass(frozen=True)
 class UnitRecord:
-    """What a manifest says of a unit.
+    """A manifest's record of a unit.
 
     Args:
         unit: its key. hand, object, scale, part, count: see `Unit`.
         status: "done", or "failed" with a sentence in `reason`: the hand or the object could not be used.
         rows: how many grasps were written, and how many of them are `ok`.
         proposed, closed, force_closed, rejected: see `clench.GraspPlan`; reasons that rejected none are left out.
-        hand_hash, object_hash: of the geometry; None where there is no row.
+        hand_hash, object_hash: of the geometry; None without a row.
         sha256: of the part's file; None for a unit that failed. seconds: that it took; None where this is not known.
     """
 
@@ -63,7 +63,7 @@ class UnitRecord:
         return cls(unit.key, unit.hand, unit.object, unit.scale, unit.part, unit.count, **values)
 
     def content(self, job: str) -> dict[str, Any]:
-        """Return what the part's file says of itself: the hash of the job, and the record without hash and time."""
+        """Return the part's description in its file: the hash of the job, and the record without hash and time."""
         return {"job": job, **{key: value for key, value in self.same().items() if key != "sha256"}}
 
     def same(self) -> dict[str, Any]:
@@ -73,7 +73,7 @@ class UnitRecord:
 
 @dataclass(frozen=True)
 class UnitResult:
-    """What came of a unit: its record, and the bytes of its part; None for a unit that failed."""
+    """The result of a unit: its record, and the bytes of its part; None for a unit that failed."""
 
     record: UnitRecord
     part: bytes | None
@@ -125,7 +125,7 @@ def _planned(job: DatasetJob, unit: Unit, began: float) -> UnitResult:
 
 
 def _test(job: DatasetJob) -> Hold:
-    """Return the hold test at the hard end of what is planned for: the heaviest mass, the lowest friction."""
+    """Return the hold test at the hard end of the planned range: the heaviest mass, the lowest friction."""
     lowest = friction_range(FRICTION if job.friction is None else job.friction)[0]
     return Hold(
         mass=mass_range(job.mass)[1],

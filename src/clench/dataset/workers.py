@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 THREADS: Final = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: A unit during which the process ended is tried so often.
 TRIES: Final = 2
-#: How long a process that was told to end may take [s].
+#: Time limit for a process to end on request [s].
 _PATIENCE: Final = 5.0
 _GB: Final = 1 << 30
 
@@ -46,7 +46,7 @@ class Worker:
         other.close()
 
     def give(self, unit: Unit) -> None:
-        """Send a unit; what comes of it is received from `connection`."""
+        """Send a unit; its result arrives at `connection`."""
         self.unit = unit
         try:
             self.connection.send(unit)
@@ -54,7 +54,7 @@ class Worker:
             return  # the process has ended, which is noticed when its answer is read
 
     def stop(self) -> None:
-        """End the process, whatever it does."""
+        """End the process, even in the middle of work."""
         self.connection.close()
         self.process.terminate()
         self.process.join(_PATIENCE)
@@ -64,7 +64,7 @@ class Worker:
 
 
 def run_units(job: DatasetJob, units: Iterable[Unit], workers: int, memory: float) -> Iterator[UnitResult]:
-    """Yield what comes of units, in the order in which they end.
+    """Yield the results of units, in the order in which they end.
 
     Args:
         job: the options. units: the units. workers: processes; 0 works in this one.
@@ -105,7 +105,7 @@ def run_units(job: DatasetJob, units: Iterable[Unit], workers: int, memory: floa
 
 
 def _answer(worker: Worker) -> tuple[UnitResult | None, int]:
-    """Return what a worker found and the memory that it has used [bytes]; None where it has ended."""
+    """Return a worker's result and the memory that it has used [bytes], or None if it has ended."""
     try:
         found: tuple[UnitResult, int] = worker.connection.recv()
     except (EOFError, OSError):

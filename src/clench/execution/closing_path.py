@@ -21,9 +21,9 @@ def closing_path(
 ) -> FloatArray:
     """Return way-points on which joints move at their speeds, each until its end, shape (n, J); the others rest.
 
-    Followers are where their couplings have them, between their own start and end: one at its limit waits, and one
-    that breaks away goes on with the actuator while its leader is held, or is held while its leader goes on. Every
-    place at which a joint starts or stops is a way-point; between two of them the path is a straight line.
+    Followers keep to their couplings, between their own start and end. A follower at its limit waits. A follower that
+    breaks away continues with the actuator while its leader is held, or stays while its leader continues. Every place
+    at which a joint starts or stops is a way-point; between two of them the path is a straight line.
     """
     away = end - start
     closing = np.array([j.direction for j in hand.joints], dtype=np.float64)
@@ -46,7 +46,7 @@ def closing_path(
 
 
 def distinct(values: FloatArray) -> FloatArray:
-    """Return values in order, from 0 on; of those that differ by rounding alone, the first."""
+    """Return values in order, from 0 on; of values that differ by rounding alone, the first."""
     ordered = np.unique(values)
     distinct: FloatArray = ordered[np.diff(ordered, prepend=-np.inf) > ROUNDING * ordered[-1]]
     return distinct

@@ -1,4 +1,4 @@
-"""Fill in what a solution is asked for only when somebody reads it: quality, squeeze and pregrasp."""
+"""Complete a solution on first reading: quality, squeeze and pregrasp."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def complete(
     document that it writes.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for.
+        solution: the solution. hand, obj: the hand and object that were solved for.
         mass: of the object [kg]; friction: of its contacts [-]: numbers or ranges, see `plan_squeeze`.
         contact_model: see `grasp_quality`. clearance: see `plan_pregrasp` [m].
 
@@ -41,6 +41,6 @@ def complete(
     """
     quality = grasp_quality(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
     squeeze = plan_squeeze(solution, hand, obj, mass=mass, friction=friction, contact_model=contact_model)
-    # Of joints that were gone through more than once no path is known to back off along.
+    # For joints that closed in several rounds, no path to back off along is known.
     pregrasp = plan_pregrasp(solution, hand, obj=obj, clearance=clearance) if solution.rounds == 1 else None
     return replace(solution, quality=quality.to_dict(), squeeze=squeeze.to_dict(), pregrasp=pregrasp)

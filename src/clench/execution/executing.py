@@ -1,4 +1,4 @@
-"""Carry a solution out on whatever moves a hand."""
+"""Execute a solution on any actuator of a hand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .trajectory_checks import ROUNDING
 
 
 class Executor(Protocol):
-    """Move a hand along a trajectory and report what was reached."""
+    """Move a hand along a trajectory and report the reached state."""
 
     @property
     def name(self) -> str:
@@ -44,19 +44,20 @@ def execute(
 ) -> ExecutionReport:
     """Carry out a solution: open, close along the computed path, all fingers arriving together; go to its next steps.
 
-    A solution that is not valid is not carried out. Neither is one without a free path: every link is checked against
-    every other link, the object and obstacles along the whole motion, see `plan_trajectory`. The report says why.
+    An invalid solution is not executed. A solution without a free path is not executed either: every link is checked
+    against every other link, the object and obstacles along the whole motion, see `plan_trajectory`. The report says
+    why.
 
     Args:
-        solution: what to carry out.
-        actuator: what moves the hand, e.g. `SimulatedHand`.
+        solution: the solution to execute.
+        actuator: the hand that moves, e.g. `SimulatedHand`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry it out all the same. A `HardwareHand` refuses what is not free even then.
+        force: carry it out all the same. A `HardwareHand` still refuses a path that is not free.
         next_steps: carry out its next steps, too, after the touch and the squeeze.
 
     Raises:
-        CommandError: the solution is for another hand or another geometry of hand or object, its pregrasp or a next
-            step is outside a joint's limits, or `speed` is out of range.
+        CommandError: the solution is for another hand or another geometry of hand or object, `speed` is out of range,
+            or the pregrasp or a next step is outside a joint's limits.
         UnknownNameError: its pregrasp, squeeze or a next step is of a joint that the hand does not have.
     """
     check_type(solution, GraspSolution, "solution")
@@ -112,7 +113,7 @@ def check_angles(solution: GraspSolution, hand: Hand | None) -> None:
     """Check the joints and limits of a solution's pregrasp, and the joints of its squeeze's offsets.
 
     Args:
-        solution: may come from a file that was edited. hand: what it is for; None: it tells the limits itself.
+        solution: may come from a file that was edited. hand: the model; None: the solution tells the limits itself.
 
     Raises:
         CommandError: an angle is outside its limits. UnknownNameError: a joint that the hand does not have.

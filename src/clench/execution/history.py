@@ -1,4 +1,4 @@
-"""What was sent, told and measured while a solution was carried out."""
+"""The history of an execution: commands sent, targets and measurements."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ExecutionHistory:
 
 @dataclass(frozen=True)
 class CommandsSent:
-    """Count what was sent to a controller.
+    """The count of commands sent to a controller.
 
     Args:
         commands: that the driver took.

@@ -1,4 +1,4 @@
-"""The last piece of the way: from off the object straight to all contacts at once (docs/method.md section 7)."""
+"""Plan the last piece of the way: straight to all contacts simultaneously (docs/method.md section 7)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import Contact, GraspSolution
 
-#: Clearance of the pregrasp unless another is asked for [m].
+#: Default clearance of the pregrasp [m].
 CLEARANCE: Final = 0.005
-#: How fast links come near the object on the last piece of the way, unless joints must be slower [m/s].
+#: Speed of links near the object on the last piece of the way, unless joints must be slower [m/s].
 LANDING_SPEED: Final = 0.01
 #: A joint turns back by at most this [rad]: for more, the path would not be near its tangent.
 _FARTHEST: Final = 0.5
-#: What it costs when one contact comes off faster than another, beside turning of joints [rad/m].
+#: Cost of a contact that comes off faster than another, against the turning of joints [rad/m].
 _UNEVEN: Final = 1e4
 #: A follower that is this far from where its coupling has it does not move on a straight line [rad].
 _UNCOUPLED: Final = 1e-7
@@ -29,17 +29,18 @@ _UNCOUPLED: Final = 1e-7
 def plan_landing(
     solution: GraspSolution, hand: Hand, clearance: float = CLEARANCE, resting: Collection[int] = ()
 ) -> FloatArray | None:
-    """Return the posture from which a straight line in joint space reaches all contacts of all fingers at once.
+    """Return the posture from which a straight line in joint space reaches all contacts simultaneously.
 
-    At the touch every contact of a finger comes near at the same speed, as far as its joints allow: the rates follow
+    At the touch, every contact of a finger approaches at the same speed, as far as its joints allow. The rates follow
     from the Jacobian's rows along the contact normals. Fingers without contacts stay as they are.
 
     Args:
-        solution: the solution. hand: what it was computed for. clearance: of every contact at the start [m].
+        solution: the solution. hand: the hand that was solved for. clearance: of every contact at the start [m].
         resting: indices of joints that stay as they are.
 
     Returns:
-        joint angles [rad], shape (J,); None when the joints of a finger cannot take all of its contacts off at once.
+        joint angles [rad], shape (J,); None if the joints of a finger cannot take off all of its contacts
+            simultaneously.
     """
     q = posture(solution.joint_angles, hand, "joint_angles")
     dofs = degrees_of_freedom(hand, q)

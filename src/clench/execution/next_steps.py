@@ -1,4 +1,4 @@
-"""What comes after the touch: the squeeze, and the next steps of the work, each timed from rest to rest."""
+"""Plan the motion after the touch: the squeeze and the next steps of the work, each timed from rest to rest."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SQUEEZE: Final = "squeeze"
 NEXT_STEP: Final = "next step"
 #: Names of the phases after the touch.
 AFTER_TOUCH: Final = (SQUEEZE, NEXT_STEP)
-#: How long a squeeze takes to build up, if no joint must be slower [s].
+#: Duration of the build-up of a squeeze, if no joint must be slower [s].
 BUILDING_UP: Final = 0.4
 
 
@@ -35,7 +35,7 @@ class Phase:
 
     Args:
         name: "squeeze" or "next step". times: from its own start [s], shape (N,), rising from 0.
-        positions: joint angles [rad], shape (N, J); the first are those at the end of what came before.
+        positions: joint angles [rad], shape (N, J); the first row is the end of the phase before.
         step: index of the next step; None for the squeeze.
     """
 
@@ -64,11 +64,11 @@ def plan_next_steps(
 ) -> tuple[Phase, ...]:
     """Time the motions to a solution's next steps, one after another.
 
-    Joints that a step names go there on a straight line, and their followers with them; the others stay where they are
-    told to be, so that fingers that no step moves go on squeezing.
+    The joints that a step names, and their followers, move on a straight line. The others keep their targets, so that
+    fingers that no step moves continue to squeeze.
 
     Args:
-        solution: with `next_steps`. hand: what it was computed for.
+        solution: with `next_steps`. hand: the hand that was solved for.
         told: where the joints are told to be before the first step [rad], shape (J,).
         pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
 
@@ -86,11 +86,11 @@ def plan_next_steps(
 
 
 def plan_after_touch(solution: GraspSolution, hand: Hand, pace: tuple[FloatArray, FloatArray]) -> tuple[Phase, ...]:
-    """Time what a solution with next steps does after the touch: its squeeze, where it has one, and the steps.
+    """Time the motion after the touch of a solution with next steps: its squeeze, if it has one, and the steps.
 
     Args:
         solution: with `squeeze` where joints shall be told angles beyond the touch, see `clench.complete`.
-        hand: what it was computed for. pace: see `plan_next_steps`.
+        hand: the hand that was solved for. pace: see `plan_next_steps`.
 
     Raises:
         UnknownNameError, CommandError: see `plan_next_steps`.
@@ -108,7 +108,7 @@ def plan_after_touch(solution: GraspSolution, hand: Hand, pace: tuple[FloatArray
 def squeeze_offsets(solution: GraspSolution, hand: Hand) -> FloatArray:
     """Return the angles beyond the touch that a feasible squeeze plan tells the joints [rad], shape (J,).
 
-    They are 0 where there is no such plan, or where one of them would be outside the limits.
+    They are 0 without such a plan, or if one of them would be outside the limits.
     """
     plan = solution.squeeze or {}
     none = np.zeros(len(hand.joints))
@@ -125,7 +125,7 @@ def points_after(phases: Sequence[Phase], touch: float) -> Iterator[dict[str, An
     """Yield the way-points of phases as a trajectory's document has them, without the first, which came before.
 
     Args:
-        phases: what comes after the touch. touch: when it is [s].
+        phases: of the motion after the touch. touch: when it is [s].
     """
     begin = touch
     for phase in phases:
@@ -138,7 +138,7 @@ def points_after(phases: Sequence[Phase], touch: float) -> Iterator[dict[str, An
 def phases_after(
     names: Sequence[tuple[str, int | None]], times: FloatArray, positions: FloatArray
 ) -> tuple[Phase, ...]:
-    """Return the phases that way-points from the touch on are of; one that takes no time left none.
+    """Return the phases of the way-points from the touch on; a phase of no duration has none.
 
     Args:
         names: phase and step of every way-point; the first is the touch. times: [s], shape (N,).

@@ -31,15 +31,15 @@ def plan_pregrasp(
 ) -> dict[str, float]:
     """Return the posture in which every touching finger stands off by a clearance [rad].
 
-    With the object it is the one that `plan_trajectory` goes through: from it, all contacts are reached at once on a
-    straight line that is free. Without the object, or where there is no such posture, every finger is backed off along
-    its closing path; where the straight line from there is not free, the pregrasp is the open hand. The clearance is
-    then measured at the contacts: every point of a link that touches is that far off the object's tangent plane, which
-    for a convex object is at most its distance from it. A finger that does not get so far is taken back to where it
-    starts; one that does not touch stays where the solution has it.
+    With the object, the result is the pregrasp of `plan_trajectory`: from it, a free straight line reaches all contacts
+    simultaneously. Without the object, or without such a posture, every finger is backed off along its closing path. If
+    the straight line from there is not free, the pregrasp is the open hand. The clearance is then measured at the
+    contacts: every contact point of a link is that far off the object's tangent plane. For a convex object, this is at
+    most its distance from the object. A finger that cannot get this far is taken back to its start; a finger without
+    contact keeps the solution's angles.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for. clearance: [m].
+        solution: the solution. hand, obj: the hand and object that were solved for. clearance: [m].
 
     Raises:
         CommandError: a clearance that is not finite and above 0; the solution is of another hand.

@@ -1,4 +1,4 @@
-"""What came of carrying out a solution: angles and contacts reached against those computed."""
+"""Report an execution: angles and contacts reached, against the computed ones."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class JointReached:
 
 @dataclass(frozen=True, eq=False)
 class ContactReached:
-    """Compare one computed contact with what happened there.
+    """The comparison of one computed contact with the executed one.
 
     Args:
         finger, link: names.
         computed: the computed contact point in the world [m], shape (3,).
         position: the place where the link is nearest to the object [m], shape (3,).
         gap: distance between link and object [m], negative when they overlap.
-        displacement: how far the link's own point of contact is from where it was computed [m].
+        displacement: distance of the link's own contact point from its computed place [m].
         touches: the gap is within the report's contact tolerance.
     """
 
@@ -57,14 +57,14 @@ class ContactReached:
 
 @dataclass(frozen=True)
 class NextStepReached:
-    """The outcome of one next step: which joints arrived, what touches, and whether the object is held.
+    """The outcome of one next step: joints that arrived, contacts, and whether the object is held.
 
     Args:
-        joints: every joint that it moves, with where it should go. reached: all are there, up to the report's angle
+        joints: every joint that the step moves, with its target. reached: all are there, up to the report's angle
             tolerance. reason: in words.
         touching: fingers that touch the object after it, None where that is not known.
         held: whether the object is still held after it, None where that was not tested.
-        motion: of the object by the step alone, None where it could not move or was not seen.
+        motion: of the object in this step alone, None if it could not move or was not observed.
         pulls: with which it was tested, by direction, or "gravity"; motions count from after the step.
     """
 
@@ -95,7 +95,7 @@ def step_sentence(step: int, joints: Mapping[str, JointReached], tolerance: floa
     """Return whether a next step was reached, and say so.
 
     Args:
-        step: its index. joints: those that it moves. tolerance: largest difference that counts as reached [rad].
+        step: its index. joints: joints of the step. tolerance: largest difference that counts as reached [rad].
     """
     if not joints:
         return True, f"Next step {step + 1} moves nothing: it names no joint, or followers only."
@@ -131,19 +131,19 @@ class ExecutionReport:
     """The result of an execution: angles and contacts that were reached, against those computed.
 
     Args:
-        actuator: what carried it out. success: see `reason`. reason: one sentence.
+        actuator: name of the executor. success: see `reason`. reason: one sentence.
         joints: every joint, by name. contacts: every computed contact that had not passed.
         touched_links: names of the links that touch at the end.
         first_touch: when each finger first touched [s], None when it did not.
         duration: how long the motion took [s].
         largest_angle_error: over all joints [rad].
-        angle_tolerance: [rad], contact_tolerance: [m]: what counted as reached.
-        notes: sentences about what the comparison does not show.
-        history: what was told and measured on the way, None when it was not kept.
-        hold: what came of a hold test, None without one.
-        driven_by: what moved every joint of a simulated hand: an actuator of the model, "servo" or "coupled".
-        next_steps: what came of the solution's next steps; those after one that was not reached are left out.
-        sent: what was sent to a controller, None when the actuator is none.
+        angle_tolerance: [rad]. contact_tolerance: [m].
+        notes: limits of the comparison, as sentences.
+        history: targets and measurements on the way, None if not kept.
+        hold: result of a hold test, None without one.
+        driven_by: drive of every joint of a simulated hand: an actuator of the model, "servo" or "coupled".
+        next_steps: results of the solution's next steps, up to the first step that was not reached.
+        sent: count of commands to a controller, None if the actuator is none.
     """
 
     actuator: str

@@ -1,4 +1,4 @@
-"""Check what a hand does after the touch: the squeeze, and the next steps of the work."""
+"""Check the motion after the touch: the squeeze, and the next steps of the work."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def refuse_after(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -
     """Raise an error if the squeeze or a next step would drive links of the hand into each other.
 
     Args:
-        solution: the solution. hand: what it was computed for. phases: what comes after the touch.
+        solution: the solution. hand: the hand that was solved for. phases: of the motion after the touch.
 
     Raises:
         MotionError: the sentence names the step and the links.
@@ -35,11 +35,11 @@ def refuse_after(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -
 def squeeze_overlap(solution: GraspSolution, hand: Hand, offsets: FloatArray) -> str | None:
     """Return a sentence about the first two links that a squeeze drives into each other; None without.
 
-    The object holds the fingers that touch it: they press and do not move, whatever angles they are told. So the
-    other joints move alone.
+    The object stops the fingers that touch it: they press and do not move, regardless of their targets. Only the other
+    joints move.
 
     Args:
-        solution: the solution. hand: what it was computed for. offsets: angles beyond the touch [rad], shape (J,).
+        solution: the solution. hand: the hand that was solved for. offsets: angles beyond the touch [rad], shape (J,).
     """
     if not offsets.any():
         return None
@@ -62,7 +62,8 @@ def told_overlap(
     Another program that reads only these three postures moves the joints like that.
 
     Args:
-        solution: the grasp. hand, obj: what it was computed for; without the object only links are kept apart.
+        solution: the grasp. hand, obj: the hand and object that were solved for; without the object only links are
+            checked against each other.
         pregrasp, squeezed: angles by joint name [rad].
     """
     q = posture(solution.joint_angles, hand, "joint_angles")
@@ -80,11 +81,11 @@ def step_overlap(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -
     """Return a sentence about the first two links that next steps drive into each other; None when there are none.
 
     The object moves with the hand or stays behind, so only the hand is checked. Fingers that touch the object press on
-    it until a step moves them. So they are checked twice: where they are told to be, and where the object holds them.
-    Links that overlap when the steps begin may stay as deep as they are.
+    it until a step moves them. So they are checked twice: at their targets, and where the object stops them. Links that
+    overlap when the steps begin may stay as deep as they are.
 
     Args:
-        solution: the solution. hand: what it was computed for. phases: what comes after the touch.
+        solution: the solution. hand: the hand that was solved for. phases: of the motion after the touch.
     """
     steps = [phase for phase in phases if phase.name == NEXT_STEP]
     if not steps:

@@ -12,7 +12,7 @@ import numpy as np
 from clench.core.errors import CommandError
 from clench.core.pose import FloatArray
 
-#: Largest acceleration of a joint unless another is asked for [rad/s²]: models do not say.
+#: Default largest acceleration of a joint [rad/s²]: models do not state one.
 ACCELERATION: Final = 10.0
 #: Two directions whose unit vectors differ by less are one straight line [-].
 _STRAIGHT: Final = 1e-9
@@ -28,7 +28,7 @@ class Profile:
     """The fastest motion from 0 to 1, at rest at both ends, under a largest speed v and a largest acceleration a.
 
     The speed grows with a for a time r = v / a, stays at v, and falls with a. If half the way is too short to reach v,
-    the speed falls as soon as it has grown; then r = 1 / √a.
+    the speed falls after it has grown; then r = 1 / √a.
 
     Args:
         speed: that is reached [1/s]. ramp: r [s]. duration: of the motion [s].

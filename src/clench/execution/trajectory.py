@@ -42,11 +42,11 @@ class Trajectory:
         times: of the way-points [s], shape (N,), rising from 0.
         positions: joint angles [rad], shape (N, J); the first is the open hand, the last the touch.
         velocity_limits: of the joints [rad/s], shape (J,).
-        pregrasp: number of the way-point from which all contacts are reached at once; None when there is none.
-        after: where the solution has next steps: what comes after the touch, the squeeze and the steps.
+        pregrasp: index of the way-point from which all contacts are reached simultaneously, or None.
+        after: for a solution with next steps, the motion after the touch: the squeeze and the steps.
         speed: fraction of the velocity limits that was used [-]. acceleration: largest of every joint [rad/s²].
-        turns: names of the fingers that move at the same time on the way to the pregrasp, or to the touch without one;
-            fingers of a later turn wait for those before.
+        turns: names of the fingers that move together on the way to the pregrasp, or to the touch without one. Fingers
+            of a later turn wait for the earlier turns.
         open_bodies: names of the object's bodies that are surfaces without an inside: a link that passes through one of
             them does not overlap it.
     """
@@ -78,7 +78,7 @@ class Trajectory:
 
     @property
     def touches_at_once(self) -> bool:
-        """Whether all fingers touch at the same moment: from a pregrasp, or where one finger alone moves."""
+        """Whether all fingers touch at the same moment: from a pregrasp, or because only one finger moves."""
         return self.pregrasp is not None or sum(map(len, self.turns)) <= 1
 
     @property
@@ -149,7 +149,7 @@ class Trajectory:
         """Read a file written by `save`.
 
         Raises:
-            FileError: missing, not JSON, or not a trajectory; the message names the key.
+            FileError: the file is missing, is not JSON, or is no trajectory; the message names the key.
         """
         return _read(read_json(path), str(path))
 
@@ -166,25 +166,25 @@ def plan_trajectory(
 ) -> Trajectory:
     """Plan a free path from the open hand to the touch, and on to the next steps, and time it.
 
-    The path is proven: over all of it, no link of the hand overlaps another link, the object or an obstacle by more
-    than 10 µm, in the geometry of the solution. Pairs of links that may overlap are listed in the hand report.
+    The path is proven free. Over all of it, no link of the hand overlaps another link, the object or an obstacle by
+    more than 10 µm, in the geometry of the solution. Pairs of links that may overlap are listed in the hand report.
 
     The first free path of the following ones is returned.
 
     1. With the object, the hand moves to a pregrasp off the object. From there all fingers touch at the same moment, at
-       10 mm/s. All fingers move to the pregrasp on a straight line in joint space. A finger that would meet something
-       on this line goes along its closing path, joint by joint. Where two fingers would meet, one waits for the other.
-    2. Without the object, or without a free pregrasp, every finger goes through its closing path. Then the later joints
-       of a finger close after the first ones touched, and fingers may touch one after another.
+    10 mm/s. All fingers move to the pregrasp on a straight line in joint space. A finger that would meet something on
+    this line goes along its closing path, joint by joint. If two fingers would meet, one waits for the other. Without
+    the object, or without a free pregrasp, every finger goes through its closing path. Then the later joints of a
+    finger close after the first ones touched, and fingers may touch one after another.
 
-    Of the fingers that move at the same time, the slowest one sets the duration. Posture joints that differ between the
-    open hand and the solution move first. Without the object, the fingers go along paths that the solution's
-    certificate covers, and only links are checked against each other.
+    Among fingers that move together, the slowest one sets the duration. Posture joints that differ between the open
+    hand and the solution move first. Without the object, the fingers go along paths that the solution's certificate
+    covers, and only links are checked against each other.
 
     Args:
         solution: the solution.
         hand: the hand it was computed for.
-        obj: the object it was computed for; the solution says where it is.
+        obj: the object that was solved for; the solution gives its pose.
         speed: fraction of the velocity limits to use, above 0 and up to 1.
         acceleration: largest of every joint [rad/s²].
         clearance: of the pregrasp [m]; less where the way from there is not free.
@@ -192,8 +192,8 @@ def plan_trajectory(
 
     Raises:
         MotionError: no free path was found; the sentence names the links that would overlap, and when.
-        CommandError: the solution is of another hand, lacks a joint, has more than one round, or a next step outside a
-            joint's limits; or `speed`, `acceleration` or `clearance` is out of range.
+        CommandError: the solution is of another hand, lacks a joint, has more than one round, or has a next step
+            outside a joint's limits; or `speed`, `acceleration` or `clearance` is out of range.
         UnknownNameError: a next step of a joint that the hand does not have.
     """
     check_type(solution, GraspSolution, "solution")

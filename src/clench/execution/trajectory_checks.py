@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 RATES: Final = (1e-6, 1e6)
 #: The longest time from the first way-point to the last [s].
 LONGEST: Final = 1e6
-#: Files and sums of times round: what limits may be passed by, as a fraction of them [-].
+#: Files and sums of times round: allowed excess over limits, as a fraction of them [-].
 ROUNDING: Final = 1e-6
 #: A trajectory ends at the solution's touch but for this much [rad].
 _SAME: Final = 1e-6
@@ -36,7 +36,7 @@ def check_rates(source: str, speed: float, acceleration: float, limits: Sequence
         limits: of the velocities [rad/s].
 
     Raises:
-        FileError: with the key, and what was expected.
+        FileError: names the key and the expected value.
     """
     _check(source, "speed", speed, RATES[0], 1.0)
     _check(source, "acceleration", acceleration, *RATES)
@@ -48,7 +48,7 @@ def check_points(source: str, points: Iterable[tuple[float, Sequence[float]]]) -
     """Check the times [s] and angles [rad] of way-points; `source` names the file.
 
     Raises:
-        FileError: with the key, and what was expected.
+        FileError: names the key and the expected value.
     """
     for i, (time, angles) in enumerate(points):
         _check(source, f"points[{i}].time", time, 0.0, LONGEST)

@@ -1,8 +1,8 @@
 """Find a free path from the open hand to the touch: straight, along the closing paths, or finger after finger.
 
-Every path is proven before it is returned, see `path_check`. Where two fingers would meet, one of them waits until the
-other one has arrived. Where a finger would meet the object or the palm on a straight line in joint
-space, the finger goes along its closing path instead, joint by joint.
+Every path is proven before it is returned, see `path_check`. If two fingers would meet, one of them waits until the
+other one has arrived. If a finger would meet the object or the palm on a straight line in joint space, the finger goes
+along its closing path instead, joint by joint.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from .timing import TimedPath, time_path
 
 #: Way-points per stage; speed rises from zero and falls to zero within each.
 STAGE_STEPS: Final = 8
-#: Way-points of a path on which all joints move at once, besides those at which one stops.
+#: Way-points of a path on which all joints move simultaneously, besides those at which a joint stops.
 AT_ONCE_STEPS: Final = 32
-#: Where no way to a pregrasp is free, one nearer to the touch is tried: shares of the clearance [-].
+#: If no way to a pregrasp is free, a pregrasp nearer to the touch is tried: shares of the clearance [-].
 _CLEARANCES: Final = (1.0, 0.25)
-#: So many plans are checked for one pregrasp at most.
+#: Largest number of plans that are checked for one pregrasp.
 _MOST_PLANS: Final = 24
 #: No more plans are tried where so many lead links deeper into each other that overlap where the hand is.
 _MOST_STUCK: Final = 3
@@ -48,7 +48,7 @@ class FingerPlan:
     """Say when each finger moves, and along which path.
 
     Args:
-        turn: of each finger; fingers of one turn move at the same time, those of the next one wait for them.
+        turn: of each finger; fingers of one turn move together, and later turns wait for them.
         straight: whether each finger moves on a straight line in joint space, or else along its closing path.
     """
 
@@ -58,13 +58,13 @@ class FingerPlan:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A path from the open hand to the touch, and what it meets on the way.
+    """A path from the open hand to the touch, and its first overlap.
 
     Args:
         times: [s], shape (N,), from 0. positions: [rad], shape (N, J).
-        pregrasp: number of the way-point from which all contacts are reached at once; None without one.
+        pregrasp: index of the way-point from which all contacts are reached simultaneously, or None.
         turns: names of the fingers that move to the pregrasp, or to the touch, at the same time; first turn first.
-        overlap: the first overlap of a path that is not free; None where it is.
+        overlap: the first overlap on the path; None for a free path.
     """
 
     times: FloatArray
@@ -78,7 +78,8 @@ class WayFinder:
     """Search for a free path of a hand to the touch.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for; without the object only links are kept apart.
+        solution: the solution. hand, obj: the hand and object that were solved for; without the object only links are
+            checked against each other.
         pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
     """
 
@@ -96,7 +97,7 @@ class WayFinder:
         self.end = posture(solution.joint_angles, hand, "joint_angles")
 
     def find(self, clearance: float) -> Way:
-        """Return the first path that is free; where none is, the first one that was tried, with its overlap.
+        """Return the first free path; without one, the first tried path with its overlap.
 
         Args:
             clearance: of the pregrasp [m].
@@ -123,7 +124,7 @@ class WayFinder:
         return way if way.overlap is None or not failed else failed[0]
 
     def _landing(self, clearance: float) -> tuple[FloatArray, _Part] | None:
-        """Return a pregrasp and the straight line from there to all contacts at once; None where it is not free."""
+        """Return a pregrasp and the straight line from there to all contacts; None if it is not free."""
         goal = self._pregrasp(clearance)
         if goal is None:
             return None
@@ -154,11 +155,11 @@ class WayFinder:
         return other
 
     def overlap(self, path: FloatArray) -> PathOverlap | None:
-        """Return the first overlap on a path, shape (N, J); None where it is free."""
+        """Return the first overlap on a path, shape (N, J); None for a free path."""
         return find_path_overlap(self.hand, path, self.source, self.around)
 
     def straight(self, goal: FloatArray) -> Way:
-        """Return the straight line in joint space to a posture, with its overlap where it is not free."""
+        """Return the straight line in joint space to a posture, with its overlap unless it is free."""
         joints = range(len(goal))
         line = time_path(self._line(joints, self.start, goal), *self.pace)
         times, positions = _joined([line], goal, [joints])
@@ -169,7 +170,7 @@ class WayFinder:
 
         Args:
             goal: the posture [rad], shape (J,). straight: whether fingers first try straight lines, or else their
-                closing paths. last: times [s] and postures [rad] of what follows.
+                closing paths. last: times [s] and postures [rad] of the rest of the way.
         """
         count = len(self.hand.fingers)
         plans = [FingerPlan((0,) * count, (straight,) * count)]
@@ -204,7 +205,7 @@ class WayFinder:
             pregrasp = len(times) - 1
             times = np.concatenate([times[:-1], times[-1] + last[0]])
             positions = np.vstack([positions[:-1], last[1]])
-            # Where nothing touches, there is nothing to stand off.
+            # Without a contact, there is nothing to keep a clearance from.
             pregrasp = pregrasp if pregrasp < len(times) - 1 else None
         overlap = self.overlap(positions)
         names = [f.name for f in self.hand.fingers]
@@ -319,7 +320,7 @@ def refuse_way(way: Way, hand: Hand) -> None:
 
 
 def _later(turn: tuple[int, ...], waits: int) -> tuple[int, ...]:
-    """Return turns in which one finger moves after those that it moved with, and before those that moved after."""
+    """Return turns in which one finger moves after its former turn and before the next one."""
     own = turn[waits]
     return tuple(t + 1 if k == waits or t > own else t for k, t in enumerate(turn))
 

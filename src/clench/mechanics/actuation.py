@@ -1,7 +1,7 @@
 """Actuation force: the smallest worst joint torque, or tendon tension, that holds a load (docs/method.md section 6).
 
-A. Bicchi and V. Kumar, "Robotic grasping and contact: a review", ICRA 2000, give the problem: forces are not
-determined by the load alone; among those inside the cones the best are chosen. Friction cones are second-order cones.
+A. Bicchi and V. Kumar, "Robotic grasping and contact: a review", ICRA 2000, state the problem: the load does not
+determine the forces. Among the forces inside the cones, the best are chosen. Friction cones are second-order cones.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from .programs import ConeProgram, balanced, demand_cones, demand_limits, demand
 
 #: Largest normal force that is considered, as a multiple of the load [-].
 MOST_FORCE: Final = 1e3
-#: What a plan may miss balance, cones and limits by, beside forces of 1 N [N, Nm].
+#: Allowed error of a plan in balance, cones and limits, for forces of 1 N [N, Nm].
 ALLOWED: Final = 1e-9
 
 
 class Effort(StrEnum):
-    """Name what is made small."""
+    """The effort that is minimised."""
 
     TORQUE = "torque"
     """the largest torque of a joint [Nm]"""
@@ -39,7 +39,7 @@ class Effort(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class HoldingForces:
-    """Hold contact forces that balance a load.
+    """Contact forces that balance a load.
 
     Args:
         load: the external wrench `(force, torque / length)` [N], shape (6,).
@@ -66,12 +66,12 @@ class HoldingForces:
 
 @dataclass(frozen=True)
 class Actuation:
-    """Hold what it takes to hold a set of loads.
+    """The effort of holding a set of loads.
 
     Args:
         worst_torque: largest torque of a joint over all loads [Nm]; None when some load cannot be held.
         worst_tension: largest tension of a tendon over all loads [N]; None also without tendons.
-        plans: one for every load, None where it cannot be held.
+        plans: one per load, None if it cannot be held.
         reason: which limit binds at the first load that cannot be held, else "".
     """
 
@@ -87,7 +87,7 @@ def actuation(held: HeldObject, loads: ArrayLike, least: Effort | str = Effort.T
     """Return the smallest worst torque, or tension, for every load of a set.
 
     Args:
-        held: the grasp. loads: rows `(force, torque / length)` [N], shape (N, 6). least: what is made small.
+        held: the grasp. loads: rows `(force, torque / length)` [N], shape (N, 6). least: the effort to minimise.
 
     Raises:
         CommandError: an empty or malformed set; tensions of a hand without tendons.
@@ -108,7 +108,7 @@ def least_effort(held: HeldObject, load: FloatArray, least: Effort | str = Effor
     """Return forces that hold a load with the least effort, inside cones and limits; None when there are none.
 
     Args:
-        held: the grasp. load: external wrench, shape (6,). least: what is made small.
+        held: the grasp. load: external wrench, shape (6,). least: the effort to minimise.
 
     Raises:
         CommandError: tensions of a hand without tendons.

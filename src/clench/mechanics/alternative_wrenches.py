@@ -1,7 +1,9 @@
-"""What combinations of alternatives can resist: the steadiest of thousands, of which a few are looked at.
+"""Find the wrenches that combinations of alternatives resist: the best epsilon among thousands, after judging only a
+few.
 
 A combination takes one set of wrenches per finger; its epsilon is the least, over directions, of the farthest that any
-of them reaches. So along every direction the reach of all is a maximum over fingers, and no epsilon is more than that.
+of them reaches. Along every direction, the reach of all wrenches is a maximum over fingers. It bounds epsilon from
+above.
 """
 
 from __future__ import annotations
@@ -20,15 +22,15 @@ _STARTS = 3
 
 
 class AlternativeWrenches:
-    """Hold the wrenches of every set of every finger, and directions in which some combination was weakest.
+    """The wrenches of every set of every finger, and directions in which some combination was weakest.
 
     Args:
-        wrenches: by finger and set, shape (N, 6) each; sets that touch nothing have none.
+        wrenches: by finger and set, shape (N, 6) each; sets without contact have none.
     """
 
     def __init__(self, wrenches: Sequence[Sequence[FloatArray]]) -> None:
         self._wrenches = [[*sets] for sets in wrenches]
-        # Not to push at all is always possible: 0 is among the wrenches of every set.
+        # A finger need not push: 0 is among the wrenches of every set.
         every = [np.vstack([w, np.zeros((1, 6))]) for sets in wrenches for w in sets]
         self._rows = np.vstack(every)
         self._first = np.concatenate([[0], np.cumsum([len(w) for w in every])[:-1]])

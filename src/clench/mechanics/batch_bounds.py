@@ -1,4 +1,4 @@
-"""Lower bounds of epsilon for many grasps at once (docs/method.md section 6)."""
+"""Compute lower bounds of epsilon for many grasps in one call (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def epsilon_bounds(
     """Return the bound of `epsilon_bound` (L1) for N grasps, shape (N,) [N/N].
 
     Args:
-        first: contacts `first[n]` up to `first[n + 1]` are those of grasp n, shape (N + 1,).
+        first: grasp n has the contacts `first[n]` up to `first[n + 1]`, shape (N + 1,).
         position: [m], shape (C, 3). normal: unit, out of the object, as in `clench.BatchContacts`, shape (C, 3).
         friction: of each contact, or one number for all [-]. center: of mass of each grasp, or of all [m].
         length: length scale of wrenches [m]. torsion: torsional coefficient of soft fingers [m]; None: point contacts.

@@ -1,4 +1,4 @@
-"""What keeps a load from being held: torque limits, tendons, friction, or the contacts themselves."""
+"""Find the limit that makes a load impossible to hold: torque limits, tendons, friction, or the contacts themselves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from clench.core.pose import FloatArray
 from .actuation import HoldingForces, least_effort
 from .held import HeldObject
 
-#: Friction is raised up to this factor, and at least to this friction, to see whether it is what lacks [-].
+#: Friction is raised up to this factor, and at least to this friction, to test whether friction is the limit [-].
 MOST_FRICTION: Final = 100.0
 #: Joints whose use of their limit is this close to the largest bind, too [-].
 _AS_MUCH = 1e-4
@@ -20,7 +20,7 @@ _HALVINGS = 20
 
 
 def why_not(held: HeldObject, load: FloatArray) -> str:
-    """Return a sentence that names what keeps a load from being held.
+    """Return a sentence that names the limit that makes a load impossible to hold.
 
     Args:
         held: the grasp. load: external wrench that it does not hold, shape (6,).

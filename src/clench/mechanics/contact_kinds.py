@@ -1,4 +1,4 @@
-"""Kinds of grasps by what touches: fingers with their last links, or more than that."""
+"""Classify grasps by their contacts: fingers with their last links only, or with more links."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class GraspKind(StrEnum):
     """the palm or another link of a finger touches as well"""
 
 
-#: What the codes of `contact_kinds` mean, in order; -1 is no kind: fewer than two of the fingers and the palm touch.
+#: Meanings of the codes of `contact_kinds`, in order; -1 is no kind: fewer than two of the fingers and the palm touch.
 KINDS: Final = tuple(GraspKind)
 
 
@@ -79,7 +79,7 @@ def _link_table(hand: Hand) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 
 
 def _moving_joint(hand: Hand, link: int) -> int:
-    """Return the joint that moves a link, or that moves what the link is fixed to; -1 without one."""
+    """Return the joint that moves a link, or the link that it is fixed to; -1 without a joint."""
     while link >= 0 and hand.links[link].joint < 0:
         link = hand.links[link].parent
     return hand.links[link].joint if link >= 0 else -1

@@ -29,7 +29,7 @@ from clench.models.objects.grasp_object import Body
 
 from .loads import ends_of
 
-#: Torsional coefficient of soft fingers unless given [m]: torque about the normal per normal force; MuJoCo's default.
+#: Default torsional coefficient of soft fingers [m]: torque about the normal per normal force; MuJoCo's default.
 DEFAULT_TORSION: Final = 0.005
 #: Contacts of a link whose places and normals differ by less are one [m, -].
 _SAME: Final = 1e-9
@@ -48,7 +48,7 @@ class ContactModel(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class ContactSet:
-    """Hold the contacts of a grasp in one frame.
+    """The contacts of a grasp in one frame.
 
     Args:
         positions: [m], shape (C, 3).
@@ -58,8 +58,8 @@ class ContactSet:
         links: index of the touching link in the hand, shape (C,).
 
     Raises:
-        CommandError: shapes that do not fit, values that are not finite, normals that are not unit, friction or torsion
-            that is not above 0.
+        CommandError: shapes do not fit, values are not finite, normals are not unit, or friction or torsion is not
+            above 0.
     """
 
     positions: FloatArray
@@ -145,7 +145,7 @@ def make_contacts(
         friction: [-]. model: see `ContactModel`. torsion: of soft fingers [m]. links: indices in the hand.
 
     Raises:
-        CommandError: see `ContactSet`; a normal of no length; no such model.
+        CommandError: see `ContactSet`; also a normal of length zero, or an unknown model.
     """
     if model not in list(ContactModel):
         raise CommandError(f"contact_model: expected one of {', '.join(ContactModel)}, got {model!r}.")
@@ -243,7 +243,7 @@ def friction_range(friction: float | tuple[float, float], key: str = "friction")
     """Return the lowest and the highest friction of a number, which is a range of one value, or of a pair [-].
 
     Raises:
-        CommandError: not finite, not above 0, or a range whose first friction is the larger one.
+        CommandError: a value is not finite or not above 0, or the first friction of a range is the larger one.
     """
     low, high = ends_of(friction, key)
     for end in (low, high):

@@ -1,7 +1,7 @@
 """Steadiness of a held object: epsilon and volume, within torque limits, and a fast lower bound of each epsilon.
 
-Polyhedra inside the friction cones stand in for the cones, so every number is on the safe side of the round cones: with
-N edges by at most a factor cos(pi / N) in the friction.
+Polyhedra inside the friction cones replace the cones, so every number is a lower bound. With N edges, the friction is
+too small by at most a factor cos(pi / N).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .contacts import ContactSet, edge_directions
 from .held import HeldObject
 from .wrench_space import Ball, WrenchNorm, epsilon_l1, epsilon_linf, largest_ball, spanned_dimensions
 
-#: Edges of the polyhedra inside the friction cones unless asked otherwise [-].
+#: Default number of edges of the polyhedra inside the friction cones [-].
 EDGES: Final = 8
 #: Largest normal force of a contact within torque limits [N]; binds only where joints have none, or stand still.
 MOST_NORMAL_FORCE: Final = 1e3
@@ -61,7 +61,8 @@ def epsilon_within_torques(held: HeldObject, edges: int = EDGES) -> Ball:
 def epsilon_bound(held: HeldObject, norm: WrenchNorm | str | None = WrenchNorm.L1, edges: int = EDGES) -> float:
     """Return a lower bound of `epsilon`, or with norm None of `epsilon_within_torques`, in a fraction of the time [N].
 
-    Forces answer wrenches affinely, `f = s f0 + K w`; 0 says that no such answer was found, not that there is none.
+    Forces answer wrenches affinely, `f = s f0 + K w`. A bound of 0 means that the search found no such answer, although
+    one may exist.
     """
     from clench.kernels.mechanics.wrench_bound import resisted_ball
 
@@ -89,7 +90,7 @@ def cone_faces(contacts: ContactSet, edges: int) -> FloatArray:
 
 
 def _caps(held: HeldObject, norm: WrenchNorm | str | None) -> tuple[FloatArray, FloatArray]:
-    """Return what bounds the forces: rows c with `|c f| <= most`."""
+    """Return the bounds of the forces: rows c with `|c f| <= most`."""
     contacts = held.contacts
     if norm == WrenchNorm.L1:
         together = np.zeros((1, len(contacts) * contacts.width))
@@ -106,7 +107,7 @@ def _caps(held: HeldObject, norm: WrenchNorm | str | None) -> tuple[FloatArray, 
 
 @dataclass(frozen=True, eq=False)
 class _LimitedWrenches:
-    """Hold the linear program whose best value along a direction is the support of the limited wrench space.
+    """The linear program whose optimum along a direction is the support of the limited wrench space.
 
     Args:
         wrenches: of the cones' edges, shape (C * N, 6). rows, most: bounds of the edges' shares.

@@ -1,7 +1,7 @@
 """The grasp map: from contact forces to wrenches on the object (Murray, Li and Sastry 1994, chapter 5).
 
-Wrenches are `(force, torque / length)` about the centre of mass, both in newtons: the length scale makes the ball of
-wrenches mean something, and results independent of the unit of length.
+Wrenches are `(force, torque / length)` about the centre of mass, both in newtons. The length scale gives the ball of
+wrenches a meaning, and makes results independent of the unit of length.
 """
 
 from __future__ import annotations

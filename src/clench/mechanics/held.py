@@ -20,13 +20,13 @@ from .tendon_tensions import TendonDrive, tendon_drive
 
 @dataclass(frozen=True, eq=False)
 class HeldObject:
-    """Hold what forces and steadiness are computed from.
+    """The input for forces and epsilon quality.
 
     Args:
         contacts: in one frame (the palm's where a hand holds).
         center: centre of mass of the object in the same frame [m], shape (3,).
         length: length scale: largest distance of the object's surface from the centre of mass [m].
-        dofs: degrees of freedom of the hand; none for contacts without a hand.
+        dofs: degrees of freedom of the hand; empty for contacts without a hand.
         jacobian: see `hand_jacobian`, shape (C * width, D).
         drive: tendons that move the joints, None where joints are driven by themselves.
     """

@@ -22,7 +22,7 @@ _AT_LIMIT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class DegreesOfFreedom:
-    """Hold the degrees of freedom of a hand at a posture.
+    """The degrees of freedom of a hand at a posture.
 
     Args:
         names: of the leading joints, in model order.

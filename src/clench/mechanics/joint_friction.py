@@ -15,14 +15,14 @@ from .held import HeldObject
 
 #: Fingers whose torques sum to less than this part of the strongest finger's sum are left aside [-].
 _MINOR: Final = 0.2
-#: How often the harder squeeze is halved on the way to the hardest one that is allowed.
+#: Number of bisections towards the hardest allowed squeeze.
 _HALVINGS: Final = 20
-#: How often a squeeze that the tendons cannot exert is halved.
+#: Number of times that a squeeze is halved if the tendons cannot exert it.
 _TENDON_HALVINGS: Final = 4
 
 
 def loss_of_torques(held: HeldObject, plan: HoldingForces) -> float:
-    """Return the part of the torques that friction in the joints takes, of the finger where it takes most [-].
+    """Return the largest share of a finger's torques that joint friction takes [-].
 
     Friction r of the joints takes the part `sum(r |tau|) / sum(tau^2)` of the power of a motion along the torques.
     Fingers that hardly press are left aside.

@@ -1,6 +1,6 @@
 """Load sets: the external wrenches that a grasp is asked to hold, as rows `(force, torque / length)` [N].
 
-What contacts can resist is convex: whoever holds the corners of a set holds everything between them.
+The resisted wrenches form a convex set: a grasp that holds the corners of a set holds everything between them.
 """
 
 from __future__ import annotations

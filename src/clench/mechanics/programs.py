@@ -18,8 +18,8 @@ from .tendon_tensions import TendonDrive
 
 #: Accuracy asked of the solver, relative and absolute [-].
 _ACCURACY = 1e-10
-#: How far steps go towards the boundary: shorter ones where the solver ends with neither forces nor a proof that
-#: there are none; near the limits about one program in a hundred goes in circles [-].
+#: Step lengths towards the boundary. Shorter steps follow if the solver finds neither forces nor a proof that none
+#: exist; near the limits about one program in a hundred cycles [-].
 _STEPS = (0.99, 0.9)
 #: Weight of the squared forces beside the cost: among equally good ones the smallest are taken [-].
 _SMALLEST = 1e-9
@@ -29,7 +29,7 @@ _INSIDE = 1e-8
 
 @dataclass
 class ConeProgram:
-    """Collect a program over `size` unknowns: minimise `cost x + small |x|²` under what is added.
+    """Collect a program over `size` unknowns: minimise `cost x + small |x|²` under the added constraints.
 
     Args:
         size: number of unknowns. cost: shape (size,).
@@ -120,7 +120,7 @@ def demand_tensions(program: ConeProgram, torques: FloatArray, drive: TendonDriv
 
     Args:
         program: to add to.
-        torques: rows that give those of all degrees of freedom, in units in which they are as large as forces.
+        torques: rows of the torques of all degrees of freedom, in units in which they are as large as forces.
         drive: the tendons, in the same units. first: place of the first tension among the unknowns.
     """
     tensions = np.eye(len(drive.t_min), program.size, first)

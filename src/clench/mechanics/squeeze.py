@@ -1,9 +1,9 @@
 """The squeeze: contact forces that hold an object with a margin against disturbances (docs/method.md section 6).
 
-Forces f balance the nominal load. A disturbance d changes them by the least that balances it, `-K d`, as equally stiff
-fingers do (torques of soft fingers count by gamma); the hand need not react. The margin is the largest s such that
-`f - s K d` is inside all cones and torque limits for every disturbance d of a set: up to a margin that is enough, after
-which torques are made small. A load that is known only as `load ± spread` must be held at both of its ends.
+Forces f balance the nominal load. A disturbance d changes them by the smallest forces that balance it, `-K d`, as
+equally stiff fingers do (torques of soft fingers count by gamma). The hand need not react. The margin is the largest s
+such that `f - s K d` is inside all cones and torque limits for every disturbance d of a set. Once the margin is large
+enough, torques are minimised. A load that is known only as `load ± spread` must be held at both of its ends.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from .loads import check_loads
 _GIVEN_UP: Final = 1e-6
 #: Disturbances of which more than this part cannot be exerted by any contact forces count as not resisted [-].
 _UNRESISTED: Final = 1e-9
-#: Weight of the sum of normal forces beside the worst torque: no finger presses for nothing [-].
+#: Weight of the sum of normal forces beside the worst torque: no finger presses without need [-].
 _TOTAL_FORCE: Final = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class SqueezeForces:
-    """Hold a squeeze.
+    """A squeeze.
 
     Args:
         plan: forces and torques that balance the nominal load; None when there are none.
         margin: the disturbances are resisted up to this multiple [-].
         unresisted: rows of the disturbance set that no contact forces can balance; the margin leaves them out.
-        reason: which limit binds where there is no plan, else "".
+        reason: the binding limit if there is no plan, else "".
         reserve: the plan counts on this part of the friction [-].
-        loss: part of the torques that friction in the joints takes at most, of the finger where it takes most [-].
+        loss: largest share of a finger's torques that joint friction takes [-].
     """
 
     plan: HoldingForces | None
@@ -58,7 +58,7 @@ class SqueezeForces:
 
 @dataclass(frozen=True, eq=False)
 class SqueezeTask:
-    """Hold what a squeeze must do.
+    """The demands on a squeeze.
 
     Args:
         held: the grasp. load: nominal external wrench, shape (6,). unit: forces are counted in this many newtons.
@@ -143,14 +143,15 @@ def _with_friction(task: SqueezeTask, reserve: float) -> SqueezeTask:
 def _squeeze_of(
     task: SqueezeTask, careful: SqueezeTask, needed: float
 ) -> tuple[tuple[HoldingForces, float] | None, SqueezeTask]:
-    """Return forces with their margin, and the task that they fulfil: the careful one where it can be fulfilled."""
+    """Return forces with their margin, and the task that they fulfil: the careful task if it is feasible."""
     if needed == 0.0:
         for each in (careful, task):
             best = _largest_margin(each)
             if best is not None:
                 return _gentle(each, best), each
         return None, task
-    # Most squeezes reach all the margin that is asked for. Of the others, only what all friction holds can be held.
+    # Most squeezes reach all the margin that is asked for. For the others, only loads that full friction can hold are
+    # feasible.
     found = _least_torque(careful, careful.enough)
     if found is not None:
         return found, careful
@@ -166,7 +167,7 @@ def _squeeze_of(
 
 def _gentle(task: SqueezeTask, best: tuple[HoldingForces, float]) -> tuple[HoldingForces, float]:
     """Return forces of nearly the largest margin whose torques are small; those given where the solver finds none."""
-    # A margin that is enough is reached to the last digit; only one that falls short gives up a part.
+    # A margin that is large enough is reached to the last digit; only a smaller margin gives up a part.
     return _least_torque(task, min(task.enough, best[1] * (1.0 - _GIVEN_UP))) or best
 
 

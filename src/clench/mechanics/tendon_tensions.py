@@ -24,7 +24,7 @@ _MISSED = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Tensions:
-    """Hold tensions of tendons.
+    """The tensions of tendons.
 
     Args:
         tensions: [N], shape (T,); of the nearest torques that can be given.
@@ -44,7 +44,7 @@ class Tensions:
 
 @dataclass(frozen=True, eq=False)
 class TendonDrive:
-    """Hold the tendons of a hand as its degrees of freedom feel them.
+    """The tendons of a hand, acting on its degrees of freedom.
 
     Args:
         names: of the tendon-driven degrees of freedom, shape (N,). columns: their indices among all.
@@ -61,7 +61,8 @@ class TendonDrive:
     def tensions(self, torques: ArrayLike) -> Tensions:
         """Return tensions that give torques of the tendon-driven degrees of freedom, the largest tension smallest.
 
-        Where none do, the tensions whose torques come nearest are returned, and what cannot be given is named.
+        If no tensions give the torques, the tensions with the nearest torques are returned, and the missing torques are
+        named.
 
         Args:
             torques: [Nm], shape (N,).
@@ -80,7 +81,7 @@ class TendonDrive:
         return Tensions(found, given, tuple(n for n, m in zip(self.names, missed, strict=True) if m))
 
     def _least(self, wanted: FloatArray) -> FloatArray | None:
-        """Minimise the largest tension, and a little their sum, so that no tendon is pulled for nothing."""
+        """Minimise the largest tension and, with a small weight, the sum, so that no tendon is pulled without need."""
         from scipy.optimize import linprog
 
         count = self.arms.shape[1]

@@ -1,4 +1,5 @@
-"""Steadiness: the largest ball of wrenches that a grasp resists, and the volume of what it resists.
+"""Compute the epsilon quality, the largest ball of wrenches that a grasp resists, and the volume of the resisted
+wrenches.
 
 C. Ferrari and J. Canny, "Planning optimal grasps", ICRA 1992. The grasp wrench space W holds all wrenches that contact
 forces inside their cones can exert, with normal forces bounded either together or each:
@@ -9,9 +10,9 @@ forces inside their cones can exert, with normal forces bounded either together 
 Epsilon is the radius of the largest ball around 0 inside W, 0 when 0 is not inside. With the wrenches of `grasp_map`
 it is a force [N] per bound of 1 N; volume is that of W in six dimensions [N^6].
 
-Epsilon is found by expansion: the hull of a few points of W lies inside W, and where W's support beats a facet that is
-nearer than any that W is known to have, its point is added; when there are none, the nearest facet is W's. Of L1, the
-facets that are nearest around a few directions are found first: mostly they settle it.
+Epsilon is found by expansion. The hull of a few points of W lies inside W. If W's support beats the nearest facet that
+is not known to belong to W, its point is added. When no such facet is left, the nearest facet is W's. For L1, the
+nearest facets around a few directions are found first. They usually suffice.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ if TYPE_CHECKING:
 
 #: Rounding allowed in the offset of a facet, as a fraction of the largest wrench [-].
 _ROUNDING = 1e-10
-#: Facets that are asked at once: fewer take more hulls, more let hulls grow.
+#: Facets per call: fewer facets need more hulls, more facets make the hulls grow.
 _BATCH = 64
-#: More expansions than this mean that rounding keeps them going; what is reached is a lower bound all the same.
+#: After this many expansions, only rounding keeps them going. The result is still a lower bound.
 _EXPANSIONS = 500
 
 #: Points that lie this far below a facet are on it [N].
 _SAME_FACET = 1e-9
-#: What reaches no farther than this fraction of the largest wrench reaches nowhere [-].
+#: Points within this fraction of the largest wrench count as 0 [-].
 _NOTHING = 1e-12
 
 #: Searches for a near facet, from the same directions every time: eight find the nearest of 12 contacts 9 times in 10.
@@ -60,7 +61,7 @@ class WrenchNorm(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """Hold the largest ball around 0 inside a set of wrenches.
+    """The largest ball around 0 inside a set of wrenches.
 
     Args:
         radius: 0 when 0 is not inside [N].
@@ -147,7 +148,7 @@ def largest_ball(
     Args:
         support: see `Support`. generators: points that span the set's directions, shape (N, D).
         tolerance: of the radius, as a fraction of the largest point found [-].
-        batch: directions that are asked at once.
+        batch: directions per call.
         known: points of the set that its nearest facet may have, shape (M, D). most: the set reaches no farther there.
     """
     size = generators.shape[1]

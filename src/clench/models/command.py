@@ -1,4 +1,4 @@
-"""The command: the wrist pose, the posture, and what is asked for."""
+"""The command: the wrist pose, the posture, and the options."""
 
 from __future__ import annotations
 
@@ -23,29 +23,28 @@ class ClosingOrder(StrEnum):
     PROXIMAL_FIRST = "proximal-first"
     """one degree of freedom after another, from the palm outwards (the patent)"""
     TOGETHER = "together"
-    """all at once; a contact stops the joints before it in its finger, the others go on"""
+    """all simultaneously; a contact stops the joints before it in its finger, and the others continue"""
     FINGERTIP = "fingertip"
-    """all at once; only a touch of the last link counts"""
+    """all simultaneously; only a contact of the last link counts"""
 
 
 @dataclass(frozen=True)
 class GraspCommand:
-    """Say where the hand is, how it is preshaped and what is asked for.
+    """The pose of the hand, its preshape and the options of a solve.
 
     Args:
         hand_pose: `T_world_palm`, or the pose of `root_link` when that is named.
         root_link: the link that `hand_pose` places; None is the palm.
         object_pose: `T_world_object`; None keeps the object's own.
         preshape: angles [rad] by joint name: posture joints, and open values of closing joints. Or a name: "open", or
-            that of a preshape of the hand (`clench hand` lists them). If no posture joint and no name is given, clench
-            compares the preshapes of the hand and chooses one (docs/preshapes.md).
+            that of a preshape of the hand (`clench hand` lists them). If it names no posture joint and no preshape,
+            clench compares the preshapes of the hand and chooses one (docs/preshapes.md).
         fingers: names of the fingers that close, in order; None is all.
         order, rounds: closing order, and how often it is gone through; 0 rounds: until nothing moves any more.
         orders: alternatives, used instead of `order`: each is solved by itself, and the best solution is kept.
-        speeds: how fast joints close relative to each other where all move at once, by name of a free joint; 1 if not
-            named.
+        speeds: relative closing speeds for simultaneous closing, by name of a free joint; 1 if not named.
         planes: number of curl planes per finger.
-        full_width: also compute the set that closes over all planes at once.
+        full_width: also compute the set that closes over all planes together.
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
         check_sets: measure the penetration of every alternative set, which costs more than the solve.
@@ -55,8 +54,8 @@ class GraspCommand:
         criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.
         next_steps: postures [rad] by joint name that the hand goes to after the grasp, one after another; joints that a
             step does not name stay. For the criteria about them, and carried out.
-        task_wrenches: what acts on the object in its task, `force` [N] and `torque` [Nm] in the world about the centre
-            of mass, for the criterion about it; each is held alone.
+        task_wrenches: task loads on the object for their criterion, `force` [N] and `torque` [Nm] in the world about
+            the centre of mass; each load is held alone.
         seed: recorded with the result; nothing random depends on it.
 
     Raises:
@@ -94,7 +93,7 @@ class GraspCommand:
 
     @property
     def angles(self) -> Mapping[str, float]:
-        """The angles that the preshape gives by joint name [rad]; none where it is a name."""
+        """The angles that the preshape gives by joint name [rad]; empty if it is a name."""
         return {} if isinstance(self.preshape, str) else self.preshape
 
     def unshared(self) -> GraspCommand:
@@ -124,7 +123,7 @@ class GraspCommand:
 
 
 def as_command(command: GraspCommand | Pose) -> GraspCommand:
-    """Return a command as it is, and a pose as the command that asks for nothing else.
+    """Return a command unchanged, and a pose as the command without other options.
 
     Raises:
         CommandError: neither of the two.

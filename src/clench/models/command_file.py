@@ -63,7 +63,7 @@ def command_from_dict(data: Any, source: str = "command", folder: Path | None = 
     """Read the form of a command file.
 
     Args:
-        data: what JSON gives. source: names it in messages. folder: where a relative calibration file is looked for.
+        data: parsed JSON. source: names it in messages. folder: where a relative calibration file is looked for.
 
     Raises:
         CommandError: unknown, missing or malformed key.

@@ -21,8 +21,8 @@ def command_from_posture(hand: Hand, q: FloatArray | Mapping[str, float], hand_p
 
     Args:
         hand: the hand.
-        q: all joint angles [rad], in model order, shape (J,), or by name; followers may be left out by name, and are
-            never used: their leaders decide.
+        q: all joint angles [rad], in model order, shape (J,), or by name. Followers are ignored, because their leaders
+            decide; they may be missing by name.
         hand_pose: `T_world_palm`.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Reduce binary glTF files to their geometry: no pictures, nothing outside of the file, a scene of few parts."""
+"""Reduce binary glTF files to their geometry: without pictures and outside references, as a scene of few parts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from clench.core.files.file_limits import JSON_BYTES, MESH_TRIANGLES, SCENE_PART
 
 _MAGIC: Final = 0x46546C67
 _JSON: Final = 0x4E4F534A
-#: What is of pictures; it is left out before anything reads it.
+#: Keys of pictures; they are removed before parsing.
 _LOOKS: Final = ("images", "textures", "samplers", "materials", "animations", "skins", "cameras", "extras")
 
 

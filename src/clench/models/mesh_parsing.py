@@ -30,11 +30,11 @@ def parse_mesh(data: bytes, suffix: str) -> Any:
         data: of the file. suffix: of its name, one of `PARSED`, in lower case.
 
     Raises:
-        MeshError: whatever the parser raises on it, or a limit of docs/security.md, as part of a sentence.
+        MeshError: any error of the parser, or a limit of docs/security.md, as part of a sentence.
     """
     import trimesh
 
-    # The library tells what it cannot read on standard error, with names from the file.
+    # The library reports unreadable parts on standard error, with names from the file.
     logging.getLogger("trimesh").addHandler(logging.NullHandler())
     options: dict[str, Any] = {"skip_materials": True} if suffix == ".obj" else {}
     try:
@@ -83,7 +83,7 @@ def _dae(data: bytes) -> bytes:
 
 #: Copies of nodes may hold copies: so many make at most 256 of one.
 _DAE_COPIES: Final = 16
-#: Suffixes of the files that are parsed, and what makes their bytes fit for the parser.
+#: Suffixes of the parsed files, and functions that prepare their bytes for the parser.
 PARSED: Final[dict[str, Callable[[bytes], bytes]]] = {
     ".obj": _obj,
     ".stl": _as_it_is,
@@ -95,5 +95,5 @@ PARSED: Final[dict[str, Callable[[bytes], bytes]]] = {
 
 
 def arrays_of(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices and triangles of what `parse_mesh` returned; no triangles where it has points alone."""
+    """Return the vertices and triangles of a result of `parse_mesh`; no triangles if it has only points."""
     return np.asarray(mesh.vertices), np.asarray(getattr(mesh, "faces", ()))

@@ -31,7 +31,7 @@ class ShapeKind(StrEnum):
 
     @property
     def lengths(self) -> int:
-        """How many entries of `size` count."""
+        """Number of entries of `size` that count."""
         counts = {ShapeKind.MESH: 0, ShapeKind.SPHERE: 1, ShapeKind.CAPSULE: 2, ShapeKind.CYLINDER: 2}
         return counts.get(self, 3)
 
@@ -40,7 +40,7 @@ class CollisionSource(StrEnum):
     """Name which geometry of a model is meant (docs/method.md section 2); results compare only for the same choice."""
 
     ENGINE = "engine"
-    """what MuJoCo collides: primitives, and the convex hull of every mesh"""
+    """MuJoCo's collision geometry: primitives, and the convex hull of every mesh"""
     RAW = "raw"
     """the collision geometry with the triangles of its meshes as they are"""
     VISUAL = "visual"

@@ -14,7 +14,7 @@ from clench.core.pose import FloatArray
 from .mesh import IntArray, TriangleMesh
 from .shapes import CollisionSource, Shape, ShapeKind
 
-#: How far triangles may stay inside a round shape, as a fraction of its size [-] ...
+#: Largest distance of triangles inside a round shape, as a fraction of its size [-] ...
 TESSELLATION_FRACTION: Final = 2e-3
 #: ... and in metres.
 TESSELLATION_DEVIATION: Final = 2e-5
@@ -52,11 +52,11 @@ def shape_mesh(shape: Shape, source: CollisionSource) -> TriangleMesh:
 def tessellate(shape: Shape, deviation: float) -> TriangleMesh:
     """Return a closed mesh inscribed in a shape, in the shape's own frame.
 
-    Vertices lie on the surface; facets are off by at most `deviation` [m], except that no shape gets more than
-    `MAX_SEGMENTS` facets around (deviation 2e-5 of its radius). A mesh is returned as it is.
+    Vertices lie on the surface; facets are off by at most `deviation` [m]. No shape gets more than `MAX_SEGMENTS`
+    facets around (deviation 2e-5 of its radius). A mesh is returned as it is.
 
     Raises:
-        ObjectError: a deviation that is not positive, or a shape of no size.
+        ObjectError: the deviation is not positive, or the shape has no size.
     """
     if not (math.isfinite(deviation) and deviation > 0):
         raise ObjectError(f"tessellation: expected a deviation above 0 m, got {deviation!r}.")

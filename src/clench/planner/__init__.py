@@ -1,1 +1,1 @@
-"""Where to put the hand: propose many wrist poses, close the hand at all, keep the best (docs/method.md section 9)."""
+"""Plan where to put the hand: propose wrist poses, close the hand at all, keep the best (docs/method.md section 9)."""

@@ -1,4 +1,4 @@
-"""Bring proposed hands up to the object, and leave out those that something stops (docs/method.md section 9)."""
+"""Bring proposed hands up to the object, and reject those that are stopped too early (docs/method.md section 9)."""
 
 from __future__ import annotations
 

@@ -18,14 +18,14 @@ from clench.core.files.json_files import read_json
 from clench.core.pose import FloatArray
 
 SCHEMA: Final = "clench.confidence/1"
-#: Grasps per level of the score, about; a level is as wide as it has to be.
+#: Approximate number of grasps per level of the score; a level is as wide as this number needs.
 LEVEL: Final = 40
 _SHIPPED: Final = Path(__file__).with_name("confidence.json")
 
 
 @dataclass(frozen=True, eq=False)
 class ConfidenceTable:
-    """How many grasps were tried and held, by levels of the score that do not overlap, low ones first.
+    """The number of tried and held grasps by levels of the score, which do not overlap; low levels first.
 
     Args:
         score: mean score of every level, ascending, shape (L,). tried, held: numbers of grasps, shape (L,).

@@ -36,7 +36,7 @@ class Finisher:
     """Complete grasps; see `PlannedGrasp`.
 
     Args:
-        hand, obj, asked: what grasps what, and how. closer: knows the commands.
+        hand, obj, asked: hand, object and options. closer: knows the commands.
         tell: called with every grasp that could not be completed.
     """
 

@@ -1,4 +1,4 @@
-"""What planning gives: grasps with everything that is needed to use them, and what became of all proposals."""
+"""The plan: grasps with all data for their use, and the fate of all proposals."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class PlannedGrasp(Displayed):
         solution: the certified answer with its pregrasp and squeeze; `solution.hand_pose` is where the palm goes.
         command: solves to the same answer. preshape: name of the preshape. kind: see `GraspKind`.
         epsilon: Ferrari–Canny ball at the lowest friction [N per N of normal force].
-        score: mean of epsilon at the lowest friction and at half of it; grasps are sorted by it, unless displaced.
+        score: mean of epsilon at the lowest friction and at half of it. Grasps are sorted by it, unless displaced.
         displaced: mean of the bound of this score over displacements of the object; None without `pose_sigma`.
-        confidence: measured share of grasps with such a score that held in simulation, 0 to 1 (docs/planning.md); None
-            for soft contacts, for which it was not measured.
+        confidence: measured share of grasps with such a score that held in simulation, 0 to 1 (docs/planning.md). None
+            for soft contacts, for which no measurement exists.
         squeeze: forces, torques and offsets that hold the object.
         trajectory: the proven path from the open hand to the touch; None when it was not asked for.
         number: tells the grasps of a search apart; earlier ones have lower numbers.
@@ -55,12 +55,12 @@ class PlannedGrasp(Displayed):
 
     @property
     def rank(self) -> tuple[float, int]:
-        """What plans are sorted by: the better score first, then the earlier proposal."""
+        """Sort key of plans: the better score first, then the earlier proposal."""
         return -(self.score if self.displaced is None else self.displaced), self.number
 
     @property
     def hand_pose(self) -> Pose:
-        """Where the palm goes, `T_world_palm`."""
+        """Target pose of the palm, `T_world_palm`."""
         return self.solution.hand_pose
 
     @property
@@ -77,7 +77,7 @@ class PlannedGrasp(Displayed):
         return f"PlannedGrasp({self.kind}, '{self.preshape}', palm at [{position}] m, epsilon {self.epsilon:.3g})"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form: the solution's document besides what the plan knows of it."""
+        """Return the JSON form: the solution's document, and the plan's data about it."""
         return {
             "preshape": self.preshape,
             "kind": self.kind.value,
@@ -131,7 +131,8 @@ class GraspPlan(Displayed):
         hand, object: their names. grasps: see `PlannedGrasp`. asked: the options.
         proposed: how many wrist poses were proposed. closed: at how many the hand was closed.
         force_closed: how many of these resist every wrench, by the bound of epsilon.
-        rejected: how many proposals fell for each reason, by its name. waiting: good ones that were not needed.
+        rejected: how many proposals fell for each reason, by its name. waiting: number of good proposals that were not
+            needed.
         late: the time budget ended the search. widest: how far apart pads of the hand come [m].
         times: seconds by stage.
     """
@@ -160,7 +161,7 @@ class GraspPlan(Displayed):
 
     @property
     def text(self) -> str:
-        """One or two sentences: what was found, and why not more."""
+        """One or two sentences: the result, and the reason if there are fewer grasps than asked for."""
         found = f"{len(self)} of {self.asked.count} grasps from {self.proposed} proposals"
         if len(self) >= self.asked.count:
             return f"Found {found}."
@@ -172,7 +173,7 @@ class GraspPlan(Displayed):
                 f"Found {found}. No two opposing places of the object are spanned by the hand, whose pads come up to "
                 f"{1e3 * self.widest:.0f} mm apart. Check the object's scale."
             )
-        # What the caller left out says nothing of the others.
+        # An option that the caller left out does not restrict the others.
         others = {k: n for k, n in counted.items() if k != Rejection.DIRECTION} or counted
         reason, number = max(others.items(), key=lambda item: item[1])
         return f"Found {found}. Most proposals fell for '{reason}' ({number}). {HELP[Rejection(reason)]}"

@@ -1,4 +1,4 @@
-"""What a planner is asked for, checked once."""
+"""The options of the planner, checked once."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Reachable = Callable[[FloatArray], ArrayLike]
 
 
 class PlanArguments(TypedDict, total=False):
-    """Name what may be asked for besides the number of grasps; `clench.plan_grasps` explains it."""
+    """Name the options besides the number of grasps; `clench.plan_grasps` explains them."""
 
     friction: float | tuple[float, float] | None
     mass: float | tuple[float, float]
@@ -89,7 +89,7 @@ class PlanOptions:
     path: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be planned for."""
+        """Refuse options that the planner cannot meet."""
         for key in ("friction", "mass", "pose_sigma"):
             object.__setattr__(self, key, _range(getattr(self, key), key))
         for key in ("kinds", "fingers"):
@@ -153,7 +153,7 @@ class PlanOptions:
 
     @property
     def sigma(self) -> tuple[float, float] | None:
-        """Standard deviations of the object's position [m] and of its rotation [rad]; None: it is where it is."""
+        """Standard deviations of the object's position [m] and of its rotation [rad]; None: the pose is exact."""
         if self.pose_sigma is None:
             return None
         if isinstance(self.pose_sigma, tuple):

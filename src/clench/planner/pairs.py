@@ -17,13 +17,13 @@ from .regions import Region
 #: Places on the surface that are drawn, and pairs that are kept.
 _PLACES = 700
 _PAIRS = 6000
-#: Normals lean from the line between two places by at most this part of the friction angle; the second holds where
-#: the first gives too few pairs [-].
+#: Largest angle between the normals and the line between two places, as a part of the friction angle; the next value
+#: applies if this one gives too few pairs [-].
 _LEAN = (0.75, 1.25, 2.0)
 _ENOUGH = 40
 #: Pairs are farther apart than this [m].
 _NEAREST = 1e-3
-#: How far around a place the object's extent is looked at [m].
+#: Radius around a place within which the object's extent is measured [m].
 _AROUND = 0.06
 
 
@@ -114,7 +114,7 @@ def draw_surface(
         ObjectError: no graspable surface.
     """
     tree, surface = packed.full_tree, GraspableSurface(obj, packed)
-    # One draw per equal share of the area: the places are spread more evenly than independent draws.
+    # One draw per equal share of the area spreads the places more evenly than independent draws.
     shares = (np.arange(count) + rng.random(count)) / count
     drawn = np.minimum(np.searchsorted(surface.shares, shares, side="right"), len(surface.shares) - 1)
     chosen = surface.triangles[drawn]

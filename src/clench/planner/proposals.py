@@ -17,17 +17,17 @@ _ROOM = 0.01
 #: Pairs that are looked at for every proposal, and how far a zone's aperture may miss [m].
 _LOOKS = 12
 _MISS = 0.012
-#: How much good opposition counts against a miss of the aperture [-].
+#: Weight of good opposition against an aperture error [-].
 _OPPOSED = 6.0
 #: Share of the proposals that vary a good one, once there are so many good ones [-].
 VARIED = 0.7
 _ENOUGH_GOOD = 3
 #: Standard deviations of a variation: turn [rad] and shift [m].
 _TURN, _SHIFT = 0.15, 0.005
-#: Rows of pads longer than this [m] are laid along what is long, as often as it is longer than wide times this [-],
-#: and askew by this [rad].
+#: Rows of pads longer than this [m] are laid along the object's long side. They are laid so as often as the object is
+#: longer than wide times this [-], and askew by this [rad].
 _ROW, _ALIGNED, _ASKEW = 0.01, 1.2, 0.25
-#: How far past its place a hand of a deep arm may go [m].
+#: Distance that a hand of a deep arm may go past its place [m].
 DEEP = 0.06
 #: Shares of the proposals go to arms by the power of their success [-].
 _GREED = 2.0
@@ -38,7 +38,7 @@ class Arm:
     """One way of proposing.
 
     Args:
-        shape: number of the preshape. fingers: names of those that close.
+        shape: number of the preshape. fingers: names of the closing fingers.
         deep: the hand goes on past its place until the palm is at the object.
     """
 
@@ -81,7 +81,7 @@ class Proposer:
     pairs: Pairs
 
     def __post_init__(self) -> None:
-        """Start with what the zones promise."""
+        """Start with the estimates from the zones."""
         promise = np.array([self._promise(arm) for arm in self.arms])
         self._tried, self._good = np.full(len(self.arms), 2.0), 2.0 * promise
         self._usable = promise > 0.0
@@ -103,10 +103,10 @@ class Proposer:
         )
 
     def learn(self, proposals: Proposals, score: FloatArray, keep: int = 64) -> None:
-        """Take in what came of proposals.
+        """Learn from the results of proposals.
 
         Args:
-            proposals: those that were closed. score: how good each is, 0 for no use, shape (N,).
+            proposals: the closed ones. score: how good each is, 0 for no use, shape (N,).
             keep: how many good ones are varied, the best ones.
         """
         np.add.at(self._tried, proposals.arm, 1.0)
@@ -155,7 +155,8 @@ class Proposer:
         return Proposals(arm.astype(np.int64), T, centers)
 
     def _roll(self, rng: np.random.Generator, pair: NDArray[np.int64], row: FloatArray) -> FloatArray:
-        """Return how far hands turn about the ways of pairs, so that rows of pads lie along what is long, (N,) [rad].
+        """Return the rolls of hands about the lines of pairs that lay rows of pads along the object's long side, (N,)
+        [rad].
 
         Args:
             rng: draws. pair: which pairs, (N,). row: of pads, in the object's frame, not turned yet [m], (N, 3).

@@ -70,7 +70,7 @@ class Region:
             points: all vertices in the object's frame [m], shape (V, 3). marked: which count, shape (V,).
 
         Raises:
-            CommandError: shapes that do not fit, or no vertex is marked.
+            CommandError: shapes do not fit, or no vertex is marked.
         """
         try:
             p, chosen = np.asarray(points, dtype=np.float64), np.asarray(marked)

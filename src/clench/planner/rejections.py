@@ -1,4 +1,4 @@
-"""Why a proposal comes to nothing, and what would help."""
+"""Name the reasons that reject a proposal, and the remedies."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Rejection(StrEnum):
     """no path from the open hand to the touch was proven free"""
 
 
-#: What would help, by the reason that rejected most proposals.
+#: Remedies, by the reason that rejected most proposals.
 HELP: Final = {
     Rejection.STOPPED: "The object may be too large for the hand, or may be reached from few sides only.",
     Rejection.OBSTACLE: "Obstacles leave few ways in; give an approach direction, or move the object.",

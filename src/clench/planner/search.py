@@ -1,4 +1,4 @@
-"""Search for grasps in rounds: propose, bring up, close, keep the best, finish what is returned."""
+"""Search for grasps in rounds: propose, bring up, close, keep the best, finish the returned ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from .trials import Closer, Trial
 #: Proposals of the first round, and of a round at most; every round has twice as many as the one before.
 FIRST_ROUND = 64
 LARGEST_ROUND = 256
-#: The search ends when so many grasps in a row have no squeeze or no path: the object is too heavy, say.
+#: The search ends when this many grasps in a row have no squeeze or no path: for example, the object is too heavy.
 FRUITLESS = 100
 #: A grasp is lost when displacements of the object leave less than this part of its score [-].
 LEFT = 0.2
@@ -121,7 +121,7 @@ class GraspSearch:
         self.rejected.tell = describe
 
     def plan(self) -> GraspPlan:
-        """Return what was found so far, the best grasps first."""
+        """Return the grasps found so far, best first."""
         return GraspPlan(
             hand=self.hand.name,
             object=self.obj.name,
@@ -167,7 +167,7 @@ class GraspSearch:
             self.times[key] += end - begin
 
     def _allowed(self, proposals: Proposals) -> Proposals:
-        """Leave out what comes from another direction than is asked for."""
+        """Reject proposals from other directions than the requested ones."""
         if self.asked.approach is None:
             return proposals
         way = np.asarray(self.asked.approach, dtype=np.float64)
@@ -184,7 +184,7 @@ class GraspSearch:
         return proposals.taken(reached)
 
     def _finish(self, due: int) -> Iterator[PlannedGrasp]:
-        """Yield the best of those that wait, completed, until so many were found in all."""
+        """Yield the best waiting grasps, completed, up to a total number."""
         while len(self.found) < due and self._waiting and self._fruitless < FRUITLESS:
             if self._is_late() and self.found:
                 return
@@ -204,7 +204,7 @@ class GraspSearch:
                 yield grasp
 
     def _displace(self, trial: Trial, sigma: tuple[float, float]) -> None:
-        """Score a trial by what is left of it when the object is displaced, and let it wait again."""
+        """Score a trial by its remaining quality when the object is displaced, and let it wait again."""
         self._displaced.add(trial.number)
         score = self._closer.displaced_score(trial, sigma)
         if score <= LEFT * trial.score:

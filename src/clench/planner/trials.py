@@ -1,4 +1,4 @@
-"""Close the hand at proposals, and tell what came of each of them (docs/method.md section 9)."""
+"""Close the hand at proposals, and classify the result of each (docs/method.md section 9)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FRICTION_SHARES = (0.5, 1.0)
 #: Displacements of the object for which a grasp is closed again.
 DISPLACEMENTS = 16
 _BLOCKED = STATUSES.index(SolutionStatus.BLOCKED)
-#: What may be a grasp: of a hand without a thumb, some fingers may do.
+#: Statuses that may be a grasp: for a hand without a thumb, some fingers suffice.
 _HOLDS = [STATUSES.index(SolutionStatus.GRASP), STATUSES.index(SolutionStatus.PARTIAL)]
 _LIMIT = FINGER_STATUSES.index(FingerStatus.LIMIT)
 
@@ -58,7 +58,7 @@ class Closer:
     """Close the hand at proposals; hand and object are planned once per preshape.
 
     Args:
-        hand, obj: what grasps what. asked: the options. arms, shapes: of the proposals. threads: how many are used.
+        hand, obj: hand and object. asked: the options. arms, shapes: of the proposals. threads: how many are used.
     """
 
     hand: Hand
@@ -70,7 +70,7 @@ class Closer:
     solvers: dict[int, BatchSolver] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Look up what every grasp needs."""
+        """Look up the data that every grasp needs."""
         mass = mass_properties(self.obj)
         self._center, self._length = mass.center, mass.length
         lowest = self.asked.lowest_friction
@@ -82,10 +82,10 @@ class Closer:
         self._solid = [*self.hand.solid_links]
 
     def command(self, arm: Arm) -> GraspCommand:
-        """Return what an arm asks for, at no pose in particular."""
+        """Return the command of an arm, without a particular pose."""
         names = tuple(f.name for f in self.hand.fingers)
         fingers = None if arm.fingers == names else arm.fingers
-        # One plane, as none is closed: the full width has the answer.
+        # One plane, because the full width has the answer and no plane is closed.
         angles = self.shapes[arm.shape].angles
         return GraspCommand(hand_pose=Pose.identity(), preshape=angles, fingers=fingers, planes=1)
 
@@ -118,7 +118,7 @@ class Closer:
     def displaced_score(self, trial: Trial, sigma: tuple[float, float]) -> float:
         """Return the mean score of a trial when the object is displaced at random, 0 where no grasp is left [N/N].
 
-        The hand stays where it is and closes until it touches. The same trial gets the same draws.
+        The hand keeps its pose and closes until it touches. The same trial gets the same draws.
 
         Args:
             trial: the trial. sigma: standard deviations of the object's position [m] and of its rotation [rad].
@@ -189,7 +189,7 @@ class Closer:
         return count
 
     def _counted(self, batch: GraspBatch) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return whose every contact is, and whether it counts: it was not opened again and is no obstacle's, (C,)."""
+        """Return the grasp of every contact, and whether it counts, (C,): not opened again and no obstacle's."""
         contacts = batch.contacts
         owner = np.repeat(np.arange(len(batch)), np.diff(contacts.first))
         return owner, ~contacts.passed & self._graspable[contacts.body]

@@ -27,11 +27,11 @@ _TABLES: Final = ("weights", "scales", "limits", "joints")
 
 @dataclass(frozen=True)
 class Calibration:
-    """Say what counts in the choice, and how much.
+    """The weights, scales and limits of the criteria in the choice.
 
     Args:
         name: of the preset or file. weights: of the criteria in the sum, at least 0.
-        scales: the value that counts as 1, where it is not the criterion's own, above 0.
+        scales: the value that counts as 1, above 0, if it differs from the criterion's own.
         limits: sets beyond come last: the least allowed where more is better, the most where less is.
         joints: weight of a joint in the range of motion, 1 where not named.
     """
@@ -46,7 +46,7 @@ class Calibration:
 
     @property
     def criteria(self) -> tuple[str, ...]:
-        """Names of the criteria that play a part: those with a weight above 0, and those with a limit."""
+        """Names of the criteria with a weight above 0 or with a limit."""
         weighted = [name for name, weight in self.weights.items() if weight > 0.0]
         return tuple(dict.fromkeys([*weighted, *self.limits]))
 
@@ -55,12 +55,12 @@ class Calibration:
         return self.scales.get(name) or find_criterion(name, self.name).scale
 
     def worth(self, name: str, value: float) -> float:
-        """Return what a value adds to the weighted sum, in which more is better [-]."""
+        """Return the contribution of a value to the weighted sum, in which more is better [-]."""
         sign = 1.0 if find_criterion(name, self.name).larger_is_better else -1.0
         return sign * self.weights.get(name, 0.0) * value / self.scale(name)
 
     def allows(self, name: str, value: float | None) -> bool:
-        """Say whether a value is inside the criterion's limit; one that is not known is not."""
+        """Say whether a value is inside the criterion's limit; an unknown value is not."""
         if name not in self.limits:
             return True
         return value is not None and bool(self.inside(name, np.array(value)))
@@ -114,10 +114,10 @@ def load_calibration(path: Path, name: str | None = None) -> Calibration:
     """Read a calibration file: tables [weights], [scales], [limits] of numbers by criterion, [joints] by joint.
 
     Args:
-        path: the file. name: what to call it; its path by default.
+        path: the file. name: name of the calibration; its path by default.
 
     Raises:
-        FileError: missing, not TOML, with other keys, or with neither a weight above 0 nor a limit.
+        FileError: the file is missing, is not TOML, has unknown keys, or has neither a weight above 0 nor a limit.
     """
     missing = f"no such calibration file; presets, by name alone: {', '.join(preset_names())}."
     data = read_toml(path, missing, "a calibration file in TOML")
@@ -145,7 +145,8 @@ def calibration_to_toml(calibration: Calibration, comments: Mapping[str, str] | 
     """Return the text of a calibration file, every criterion with its unit and direction as a comment.
 
     Args:
-        calibration: what to write. comments: a sentence before each table, by its name; "" is the head of the file.
+        calibration: the calibration to write. comments: a sentence before each table, by the table's name; "" is the
+            head of the file.
     """
     said = comments or {}
     blocks = [f"# {said['']}\n"] if said.get("") else []
@@ -166,7 +167,7 @@ def _remark(table: str, name: str) -> str:
 
 
 def _key(name: str) -> str:
-    """Return a name as a key of TOML, quoted where it has to be."""
+    """Return a name as a key of TOML, quoted if necessary."""
     return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else json.dumps(name)
 
 

@@ -26,7 +26,7 @@ from .criterion_registry import (
     score_sets,
 )
 
-#: What puts one set before another, whatever their scores, strongest first; as `tier` lists them.
+#: Tiers that rank one set before another regardless of the scores, strongest first; as `tier` lists them.
 TIERS = (
     "may be taken",
     "passes through nothing on any plane",
@@ -35,19 +35,19 @@ TIERS = (
     "has a value for every criterion",
 )
 
-#: Sets whose angles differ by less are the same for the choice [rad]; so are sums [-].
+#: Sets whose angles differ by less are the same for the choice [rad]; the same number applies to sums [-].
 SAME_ANGLE = 1e-9
 _SAME_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
 class FingerChoice:
-    """Hold how the sets of one finger compare.
+    """The comparison of the sets of one finger.
 
     Args:
-        tiers: per set, what it fulfils of `TIERS`. totals: per set, the weighted sum of its scores [-].
-        order: indices of the sets, best first. equals: of those that fulfil as much as the best, and whose joint
-            angles differ, best first: the scores decide among them. chosen: index.
+        tiers: per set, its values of `TIERS`. totals: per set, the weighted sum of its scores [-].
+        order: indices of the sets, best first. equals: sets with the best tier and different joint angles, best first:
+            the scores decide among them. chosen: index.
     """
 
     tiers: tuple[tuple[bool, ...], ...]
@@ -59,14 +59,14 @@ class FingerChoice:
 
 @dataclass(frozen=True, eq=False)
 class HandChoice:
-    """Hold the choice over all fingers.
+    """The choice over all fingers.
 
     Args:
-        fingers: one per finger. calibration: what counted. used, unused: names of its criteria that did, and of those
-            that said nothing about any set. hand_scores: values of the hand's criteria for the chosen sets.
+        fingers: one per finger. calibration: weights and limits. used, unused: names of its criteria with and without a
+            value for some set. hand_scores: values of the hand's criteria for the chosen sets.
         runner_up: the second best combination, as indices, with its total and hand scores; None when there is none.
-        total: weighted sum over the chosen sets [-]. tried: how many combinations were compared; 0 when no criterion
-            is about the whole hand, and every finger has its own best. proved: no other combination is better.
+        total: weighted sum over the chosen sets [-]. tried: number of compared combinations; 0 if no criterion is about
+            the whole hand and every finger has its own best. proved: no other combination is better.
     """
 
     fingers: tuple[FingerChoice, ...]
@@ -90,12 +90,12 @@ def choose(
 ) -> HandChoice:
     """Return the best set of every finger; the sets' scores are filled on the way.
 
-    A set that is known to be infeasible is never chosen before one that is not, and so on down `TIERS`. The weighted
-    scores decide among the rest; ties go to the full width, then to the first. Where no criterion is about the whole
-    hand, the best of every finger is the best of all; else see `best_combination`.
+    A set that is known to be infeasible never goes before one that is not, and so on down `TIERS`. The weighted scores
+    decide among the rest; ties go to the full width, then to the first. Without a criterion of the whole hand, the best
+    sets of the fingers are the best of all; else see `best_combination`.
 
     Args:
-        groups: sets of every finger. calibration: what counts. setting: what they are judged in.
+        groups: sets of every finger. calibration: weights and limits. setting: context of the judgement.
     """
     criteria = {name: find_criterion(name, calibration.name) for name in calibration.criteria}
     of_finger = [name for name, c in criteria.items() if is_of_finger(c)]
@@ -129,7 +129,7 @@ def choose(
 def _compare(
     group: Sequence[FingerCandidate], names: Sequence[str], calibration: Calibration, tip_only: bool
 ) -> FingerChoice:
-    """Rank the sets of one finger by what they fulfil, then by their weighted scores."""
+    """Rank the sets of one finger by their tiers, then by their weighted scores."""
     said = [name for name in names if any(name in c.scores for c in group)]
     tiers = tuple(_tier(c, said, calibration, tip_only) for c in group)
     worth = {name: calibration.worth(name, 1.0) for name in said}
@@ -145,9 +145,9 @@ def _compare(
 
 
 def _same_as_whole(group: Sequence[FingerCandidate]) -> list[int]:
-    """Return what every set is judged as: a plane's set with the angles of the full width is no other set.
+    """Return each set for the judgement: a plane's set with the angles of the full width is the same set.
 
-    Corners that touch on several planes at once would else let a plane, which promises less, go before it.
+    Otherwise, if corners touch on several planes simultaneously, a plane with a weaker guarantee could go first.
     """
     whole = {id(c.plan): i for i, c in enumerate(group) if c.plane is None}
     result = []
@@ -159,7 +159,7 @@ def _same_as_whole(group: Sequence[FingerCandidate]) -> list[int]:
 
 
 def _tier(c: FingerCandidate, said: Sequence[str], calibration: Calibration, tip_only: bool) -> tuple[bool, ...]:
-    """Say what a set fulfils of `TIERS`."""
+    """Return the tier of a set, see `TIERS`."""
     return (
         c.feasible is not False,
         c.clear,
@@ -201,7 +201,7 @@ class _HandJudge:
 
     @property
     def criteria(self) -> int:
-        """How many criteria of the whole hand may have a value."""
+        """Number of criteria of the whole hand that may have a value."""
         return len(self._criteria)
 
     def __call__(self, sets: tuple[int, ...]) -> Combination:
@@ -214,7 +214,7 @@ class _HandJudge:
         return Combination(sets, scores, allowed, total)
 
     def ceilings(self, places: tuple[int, ...]) -> Ceilings | None:
-        """Return what no combination exceeds; None where a criterion of the whole hand does not say."""
+        """Return upper bounds of all combinations; None if a criterion of the whole hand gives no bound."""
         for name in self._criteria:
             found = bound_hand(name, self._options, places, self._setting)
             if found is not None:

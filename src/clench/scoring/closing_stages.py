@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 
 #: Touches that are listed at most; flat faces on each other have many.
 _MOST_TOUCHES = 4096
-#: Joints that stop within so much motion stop at once [rad at speed 1].
+#: Joints that stop within this motion of each other stop simultaneously [rad at speed 1].
 _AT_ONCE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Describe where degrees of freedom of a finger stopped: one, or several at once.
+    """The event in which one or several degrees of freedom of a finger stopped.
 
     Args:
         finger: its finger. leaders: joints that moved on their own and stopped, indices in the hand.
-        stops: all that stopped, those that follow them, too.
+        stops: all joints that stopped, including followers.
         rates: of every joint of the hand that moved until then, per turn of the first leader [-], shape (J,); followers
             at their limits have 0.
-        posture: of the whole hand where they stopped [rad], shape (J,).
+        posture: of the whole hand at the stop [rad], shape (J,).
     """
 
     finger: Finger
@@ -54,7 +54,7 @@ class StageTouch:
 
     Args:
         stage: number. link: that moved. met: the link it touches, or the number of links for the object.
-        position: [m], normal: unit, from what is touched to the link, shape (3,) each. gap: [m].
+        position: [m], shape (3,). normal: unit, from the touched body to the link, shape (3,). gap: [m].
     """
 
     stage: int
@@ -98,7 +98,7 @@ def _follow(hand: Hand, q: FloatArray, rates: FloatArray) -> None:
 def stages_at_once(
     hand: Hand, fingers: Sequence[Finger], opened: FloatArray, final: FloatArray, speeds: Mapping[str, float]
 ) -> list[Stage]:
-    """Return the stages of fingers whose joints all moved at once, in the order in which they stopped.
+    """Return the stages of fingers whose joints moved simultaneously, in the order of their stops.
 
     Args:
         hand: the hand. fingers: that closed. opened, final: postures of the whole hand [rad], shape (J,).
@@ -162,12 +162,12 @@ def stage_touches(
     tie: float,
     deviation: float,
 ) -> list[StageTouch]:
-    """Return what touches at the end of every stage.
+    """Return the contacts at the end of every stage.
 
     Args:
-        bodies: the hand's links. packed: the object. T_palm_object: where it is, shape (4, 4).
+        bodies: the hand's links. packed: the object. T_palm_object: pose of the object, shape (4, 4).
         poses: `T_palm_link` at every stage, shape (S, L, 4, 4). moves: whether a link moved in a stage, shape (S, L).
-        tie: gap below which links touch [m]. deviation: of what is swept as polyhedra [m].
+        tie: gap below which links touch [m]. deviation: of shapes that are swept as polyhedra [m].
     """
     from clench.kernels.toi.touching_pairs import PAIR_FLOATS, PAIR_INTEGERS, touching_pairs
 

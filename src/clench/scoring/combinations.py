@@ -1,10 +1,10 @@
 """Search the combinations of one set per finger for the best (docs/method.md section 6).
 
 Criteria of the whole hand do not add up over the fingers, so the best of every finger need not be the best of all. The
-search goes best first: for every combination it knows a ceiling that its sum does not exceed, judges the one with the
-highest, and ends with a proof when no ceiling is above the best that was judged. Criteria may lower the ceilings on the
-way (`HandCriterion`). Where there are too many combinations, or a proof would take too long, one finger after another
-takes the set that is best with those of the others; then nothing is proved.
+search goes best first. Every combination has a ceiling that its sum does not exceed. The search judges the combination
+with the highest ceiling. It ends with a proof when no ceiling is above the best judged sum. Criteria may lower the
+ceilings on the way (`HandCriterion`). If there are too many combinations, or a proof would take too long, each finger
+in turn takes its best set given the sets of the others. Then nothing is proved.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from clench.core.pose import FloatArray
 
 #: More combinations than this get no ceilings: they would take more memory and time than they save.
 MOST_CEILINGS: Final = 2**20
-#: So many are judged on the way to a proof, and so many altogether where it is given up.
+#: Numbers of combinations that are judged at most: on the way to a proof, and in all if the proof is given up.
 MOST_JUDGED: Final = 256
 MOST_TRIED: Final = 384
 #: Starts of the ascent besides the best that is known; they are drawn from a fixed seed.
@@ -35,7 +35,7 @@ Places = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Combination:
-    """Hold one set per finger and how it was judged.
+    """One set per finger and its judgement.
 
     Args:
         sets: index of the set of every finger. scores: values of those criteria of the whole hand that have one.
@@ -49,12 +49,12 @@ class Combination:
 
     @property
     def rank(self) -> tuple[bool, int, float]:
-        """What is larger for the better combination: limits first, then that every criterion has a value."""
+        """Sort key, larger for the better combination: limits first, then whether every criterion has a value."""
         return self.allowed, len(self.scores), self.total
 
 
 class Ceilings(NamedTuple):
-    """Hold what no combination exceeds, one axis per finger.
+    """Upper bounds for all combinations, one axis per finger.
 
     Args:
         allowed: it may be inside the limits. total: its weighted sum is at most this [-].
@@ -69,7 +69,7 @@ class Judge(Protocol):
 
     @property
     def criteria(self) -> int:
-        """How many criteria of the whole hand may have a value."""
+        """Number of criteria of the whole hand that may have a value."""
         ...
 
     def __call__(self, sets: tuple[int, ...]) -> Combination:
@@ -83,7 +83,7 @@ class Judge(Protocol):
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Hold what a search found.
+    """The result of a search.
 
     Args:
         best: the best combination. second: the best of the others that were judged, None when there is no other.
@@ -99,7 +99,7 @@ class SearchResult:
 def best_combination(options: Sequence[Sequence[int]], judge: Judge) -> SearchResult:
     """Return the best combination, and whether it is known to be the best of all.
 
-    Of equal ones that were judged the first wins, in the order of the options.
+    Among equal combinations, the first in the order of the options wins.
 
     Args:
         options: sets of every finger, best first. judge: gives the value of a combination, and ceilings.
@@ -126,7 +126,7 @@ def best_combination(options: Sequence[Sequence[int]], judge: Judge) -> SearchRe
 
 
 def _first(tried: Mapping[Places, Combination]) -> list[Places]:
-    """Return what was judged, best first."""
+    """Return the judged combinations, best first."""
     return sorted(tried, key=lambda places: (*(-float(r) for r in tried[places].rank), places))
 
 

@@ -1,4 +1,4 @@
-"""What a criterion is: a number for a set, with a unit, a direction and a source (docs/method.md section 6)."""
+"""Define a criterion: a number for a set, with a unit, a direction and a source (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ScoringContext:
-    """Hold what sets are judged in; J joints.
+    """The context in which criteria score sets; J joints.
 
     Args:
         hand: the hand. start: posture it closes from, shape (J,) [rad].
-        packed, T_palm_object: the object and where it is, shape (4, 4). source: geometry of the hand.
+        packed, T_palm_object: the object and its pose, shape (4, 4). source: geometry of the hand.
         steps: postures of the next steps of the work, NaN for joints that a step leaves alone, (J,) each [rad].
         joint_weights: of the joints in the range of motion, shape (J,); None is 1 for all.
         obj: the object, its friction and mass; None where only its surface counts.
         gravity: its direction in the palm frame, unit, shape (3,).
-        task: what acts on the object in its task: force [N] and torque about the centre of mass [Nm] in the palm frame,
+        task: wrenches on the object in its task: force [N] and torque about the centre of mass [Nm] in the palm frame,
             shape (N, 6).
-        in_stages: fingers close proximal first, once, so that what stopped a joint can be found again.
+        in_stages: fingers close proximal first, in one round, so that the contact that stopped a joint can be
+            recomputed.
         tip_only: only the first touch of a fingertip counts.
-        kept: what a criterion wants to keep from one set to the next; emptied with every solve.
+        kept: a criterion's cache between sets; emptied with every solve.
     """
 
     hand: Hand
@@ -59,7 +60,7 @@ class Criterion(Protocol):
     """Judge the set of one finger; write a class with these members and `register_criterion` it to add your own.
 
     Attributes:
-        name: as weights name it. unit: of the value. source: where it comes from.
+        name: as weights name it. unit: of the value. source: publication or section of the method.
         scale: the value that counts as 1 in the weighted sum. larger_is_better: the direction.
     """
 
@@ -78,12 +79,11 @@ class Criterion(Protocol):
 class HandCriterion(Protocol):
     """Judge the sets of all fingers together; otherwise like `Criterion`.
 
-    What else it may have makes the search for the best combination quicker, and lets it end with a proof:
+    Optional members speed up the search for the best combination and let it end with a proof:
 
-    - `prepare(candidates, setting)` is given all sets before any combination is judged;
-    - `ideal`: a value that no combination beats;
-    - `bound(groups, places, setting)` returns values that combinations do not beat, one axis per finger, near the
-      value of the combination that takes set `places[k]` of `groups[k]`; None for nothing to say.
+    - `prepare(candidates, setting)` is given all sets before any combination is judged; - `ideal`: a value that no
+    combination beats; - `bound(groups, places, setting)` returns bounds, one axis per finger, near the value of the
+    combination that takes set `places[k]` of `groups[k]`; None: no bound.
     """
 
     name: ClassVar[str]

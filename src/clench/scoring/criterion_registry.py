@@ -1,4 +1,4 @@
-"""The criteria that exist: ours, those that users register, and those of installed packages."""
+"""The registry of criteria: built-in ones, ones that users register, and ones of installed packages."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .hand_criteria import (
 
 #: Installed packages name their criteria under this group of entry points: `name = "module:Class"`.
 ENTRY_POINTS: Final = "clench.criteria"
-#: Scored for every set, whatever the weights: they cost next to nothing, and readers of a solution expect them.
+#: Criteria that every set gets, whatever the weights: they cost next to nothing, and readers of a solution expect them.
 ALWAYS: Final = ("range_of_motion", "touching_links", "limit_distance")
 
 _KINDS: Final = {"name": str, "unit": str, "source": str, "scale": Real, "larger_is_better": bool}
@@ -90,7 +90,7 @@ def register_criterion(criterion: Criterion | HandCriterion) -> None:
 
 
 def criterion_names() -> tuple[str, ...]:
-    """Return the names of all criteria, those of installed packages included."""
+    """Return the names of all criteria, including those of installed packages."""
     _load_installed()
     return tuple(_registry)
 
@@ -99,7 +99,7 @@ def find_criterion(name: str, source: str) -> Criterion | HandCriterion:
     """Return a criterion by name; installed packages are looked at only for names that are not known yet.
 
     Raises:
-        UnknownNameError: there is none; `source` says where it was named.
+        UnknownNameError: no such criterion; `source` says which text named it.
     """
     if name not in _registry:
         _load_installed()
@@ -113,7 +113,7 @@ def _load_installed() -> None:
     """Register the criteria of installed packages.
 
     Raises:
-        CommandError: one that cannot be loaded.
+        CommandError: a criterion cannot be loaded.
     """
     from importlib.metadata import entry_points
 
@@ -128,7 +128,7 @@ def _load_installed() -> None:
 
 
 def is_built_in(names: Iterable[str]) -> bool:
-    """Say whether criteria, and those that are always scored, are ours, and none of them one that replaced it."""
+    """Say whether the given and the always-scored criteria are built in, and none is a replacement."""
     return all(_registry[name] is _BUILT_IN.get(name) for name in (*ALWAYS, *names))
 
 
@@ -143,7 +143,7 @@ def is_of_finger(criterion: Criterion | HandCriterion) -> TypeGuard[Criterion]:
 
 
 def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: ScoringContext) -> None:
-    """Fill the scores of sets: those always given, and those named; a criterion that says nothing gives none.
+    """Fill the scores of sets for the always-scored and the named criteria; a criterion may give no score.
 
     Raises:
         CommandError: a criterion gave a value that is not a finite number.
@@ -158,7 +158,7 @@ def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], sett
 
 
 def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: ScoringContext) -> None:
-    """Give all sets to those of the named criteria that want them before they judge combinations."""
+    """Give all sets to the named criteria that prepare for judging combinations."""
     for name in names:
         prepare = getattr(_registry[name], "prepare", None)
         if prepare is not None:
@@ -174,14 +174,14 @@ def ideal_value(name: str) -> float | None:
 def bound_hand(
     name: str, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], setting: ScoringContext
 ) -> FloatArray | None:
-    """Return values that no combination beats in a criterion, where it says any; see `HandCriterion`."""
+    """Return a criterion's bounds of all combinations, if it gives any; see `HandCriterion`."""
     bound = getattr(_registry[name], "bound", None)
     found = None if bound is None else bound(groups, places, setting)
     return None if found is None else np.asarray(found, dtype=np.float64)
 
 
 def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting: ScoringContext) -> dict[str, float]:
-    """Return the values that those of the named criteria which are about the whole hand give one set per finger.
+    """Return the values of the named whole-hand criteria for one set per finger.
 
     Raises:
         CommandError: a criterion gave a value that is not a finite number.
@@ -196,7 +196,7 @@ def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting:
 
 
 def checked_value(criterion: Criterion | HandCriterion, value: float) -> float:
-    """Return what a criterion gave as a plain number.
+    """Return a criterion's value as a plain number.
 
     Raises:
         CommandError: it is not a finite number, or too large to be summed.

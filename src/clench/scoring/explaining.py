@@ -19,10 +19,10 @@ Groups = Sequence[Sequence[FingerCandidate]]
 
 
 def explain_choice(choice: HandChoice, groups: Groups) -> dict[str, Any]:
-    """Return the choice as plain values: what counted, totals, runners-up, Pareto fronts, and sentences.
+    """Return the choice as plain values: criteria, totals, runners-up, Pareto fronts, and sentences.
 
     Args:
-        choice: what `choose` gave. groups: the sets of every finger, as it was given them.
+        choice: result of `choose`. groups: the sets of every finger, as given to `choose`.
     """
     calibration = choice.calibration
     names = [group[0].plan.finger.name for group in groups]
@@ -65,7 +65,7 @@ def pareto_front(values: FloatArray) -> list[int]:
 
 
 def set_name(c: FingerCandidate, group: Sequence[FingerCandidate]) -> str:
-    """Return what people call a set among those of its finger."""
+    """Return the display name of a set among the sets of its finger."""
     name = "the full width" if c.plane is None else f"plane {c.plane + 1}"
     return f"{name} of posture {c.posture}" if any(other.posture for other in group) else name
 
@@ -95,7 +95,7 @@ def _finger(finger: FingerChoice, group: Sequence[FingerCandidate], choice: Hand
 
 
 def _runner_up(finger: FingerChoice, group: Sequence[FingerCandidate]) -> int | None:
-    """Return the best set besides the chosen one, of those that fulfil as much, else of those whose angles differ."""
+    """Return the best set besides the chosen one: of the same tier, else with different angles."""
     q = group[finger.chosen].q
     for i in (*finger.equals, *finger.order):
         if i != finger.chosen and np.abs(group[i].q - q).max(initial=0.0) > SAME_ANGLE:
@@ -104,7 +104,7 @@ def _runner_up(finger: FingerChoice, group: Sequence[FingerCandidate]) -> int | 
 
 
 def _finger_front(finger: FingerChoice, group: Sequence[FingerCandidate], choice: HandChoice) -> list[int]:
-    """Return the sets that no other beats in every criterion, among those that the scores decide among."""
+    """Return the Pareto-optimal sets among those that the scores decide between."""
     equals = sorted(finger.equals)
     names = [name for name in choice.used if name in group[equals[0]].scores]
     if not names:
@@ -157,7 +157,7 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
 
 
 def _doubt(choice: HandChoice) -> str:
-    """Return what has to be said where a better combination may exist."""
+    """Return a sentence for a choice that may miss a better combination."""
     if choice.proved:
         return ""
     every = math.prod(len(finger.equals) for finger in choice.fingers)

@@ -55,7 +55,7 @@ class TouchingLinks:
 
 
 class LimitDistance:
-    """Measure how far the closing joints stay from their limits, as a fraction of their range, the nearest one."""
+    """Measure the distance of the nearest closing joint from its limits, as a fraction of its range."""
 
     name: ClassVar[str] = "limit_distance"
     unit: ClassVar[str] = "fraction of the range"

@@ -1,7 +1,7 @@
 """Fit weights of criteria to examples: pairs "this one rather than that one", and outcomes held or dropped.
 
-Pairs follow the model of Bradley and Terry (1952): the better one wins with probability 1 / (1 + exp(-w·d)), d being
-the difference of what the criteria give, signed so that more is better and divided by their scales. An outcome is held
+Pairs follow the model of Bradley and Terry (1952). The better one wins with probability 1 / (1 + exp(-w·d)). Here d is
+the difference of the criteria's values, signed so that more is better and divided by their scales. An outcome is held
 with probability 1 / (1 + exp(-(w·x + b))). Weights are at least 0: directions are known.
 """
 
@@ -26,11 +26,11 @@ _SEED: Final = 0
 
 @dataclass(frozen=True, eq=False)
 class Examples:
-    """Hold examples as numbers, one column per criterion, signed and scaled.
+    """Examples as numbers, one column per criterion, signed and scaled.
 
     Args:
         names: of the criteria, M. better, worse: the two sides of every pair, shape (P, M) each.
-        outcomes: what was executed, shape (K, M). held: whether it was held, shape (K,).
+        outcomes: scores of executed solves, shape (K, M). held: whether each was held, shape (K,).
     """
 
     names: tuple[str, ...]
@@ -52,7 +52,7 @@ class Examples:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Hold fitted weights and how well they tell.
+    """The fitted weights and the quality of the fit.
 
     Args:
         names: of the criteria. weights: at least 0, the largest is 1, shape (M,).
@@ -73,11 +73,11 @@ def fit_weights(examples: Examples, penalty: float = PENALTY, *, source: str = "
     """Return the weights that make the examples likeliest, and their accuracy on examples that were left out.
 
     Args:
-        examples: at least four. penalty: see `PENALTY`. source: where they come from, for errors.
+        examples: at least four. penalty: see `PENALTY`. source: origin of the examples, for errors.
 
     Raises:
-        CommandError: too few examples, outcomes that are all the same, no criterion that all have, or none that tells
-            better from worse in its own direction.
+        CommandError: too few examples, equal outcomes only, no criterion that all examples have, or no criterion that
+            separates better from worse in its own direction.
     """
     if examples.count < FEWEST:
         raise CommandError(f"{source}: expected at least {FEWEST} pairs and outcomes, got {examples.count}.")

@@ -1,7 +1,7 @@
-"""The criteria of all fingers together: what forces their contacts resist and need (docs/method.md section 6).
+"""The criteria of the whole hand: loads that the contacts resist, and the effort they need (docs/method.md section 6).
 
-Contacts are those of the chosen sets that still touch, as points with friction. Forces are per newton of load, so no
-mass has to be known, and torque limits play no part; those of a task are in newtons, and inside the limits.
+Contacts are those contacts of the chosen sets that still touch, as points with friction. Forces are per newton of load:
+they need no mass and ignore torque limits. Forces of a task are in newtons and respect the limits.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from clench.models.objects.mass import mass_properties
 
 from .criteria import ScoringContext
 
-#: Where the directions are kept in which judged sets were weakest.
+#: Key of the directions in which judged sets were weakest.
 _WEAKEST: Final = "weakest"
 #: Mass whose weight is 1 N [kg].
 _NEWTON: Final = 1.0 / GRAVITY
@@ -50,7 +50,7 @@ class Steadiness:
         return ball.radius
 
     def prepare(self, candidates: Sequence[FingerCandidate], setting: ScoringContext) -> None:
-        """Find the wrenches of every set, all at once, which takes a tenth of the time of one by one."""
+        """Compute the wrenches of all sets in one call, which takes a tenth of the time of single calls."""
         if setting.obj is not None:
             _keep_wrenches(candidates, setting)
 
@@ -84,7 +84,7 @@ class ActuationForce:
 
 
 class ActuationForceAnyWay:
-    """Smallest worst joint torque that holds the object whichever way gravity points, per newton of its weight."""
+    """Smallest worst joint torque that holds the object for every direction of gravity, per newton of its weight."""
 
     name: ClassVar[str] = "actuation_force_any_way"
     unit: ClassVar[str] = "Nm/N"
@@ -124,7 +124,7 @@ class ActuationForceTask:
     larger_is_better: ClassVar[bool] = False
 
     def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
-        """Return the torque [Nm]; None without task wrenches, or where one cannot be held inside all limits."""
+        """Return the torque [Nm]; None without task wrenches, or if a wrench cannot be held inside all limits."""
         held = _held(chosen, setting) if len(setting.task) else None
         return None if held is None else _worst(held, [task_wrench(w[:3], w[3:], held.length)[0] for w in setting.task])
 
@@ -183,7 +183,7 @@ def _wrenches(candidate: FingerCandidate, setting: ScoringContext) -> FloatArray
 
 
 def _keep_wrenches(candidates: Sequence[FingerCandidate], setting: ScoringContext) -> None:
-    """Find the wrenches of several sets at once; sets are kept with them, so that their identities stay their own."""
+    """Compute the wrenches of several sets in one call; sets are kept with them, so that identities stay unique."""
     for c in candidates:
         setting.kept["wrenches", id(c)] = (c, np.empty((0, 6)))
     holding = [c for c in candidates if c.holding]

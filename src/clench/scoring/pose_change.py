@@ -1,4 +1,4 @@
-"""How the joint angles of a closed hand change with the object's pose, stage by stage (docs/method.md section 5)."""
+"""Compute how a closed hand's joint angles change with the object's pose, by stage (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class PoseChange:
             self.touches.setdefault(touch.stage, []).append(touch)
 
     def add(self, number: int, stage: Stage, opened: float) -> None:
-        """Find what stopped a stage, and fill in its joints."""
+        """Find the contact or limit that stopped a stage, and fill in its joints."""
         joint = self.hand.joints[stage.leader]
         if at_limit(self.hand, stage.leader, stage.posture):
             self.stopped_by[joint.name] = "limit"
@@ -85,7 +85,7 @@ class PoseChange:
                 self.reasons[self.hand.joints[j].name] = f"{joint.name}: {reason}."
 
     def _row(self, number: int, stage: Stage, moved: bool) -> tuple[FloatArray, NDArray[np.bool_], str]:
-        """Return the change of a stage's leader, shape (6,), where it is known, and why not elsewhere."""
+        """Return the change of a stage's leader, shape (6,), if it is known, and otherwise the reason."""
         joint = self.hand.joints[stage.leader]
         at = self.poses[number, self.mover]
         axes = np.einsum("jab,jb->ja", at[:, :3, :3], self.axes)
@@ -109,7 +109,7 @@ class PoseChange:
                 self.stopped_by[joint.name] = self._met(touch)
             shift = self._shift(touch)
             rows.append((shift - gaps @ self.change) / rate)
-            # Where the joints before it keep a touch as it is, a joint that it holds from the start stays, too.
+            # If the earlier joints preserve a contact, a joint that the contact holds from the start stays, too.
             held |= np.abs(rows[-1]) > _SAME * np.abs(shift / rate).max()
             unknown |= (~self.known & (np.abs(gaps) > _SAME * speed)[:, None]).any(axis=0)
         if not rows:
@@ -123,7 +123,7 @@ class PoseChange:
         return rows[0], ~(spread | unknown), text
 
     def _moves(self, touch: StageTouch) -> FloatArray:
-        """Return 1 for joints that move the link, less 1 for those that move what it touches, shape (J,)."""
+        """Return, shape (J,): 1 for joints that move the link, minus 1 for joints that move the touched body."""
         moves: FloatArray = self.carried[touch.link] - self.carried[touch.met]
         return moves
 

@@ -55,10 +55,10 @@ class Candidates:
 def candidates_of(problem: Problem, calibration: Calibration) -> Candidates:
     """Return which sets a solve closes.
 
-    The full width goes before every plane: it alone passes through nothing, or a plane has its angles. So where each
-    finger has one full width, the planes are not closed, and there is nothing to choose. Among planes alone the kernels
-    choose by sums of the criteria that are always scored. Criteria that others wrote are asked about every set at once,
-    so that what they raise is raised by the solve. Sets that are all to be measured are closed at once, too.
+    The full width goes before every plane: it alone passes through nothing, or a plane has its angles. If every finger
+    has one full width, the planes are not closed and there is nothing to choose. Among planes alone the kernels choose
+    by sums of the criteria that are always scored. Custom criteria score every set before the choice, so the solve
+    raises what they raise. Sets that all need a measurement are closed in one batch, too.
     """
     plan, command = plan_hand(problem), problem.command
     tip_only = command.order == ClosingOrder.FINGERTIP
@@ -79,7 +79,7 @@ def _sums_alone(calibration: Calibration) -> bool:
 
 
 def _terms(calibration: Calibration) -> Terms:
-    """Return the criteria that are always scored of a calibration: which, and what one unit adds to the sum."""
+    """Return the always-scored criteria of a calibration: their codes, and what one unit adds to the sum."""
     terms = [name for name in calibration.criteria if name in ALWAYS]
     return tuple((ALWAYS.index(name), calibration.worth(name, 1.0)) for name in terms)
 
@@ -138,7 +138,7 @@ class Alternatives:
     """The alternative sets of every finger, and the choice among them. Both are computed when first read.
 
     Args:
-        problem, calibration, setting: what the sets are chosen by. close: returns the sets.
+        problem, calibration, setting: the basis of the choice. close: returns the sets.
     """
 
     problem: Problem
@@ -147,7 +147,7 @@ class Alternatives:
     close: Callable[[], Groups]
 
     def __post_init__(self) -> None:
-        # Threads that read at once get the same: the criteria keep what they found in the setting.
+        # Concurrent readers get the same choice, because the criteria keep their results in the setting.
         self._scored = once(self._score)
 
     def _score(self) -> tuple[Groups, HandChoice]:
@@ -164,7 +164,7 @@ class Alternatives:
         return self._scored()[0][k]
 
     def chosen_items(self) -> tuple[list[int], bool]:
-        """Return the items that are chosen, and whether links lie inside each other where they begin to close."""
+        """Return the chosen items, and whether links already overlap at the start of their closing."""
         best = [self.of_finger(k)[i] for k, i in enumerate(self.choice.chosen)]
         problem = self.problem
         opened = problem.start.copy()

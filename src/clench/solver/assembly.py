@@ -46,7 +46,7 @@ _KINDS = (
 )
 _Places = dict[int, tuple[FloatArray, FloatArray]]
 #: Contacts of thumb and finger oppose each other when their normals do: the cosine is below this [-]. Normals of faces
-#: at right angles do not, whichever way their product is rounded.
+#: at right angles do not oppose each other, however their product is rounded.
 _OPPOSED = -1e-9
 
 
@@ -57,8 +57,8 @@ class Answer:
     Args:
         sets: returns the candidates of a finger that closes, by number, as closed without the other fingers.
         chosen: index of the chosen one of each. best: the chosen ones. final: posture of the hand, shape (J,) [rad].
-        at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the
-            end; None when not measured. certificate: what is promised. choice: why these sets, see `explain_choice`.
+        at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the end; None when
+            not measured. certificate: the guarantee. choice: why these sets, see `explain_choice`.
     """
 
     sets: Callable[[int], Sequence[FingerCandidate]]
@@ -142,7 +142,7 @@ def _opened(answer: Answer, problem: Problem) -> FloatArray:
 def _placed(sets: Sequence[FingerCandidate], T_world_palm: Pose) -> _Places:
     """Return position and normal of every touch of some sets in the world, by the touch's identity."""
     touches = [t for c in sets for t in c.touches]
-    # One row alone would be rounded in another way than many.
+    # A single row would be rounded differently from many rows.
     rows = touches * 2 if len(touches) == 1 else touches
     positions = T_world_palm.apply(np.array([t.position for t in rows]).reshape(-1, 3))
     normals = np.array([t.normal for t in rows]).reshape(-1, 3) @ T_world_palm.rotation.T

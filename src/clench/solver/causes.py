@@ -39,7 +39,7 @@ class CauseCode(StrEnum):
     LIMIT = "limit"
     """the joints are at their limits before the finger gets to the object"""
     COUPLING = "coupling"
-    """a joint could turn further, but follows one that is at its limit"""
+    """the joint could turn further, but it follows a joint at its limit"""
     SELF_COLLISION = "self_collision"
     """a link meets the palm, a fixed link, or another link of the same finger"""
     SHADOWED = "shadowed"
@@ -54,7 +54,7 @@ def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> 
     """Return why a finger's chosen set does not touch the object, as plain values.
 
     Args:
-        c: the set. status: how it ended. problem: what was solved.
+        c: the set. status: how it ended. problem: the solved problem.
     """
     if status is FingerStatus.BLOCKED:
         return _blocked(c, problem)
@@ -79,7 +79,7 @@ def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> 
 
 
 def what_is_there(problem: Problem) -> str:
-    """Return what a link overlaps where it is not known which body."""
+    """Describe the overlapped thing when its body is unknown."""
     return problem.obj.name if len(problem.packed.body_names) == 1 else f"{problem.obj.name} or an obstacle"
 
 
@@ -144,7 +144,7 @@ def _stopped(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
 
 
 def _missed(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
-    """Name the link that touched before the tip did: the object, or what else is in the way."""
+    """Name the obstruction that the link met before the tip: the object, or another body in the way."""
     if not t.graspable:
         return _stopped(c, t, problem)
     hand, tip = problem.hand, problem.hand.links[c.plan.finger.tip_link].name
@@ -177,7 +177,7 @@ def _at_limit(c: FingerCandidate, link: int, gap: float, problem: Problem) -> di
     left = _range_left(hand, last, float(c.q[last]))
     limit = {"joint": hand.joints[leader].name, "angle": float(c.q[leader])}
     at = f"{limit['joint']} is at its limit ({limit['angle']:.3f} rad)"
-    # No point of the finger moves farther than this when the follower takes what is left of its range.
+    # No point of the finger moves farther than this when the follower uses the rest of its range.
     if leader != last and left > _AT_LIMIT and left * c.plan.length >= gap:
         follower = hand.joints[last].name
         text = f"{away}: {follower} could turn {left:.3f} rad further, but follows {limit['joint']}, and {at}."
@@ -211,5 +211,5 @@ def _out_of_reach(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
 
 
 def _target(problem: Problem) -> tuple[BodyArrays, FloatArray]:
-    """Return what is to be grasped, without obstacles, and where it is for the hand, shape (4, 4)."""
+    """Return the grasp target without obstacles, and its pose in the palm frame, shape (4, 4)."""
     return graspable_body(problem.obj, problem.packed), problem.T_palm_object

@@ -1,4 +1,4 @@
-"""Say what is promised about a solution, and why, or why nothing is (docs/method.md section 5)."""
+"""Judge the certificate of a solution: the guarantee, or the reason why it fails (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 
 class CertificateCode(StrEnum):
-    """Name what is promised, or why nothing is."""
+    """Name the guarantee, or the reason why there is none."""
 
     CERTIFIED = "certified"
-    """no link overlaps what it must not, at the grasp or on the way"""
+    """no link overlaps anything forbidden, at the grasp or on the way"""
     BLOCKED_AT_START = "blocked_at_start"
     """a link overlaps the object or an obstacle before anything moves"""
     ONE_PLANE = "one_plane"
@@ -44,9 +44,8 @@ class Certificate:
 
     Args:
         holds: whether it is promised. text: a sentence.
-        deviation: how far links or object may be from where they are swept [m]: round shapes that are swept as
-            polyhedra.
-        code: see `CertificateCode`. links: names of those that overlap. finger: the one it is about, or None.
+        deviation: largest distance of links or object from their swept shapes [m], for round shapes swept as polyhedra.
+        code: see `CertificateCode`. links: names of those that overlap. finger: the finger in question, or None.
     """
 
     holds: bool
@@ -73,11 +72,11 @@ def judge(
     exact: ExactArrays,
     promise: Certificate | None = None,
 ) -> tuple[Sequence[LinkDepth], Sequence[LinkDepth] | None, Certificate]:
-    """Measure what overlaps at the start and at the end, over the whole width, and say what is promised.
+    """Measure the overlaps at the start and at the end over the whole width, and state the guarantee.
 
     Args:
         problem: the three inputs. best: one set per finger. final: posture at the end, shape (J,) [rad].
-        exact: the hand as it was swept. promise: what is promised, where that is known.
+        exact: the hand as it was swept. promise: the guarantee, if known.
 
     Returns:
         depths of the links that no finger moves, before closing; of all links, at the end, or None where that is not
@@ -86,7 +85,7 @@ def judge(
     hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
     at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
     certificate = promise or certify(problem, best, at_start, final, exact)
-    # Where nothing can overlap there is nothing to measure but what rests.
+    # If nothing can overlap, only the resting bodies need a measurement.
     at_end = at_start if certificate.holds else None
     if at_end is None and problem.command.measure:
         at_end = hand_depths(hand, final, packed, T, problem.source)
@@ -146,7 +145,7 @@ def promised(problem: Problem) -> Certificate:
 def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: ExactArrays) -> Certificate | None:
     """Refuse links that overlap something at the end, or lie in the object or in each other at the start.
 
-    Surfaces that never cross on the way keep what is inside inside: it is enough that nothing is at the start.
+    If surfaces never cross on the way, a body stays inside or outside: a check at the start is enough.
     """
     hand, T = problem.hand, problem.T_palm_object
     links = [link for finger in hand.fingers for link in finger.links]
@@ -172,7 +171,7 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
 
 
 def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[str]:
-    """Return the names of two links that overlap at a posture, or of one that overlaps the object; or nothing."""
+    """Return the names of two links that overlap at a posture, or of a link that overlaps the object, or nothing."""
     from clench.kernels.toi.full_width import find_link_overlap
 
     hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])

@@ -1,4 +1,4 @@
-"""A command, checked against a hand, and what follows from it wherever hand and object are: made once per content."""
+"""Check a command against a hand, once per content, and keep the results that do not depend on the poses."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class CheckedCommand(NamedTuple):
     """A command that was checked against its hand.
 
     Args:
-        command: a copy, which later changes of the caller's lists and mappings do not reach. Its poses are those of
-            the first command that was checked with these values. Its preshape is given by angles.
+        command: a copy, which later changes of the caller's lists and mappings do not reach. Its poses are those of the
+            first checked command with these values. Its preshape is given by angles.
         start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
     """
 

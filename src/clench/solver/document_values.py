@@ -42,14 +42,14 @@ def check_said(value: dict[str, Any] | None, keys: tuple[str, ...], source: str,
 
 
 def read_pose(data: Any, source: str, key: str) -> Pose:
-    """Return a pose with the quaternion as it was written, to the last bit, if it is a unit quaternion."""
+    """Return a pose with the quaternion exactly as written, to the last bit, if it is a unit quaternion."""
     try:
         pose = Pose.from_dict(data, key)
     except ClenchError as error:
         raise FileError(source, str(error)) from None
     written = np.array(data.get("wxyz", pose.wxyz), dtype=np.float64)
     if np.allclose(written, pose.wxyz, rtol=0.0, atol=4e-16):
-        # Normalising a unit quaternion again may change its last bit: keep what was written.
+        # Normalising a unit quaternion again may change its last bit: keep the written one.
         exact = np.concatenate([written, pose.position])
         exact.flags.writeable = False
         object.__setattr__(pose, "wxyz_xyz", exact)

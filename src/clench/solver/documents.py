@@ -246,7 +246,7 @@ def load_solution(path: str | Path) -> GraspSolution:
     """Read a file written by `save_solution`.
 
     Raises:
-        FileError: missing, not JSON, or not a solution.
+        FileError: the file is missing, is not JSON, or is not a solution.
     """
     return solution_from_dict(read_json(path), str(path))
 

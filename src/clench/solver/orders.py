@@ -1,7 +1,7 @@
 """Closing orders as alternatives: every order is solved by itself, and the best of the solutions is kept.
 
-An order is a matter of the whole hand: in `together` and `fingertip` all fingers close at once, and hold each other, so
-orders are not mixed over the fingers.
+An order applies to the whole hand. In `together` and `fingertip` all fingers close simultaneously and stop each other,
+so the fingers do not mix orders.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from clench.solver.analysis.examples import solve_scores
 
 from .solution import GraspSolution, SolutionStatus
 
-#: What puts one order before another, whatever the scores, strongest first; as `_Solved.rank` lists them.
+#: Tiers that rank one order before another regardless of the scores, strongest first; as `_Solved.rank` lists them.
 _TIERS: Final = (
     "is a valid {status}",
     "ends as {status}",
@@ -38,7 +38,8 @@ class _Solved:
     """The solution of one closing order, and its scores.
 
     Args:
-        order, solution: what was solved. scores: by criterion. worth: what each adds to the weighted sum [-].
+        order, solution: the order and its solution. scores: by criterion. worth: contribution of each to the weighted
+            sum [-].
         inside: its values are inside the limits.
     """
 
@@ -55,7 +56,7 @@ class _Solved:
 
     @property
     def rank(self) -> tuple[bool, int, bool, int, float]:
-        """What is larger for the better order."""
+        """Sort key: larger for the better order."""
         solution = self.solution
         place = -_BEST_FIRST.index(solution.status)
         return solution.is_valid(), place, self.inside, len(self.worth), round(self.total, 9)
@@ -70,7 +71,7 @@ def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolut
         command: with at least one of `orders`. solve: solves a command of one order.
 
     Raises:
-        ClenchError: no order can be solved; what the first says.
+        ClenchError: no order can be solved; the text is that of the first order.
     """
     solutions: dict[ClosingOrder, GraspSolution] = {}
     refused: dict[ClosingOrder, ClenchError] = {}
@@ -81,7 +82,7 @@ def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolut
             refused[order] = error
     if not solutions:
         raise refused[command.orders[0]]
-    # What says something about one order counts for all: an order without a value is not inside its limit.
+    # A criterion that has a value for one order counts for all: an order without a value is not inside its limit.
     criteria: dict[str, Any] = {}
     for solution in solutions.values():
         criteria |= (solution.choice or {}).get("criteria", {})
@@ -118,7 +119,7 @@ def _judged(order: ClosingOrder, solution: GraspSolution, criteria: Mapping[str,
 
 
 def _inside_limit(name: str, criterion: Mapping[str, Any], solution: GraspSolution) -> bool:
-    """Say whether all values of a criterion are inside its limit; one that is not known is not."""
+    """Say whether all values of a criterion are inside its limit; an unknown value is not."""
     if is_of_hand(find_criterion(name, "orders")):
         values = [(solution.choice or {}).get("final_hand_scores", {}).get(name)]
     else:  # a finger of whose sets it says nothing is left aside, as among sets

@@ -78,7 +78,8 @@ def _plan(problem: Problem) -> HandPlan:
 
 
 def _check_planes(plans: Sequence[FingerPlan], command: GraspCommand, together: bool) -> None:
-    """Refuse planes alone for a finger whose joints move at once, or again, about axes that are not parallel.
+    """Refuse planes alone for a finger whose joints move simultaneously, or in several rounds, about axes that are not
+    parallel.
 
     Raises:
         CommandError: with the name of the finger.

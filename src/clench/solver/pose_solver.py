@@ -1,4 +1,4 @@
-"""Solve a command from one posture: a batch of one, whose numbers are known at once and whose reasons when read."""
+"""Solve a command from one posture, as a batch of one: numbers immediately, reasons when first read."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class PoseSolver:
     """A solver for one problem at its pose.
 
     Args:
-        problem: the three inputs. calibration: what the choice counts. candidates: the sets to close.
+        problem: the three inputs. calibration: basis of the choice. candidates: the sets to close.
     """
 
     def __init__(self, problem: Problem, calibration: Calibration, candidates: Candidates) -> None:
@@ -100,7 +100,7 @@ class PoseSolver:
         )
 
     def _answer(self, answers: Answers) -> Answer:
-        """Read the answer: sets, contacts, scores, what overlaps, and why these sets were chosen."""
+        """Read the answer: sets, contacts, scores, overlaps, and the reasons for these sets."""
         problem, plan = self._problem, self._candidates.plan
         alternatives, free = self._alternatives, None
         if alternatives is None:
@@ -123,7 +123,7 @@ class PoseSolver:
         return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
 
     def _late_sets(self, answers: Answers, free: list[FingerCandidate]) -> Callable[[], list[list[FingerCandidate]]]:
-        """Return what gives all sets of every finger, of which the kernels chose."""
+        """Return a function that gives all sets of every finger, from which the kernels chose."""
         problem, plan = self._problem, self._candidates.plan
         if any(plan.whole):
             return lambda: with_planes(problem, overlaps_of(problem, plan, answers.closed), free)

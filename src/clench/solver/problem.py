@@ -30,7 +30,7 @@ class Problem:
     """One problem to solve: hand, object and command, checked and at their poses; J joints.
 
     Args:
-        hand, obj: what closes around what. command: a copy of the command.
+        hand, obj: the hand closes around the object. command: a copy of the command.
         start: posture before closing, shape (J,) [rad]. source: geometry of the hand.
         T_world_palm, T_world_object: poses. packed: the object.
     """
@@ -46,17 +46,17 @@ class Problem:
 
     @property
     def rounds(self) -> int:
-        """How often all degrees of freedom are gone through."""
+        """Number of passes through all degrees of freedom."""
         return self.command.rounds or UNTIL_REST
 
     @property
     def together(self) -> bool:
-        """Whether all joints close at once."""
+        """Whether all joints close simultaneously."""
         return self.command.order != ClosingOrder.PROXIMAL_FIRST
 
     @cached_property
     def T_palm_object(self) -> FloatArray:
-        """Where the object is for the hand, shape (4, 4)."""
+        """Pose of the object in the palm frame, shape (4, 4)."""
         from clench.kernels.geometry.link_frames import relate_poses
 
         T, rows = np.zeros((4, 4)), np.array([self.T_world_palm.wxyz_xyz, self.T_world_object.wxyz_xyz])
@@ -96,7 +96,7 @@ def check_calibration(hand: Hand, calibration: Calibration) -> None:
 
 
 def make_setting(problem: Problem, calibration: Calibration) -> ScoringContext:
-    """Return what the criteria judge sets in; see `check_calibration`."""
+    """Return the setting in which the criteria score sets; see `check_calibration`."""
     hand = problem.hand
     weights = np.ones(len(hand.joints)) if calibration.joints else None
     for name, weight in calibration.joints.items():

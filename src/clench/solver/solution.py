@@ -1,4 +1,4 @@
-"""The solution: what was computed, judged and chosen, as immutable values (schema `clench.solution/1`)."""
+"""The solution: contacts, angles, judgement and choice, as immutable values (schema `clench.solution/1`)."""
 
 from __future__ import annotations
 
@@ -183,18 +183,18 @@ class GraspSolution(Displayed, LateFields):
     """The answer of `clench.solve`; `to_dict` gives the documented JSON form.
 
     Args:
-        hand, object: names. hand_model, object_model: what to load to execute it again (path or built-in name).
-        object_scale: what the lengths of the object's model were multiplied by [-].
+        hand, object: names. hand_model, object_model: models to load for another execution (path or built-in name).
+        object_scale: factor on the lengths of the object's model [-].
         status, reason: the answer; `reason` has at least ``"code"`` and ``"text"``.
         hand_pose: `T_world_palm`; object_pose: `T_world_object`.
         decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
         joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
-        certified, certificate: whether the certificate of docs/method.md section 5 holds, and ``"text"`` with what is
-            promised, or why nothing is; ``"deviation"`` of what is swept as polyhedra [m].
-        choice: why these sets: what counted, totals, runners-up, and sentences (docs/calibration.md).
+        certified, certificate: whether the certificate of docs/method.md section 5 holds. ``"text"`` states the
+            guarantee or why there is none; ``"deviation"`` is that of shapes swept as polyhedra [m].
+        choice: why these sets: criteria, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the whole width and all links [m], None when not computed.
-        speeds: how fast free joints closed relative to each other in an order where all move at once; 1 if not named.
-        rounds: how often the joints were gone through, 0 for until rest.
+        speeds: relative closing speeds of free joints in an order where all move simultaneously; 1 if not named.
+        rounds: number of passes through the joints, 0 for until rest.
         next_steps: postures [rad] by joint name that the hand goes to after the grasp, as commanded.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """
@@ -305,7 +305,7 @@ class GraspSolution(Displayed, LateFields):
         """Read a file written by `save`.
 
         Raises:
-            FileError: missing, not JSON, or not a solution.
+            FileError: the file is missing, is not JSON, or is not a solution.
         """
         from .documents import load_solution
 

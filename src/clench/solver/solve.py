@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 def solve(hand: Hand, obj: GraspObject, command: GraspCommand | Pose, *, record: Record | None = None) -> GraspSolution:
     """Close a hand around an object and return the best set of contacts and joint angles (docs/method.md).
 
-    If the command leaves the posture to clench, the preshapes of the hand are closed and compared first, and the
-    solution's `choice` says which one was chosen and why (docs/preshapes.md). Otherwise there is one closing.
+    If the command leaves the posture to clench, it closes and compares the preshapes of the hand first. The solution's
+    `choice` then names the chosen one and the reason (docs/preshapes.md). Otherwise there is one closing.
 
     Args:
         hand: see `Hand.load`. obj: see `GraspObject.load`.
-        command: where the hand is, how it is preshaped, what is asked for; or the pose of the palm, `T_world_palm`.
+        command: pose of the hand, preshape, and options; or the pose of the palm, `T_world_palm`.
         record: a store that the solution is appended to.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Judge a solution by itself: what makes it unfit to execute."""
+"""Judge a solution by itself: list the reasons that make it unfit to execute."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from clench.core.tolerances import ALLOWED_PENETRATION, CONTACT_OVERLAP, PASSED_
 
 from .solution import Contact, FingerResult, FingerStatus, GraspSolution
 
-#: What lies between two curl planes of a set that is not certified over its width may be overlapped this far [m].
+#: If a set is not certified over its width, links may overlap this far between two curl planes [m].
 SAMPLED_PENETRATION = 1e-3
 #: Angles may exceed a limit by rounding only [rad].
 LIMIT_SLACK = 1e-9
@@ -24,9 +24,8 @@ UNIT_SLACK = 1e-6
 def violations(solution: GraspSolution) -> tuple[str, ...]:
     """Return a sentence for everything that makes a solution unfit to execute; empty when there is nothing.
 
-    Checked: every number is finite, of what has been made so far; no penetration beyond the allowance; the chosen
-    candidates are feasible and give the solution's angles; angles are inside the joints' limits; contacts that did not
-    pass touch.
+    Checks: all numbers present are finite; no penetration exceeds the allowance; the chosen candidates are feasible and
+    give the solution's angles; angles are inside the joints' limits; contacts that did not pass touch.
     """
     numbers = tuple(_non_finite(solution))
     if numbers:

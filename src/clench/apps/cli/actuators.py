@@ -1,4 +1,4 @@
-"""What `clench execute` moves: the actuator that was asked for, from its options."""
+"""Make the actuator for `clench execute` from its options."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Interface = Literal["auto", "rclpy", "cyclonedds", "action"]
 
 @dataclass(frozen=True)
 class ActuatorOptions:
-    """Hold the options of `clench execute` that tell how a hand is reached; None is the actuator's own default."""
+    """The options of `clench execute` for the connection to a hand; None is the actuator's own default."""
 
     controller: str | None
     joint_states: str | None
@@ -41,7 +41,7 @@ class ActuatorOptions:
     drive: DriveName | None = None
 
 
-#: Which options mean something to which actuator; any other that is given is refused.
+#: Options by actuator; any other given option is refused.
 _TAKEN: dict[str, tuple[str, ...]] = {
     "simulated": ("hold", "film", "drive"),
     "ros2": ("controller", "joint_states", "interface", "joint_map", "squeeze"),
@@ -49,7 +49,7 @@ _TAKEN: dict[str, tuple[str, ...]] = {
     "orca-mock": ("joint_map", "config", "squeeze"),
     "signal": ("to", "record"),
 }
-#: How options are given that have another name here.
+#: Option names that differ from the names here.
 _SAID = {"hold": "hold or --lift", "film": "video or --stills"}
 
 
@@ -59,7 +59,7 @@ def make_actuator(
     """Return the actuator that was asked for.
 
     Raises:
-        CommandError: an option that it does not take, or one that it needs is missing.
+        CommandError: the actuator does not take an option, or a required option is missing.
     """
     import clench
 
@@ -87,7 +87,8 @@ def make_actuator(
 
 
 def stop_of(actuator: Executor) -> Callable[[], None]:
-    """Return what forbids further commands to a driven hand, at any moment and without waiting for its driver.
+    """Return a function that forbids further commands to a hardware hand, at any moment and without waiting for its
+    driver.
 
     The interrupt that follows tells the hand to stop. Nothing is done for other actuators.
     """
@@ -97,7 +98,7 @@ def stop_of(actuator: Executor) -> Callable[[], None]:
 
 
 def report_of(actuator: Executor) -> ExecutionReport:
-    """Return what a driven hand reports of an execution that was interrupted.
+    """Return the report of an interrupted execution on a hardware hand.
 
     Raises:
         KeyboardInterrupt: there is no report, because the interrupt came before the execution, or to another actuator.

@@ -52,16 +52,16 @@ def batch(
         count: how many approach poses.
         seed: of the approach poses.
         command: command file (JSON) with everything else; its own hand_pose plays no part.
-        hand_file: TOML file that overrides what was found in the hand's model.
+        hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
         table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
-        obstacle: mesh or shape that stands in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be
-            given several times.
+        obstacle: mesh or shape fixed in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be given
+            several times.
         planes: curl planes per finger.
-        planes_only: close on the planes alone; what lies between them is not looked at, and nothing is certified.
+        planes_only: close on the planes alone; the space between them is not checked, and nothing is certified.
         threads: how many are used; all cores by default.
-        device: what closes the fingers, cpu or cuda (an NVIDIA GPU; docs/batch.md).
+        device: device that closes the fingers, cpu or cuda (an NVIDIA GPU; docs/batch.md).
         chunk: poses at a time; a GPU wants some ten thousand.
         out: NumPy file (.npz) to write. Every chunk is written when it is solved, to a folder beside it; the same call
             goes on where an ended one stopped.
@@ -142,7 +142,7 @@ def _going_on(out: Path | None) -> Iterator[None]:
 
 
 def _read(path: Path) -> np.ndarray:
-    """Read an array of poses; which shapes there are is told by what solves them.
+    """Read an array of poses; the solver checks its shape.
 
     Raises:
         FileError: missing, no array of numbers, or empty.

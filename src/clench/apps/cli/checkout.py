@@ -1,4 +1,4 @@
-"""What a checkout of the project has beside the package: the benchmarks."""
+"""Find the parts of a checkout of the project beside the package: the benchmarks."""
 
 from __future__ import annotations
 

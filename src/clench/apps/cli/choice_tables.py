@@ -18,7 +18,7 @@ _MOST_ROWS = 10
 
 
 def print_choice(solution: GraspSolution) -> None:
-    """Print what counted, the sets of every finger, and the sentences; nothing where the solution does not say."""
+    """Print the criteria, the sets of every finger, and the sentences; print nothing if the solution has none."""
     from clench.solver.analysis.pareto import hand_front
 
     out, choice = console_out(), solution.choice

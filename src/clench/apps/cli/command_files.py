@@ -1,4 +1,4 @@
-"""Command files of the command line: what does not fit the hand or the criteria is said with the file's name."""
+"""Read command files for the command line: errors about the hand or the criteria name the file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def read_command(path: Path, hand: Hand) -> GraspCommand:
     """Read a command file and check it against a hand and the criteria that exist.
 
     Raises:
-        FileError: the command file, or the calibration file that it names. CommandError: what is wrong in it.
+        FileError: the command file, or the calibration file that it names. CommandError: an error in it.
     """
     from clench.models.command_file import check_command, load_command
     from clench.scoring.calibration import calibration_of

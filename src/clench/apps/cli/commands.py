@@ -1,4 +1,4 @@
-"""The commands; what a command needs is imported when it runs, so that `--help` is quick."""
+"""The commands; each imports its own modules when it runs, so that `--help` is quick."""
 
 from __future__ import annotations
 
@@ -91,26 +91,26 @@ def solve(
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         command: command file (JSON); without it clench plans one grasp, from --seed, as `clench plan` does.
-        hand_file: TOML file that overrides what was found in the hand's model.
+        hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
         table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
-        obstacle: mesh or shape that stands in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be
-            given several times.
+        obstacle: mesh or shape fixed in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be given
+            several times.
         collision_source: geometry of the hand to solve for.
         planes: curl planes per finger.
         order: in which the joints close; several are solved one by one, and the best is kept.
-        criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
+        criteria: weights of the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
         seed: of the planned grasp; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
         html: file (.html) for a page that shows the closing in any browser, without a network (docs/pictures.md).
         record: SQLite record to append the solution to.
-        pose_error: show what changes when the object is off by up to this many metres and degrees, e.g. 0.002 2.
+        pose_error: show the effect of an error of the object's pose up to this many metres and degrees, e.g. 0.002 2.
         explain: print the alternative sets with their scores, and why the chosen ones won.
         forces: print how steady the grasp is, and the forces that hold the object.
         mass: of the object, for the forces, which it prints [kg]; 0.1 by default; two numbers are a range.
-        friction: of links on the object, for the forces, which it prints; two numbers are a range; by default what
-            hand file and object say, else 0.6. The choice takes those of hand file and object.
+        friction: of links on the object, for the printed forces; two numbers are a range; by default that of hand file
+            and object, else 0.6. The choice always takes those of hand file and object.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """
@@ -205,7 +205,7 @@ def _check_files(out: Path | None, html: Path | None, record: Path | None) -> No
 
 
 def _checked_forces(mass: tuple[float, ...], friction: tuple[float, ...], criteria: str | None) -> tuple[Any, Any]:
-    """Check options that need neither hand nor object, before anything is loaded or compiled.
+    """Check options that need neither hand nor object, before any loading or compiling.
 
     Returns:
         Mass [kg] and friction [-], numbers or ranges; the friction may be None.
@@ -233,11 +233,11 @@ def hand(
     figure: Path | None = None,
     json: bool = False,
 ) -> int:
-    """Show what was understood of a hand, check it, and say what to do: fingers, roles, coupling, preshapes, findings.
+    """Show the interpretation of a hand, check it, and give advice: fingers, roles, coupling, preshapes, findings.
 
     Args:
         model: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
-        hand_file: TOML file that overrides what was found in the model.
+        hand_file: TOML file that overrides the interpretation of the model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         collision_source: geometry to use.
         figure: file (.png, .pdf, .svg, …) for a picture of the hand: joint axes, roles, closing directions, curl
@@ -289,7 +289,7 @@ def record(
     Args:
         path: the record (SQLite file).
         id: show the solution with this number.
-        outcome: note what came of executing it, for `clench calibrate`.
+        outcome: record the outcome of its execution, for `clench calibrate`.
         hand: only solves of this hand.
         object: only solves of this object.
         status: only solves that ended so.
@@ -376,7 +376,7 @@ def _no_grasp(plan: GraspPlan, json: bool) -> int:
 
 
 def in_orders(command: GraspCommand, names: Sequence[Order]) -> GraspCommand:
-    """Return a command for one closing order, or for several as alternatives; without any, as it is."""
+    """Return a command for one closing order, or for several as alternatives; without an order, unchanged."""
     from dataclasses import replace
 
     from clench.models.command import ClosingOrder

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
 
-#: Where the palm of the built-in hand holds the built-in mug: around its wall, away from the handle.
+#: Pose of the built-in hand's palm for the built-in mug: around its wall, away from the handle.
 MUG_POSE = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 STEPS = 6
 
@@ -82,8 +82,8 @@ def choose_command(hand: Hand, obj: GraspObject, models: tuple[str, str], seed: 
     """Return the command kept for the built-in hand and mug, else that of a planned grasp.
 
     Args:
-        hand, obj: what is solved. models: what they were loaded from.
-        seed: of the planned grasp; None keeps to the built-in pose where there is one.
+        hand, obj: hand and object. models: their model names or paths.
+        seed: of the planned grasp; None takes the built-in pose if there is one.
 
     Raises:
         CommandError: no grasp was found.

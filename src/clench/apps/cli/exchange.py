@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # The values of `GraspFormat`, written out so that the command line loads without NumPy.
 Format = Literal["isaac_grasp", "dexgraspbench", "moveit_grasp"]
-# The same, and those of `DatasetFormat` besides.
+# The same formats, and those of `DatasetFormat`.
 AnyFormat = Literal["isaac_grasp", "dexgraspbench", "moveit_grasp", "hdf5"]
 
 
@@ -42,20 +42,20 @@ def export(
 
     Args:
         solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, or batches
-            (.npz) written by `clench batch --out`, of which all poses that are grasps are taken; or one dataset: the
-            folder of `clench generate`, or its grasps.parquet.
+            (.npz) written by `clench batch --out` (all poses with a grasp); or one dataset: the folder of `clench
+            generate`, or its grasps.parquet.
         out: the file; for several grasps in the format dexgraspbench, a folder; of a dataset, a folder or an HDF5 file.
             A .glb, .usd, .usda or .usdc file shows hand, object and contacts; USD has the grasp lines, too.
         format: of the file; by its ending (.yaml, .npy, .json, .h5) by default, a folder is dexgraspbench. hdf5 is for
             datasets.
-        hand: model of the hand; the one that the solutions name by default.
-        object: model of the object; the one that the solutions name by default.
+        hand: model of the hand; by default the solutions' own.
+        object: model of the object; by default the solutions' own.
         hand_file: TOML file that was used to load the hand.
         palm: palm link that was used to load the hand.
-        scale: that was used to load the object; what the solutions say by default.
+        scale: of the object; by default the solutions' own.
         root: link whose pose is written, or world (of the hand's model file): dexgraspbench's default; else the palm.
         name: of the object in the file; its own by default.
-        hold: test every grasp in simulation; what holds has confidence 1.
+        hold: test every grasp in simulation; a grasp that holds has confidence 1.
         mass: of the object, for squeeze and test, kg; two numbers are a range.
         friction: of its contacts, for squeeze and test; two numbers are a range.
         stiffness: gain of the servos that will hold the postures, Nm/rad; that of the hand's model by default.
@@ -140,7 +140,7 @@ def _export_scene(read: ReadGrasps, out: Path, json: bool) -> int:
 
 
 def _export_dataset(source: Path, out: Path, format: AnyFormat | None, more: bool, json: bool) -> int:
-    """Write a dataset in another format, all of it as it was computed."""
+    """Write a dataset in another format, with all grasps as computed."""
     import clench.dataset
 
     from .printing import print_files
@@ -188,9 +188,9 @@ def import_(
         out: folder for the command files.
         grasp: only the grasp of this name.
         format: of the file; by its ending (.yaml, .npy, .json) by default.
-        root: link whose pose the file has, or world (of the hand's model file); by default what the file says, else
-            world for dexgraspbench and the palm for the others.
-        hand_file: TOML file that overrides what was found in the hand's model.
+        root: link whose pose the file has, or world (of the hand's model file); by default the file's own, else world
+            for dexgraspbench and the palm for the others.
+        hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         json: print one JSON document on standard output.
     """

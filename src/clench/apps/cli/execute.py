@@ -60,29 +60,29 @@ def execute(
     strict: bool = False,
     json: bool = False,
 ) -> int:
-    """Carry out a solution and report what was reached.
+    """Execute a solution and report the reached state.
 
     Args:
         solution: file written by `clench solve --out` or `GraspSolution.save`.
-        actuator: what moves the hand.
-        hand: model of the hand; the one that the solution names by default.
-        object: model of the object; the one that the solution names by default.
+        actuator: the kind of hand to move.
+        hand: model of the hand; by default the solution's own.
+        object: model of the object; by default the solution's own.
         hand_file: TOML file that was used to load the hand.
         palm: palm link that was used to load the hand.
-        scale: that was used to load the object; what the solution says by default.
+        scale: of the object; by default the solution's own.
         table: the table that the solution was computed with, see `clench solve`.
         obstacle: obstacles that the solution was computed with, see `clench solve`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
         force: carry out a solution that has violations, or next steps that drive links into each other, too.
         skip_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
         hold: simulated: close on the free object, squeeze it as planned, pull it in six directions.
-        lift: simulated: close on the object where it stands on a table, squeeze it as planned, lift it.
+        lift: simulated: close on the object on a table, squeeze it as planned, lift it.
         mass: hold, lift: of the object, kg (0.1).
         friction: hold, lift: of its contacts (0.6).
-        drive: simulated: what moves the joints: stiff servos, or the model's own actuators (servo).
+        drive: simulated: actuators of the joints: stiff servos, or the model's own actuators (servo).
         controller: ros2: name of the joint_trajectory_controller (hand_controller).
         joint_states: ros2: topic of the joint states (/joint_states).
-        interface: ros2: what it is spoken through (auto: rclpy, else cyclonedds).
+        interface: ros2: program interface (auto: rclpy, else cyclonedds).
         joint_map: ros2, orca: TOML file with the controller's joint names, units, offsets and limits.
         config: orca: the hand's config.yaml.
         video: simulated: file for a moving picture (.gif, or .mp4 with clench[video]).
@@ -91,7 +91,7 @@ def execute(
         timeout: seconds to look for the controller.
         to: signal: file:PATH, tcp:HOST:PORT, unix:PATH or topic:NAME.
         record: signal: record (SQLite file) that the solution is appended to.
-        log: file for what was told and measured on the way (MCAP).
+        log: file for targets and measurements on the way (MCAP).
         out: file for the report (JSON).
         strict: exit with 1 unless the solution's status is grasp.
         json: print the report as one JSON document on standard output.

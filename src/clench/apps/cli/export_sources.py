@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ReadGrasps:
-    """Hold solutions with the hand and the objects that they are of, None where these cannot be loaded.
+    """Solutions with their hand and objects, None for models that cannot be loaded.
 
     Args:
         solutions: of all files. hand: of all solutions. objects: by solution.
@@ -34,7 +34,7 @@ class ReadGrasps:
 
 
 def make_test(mass: Any, friction: Any) -> Hold:
-    """Return the hold test at the hard end of what the squeeze is planned for: the heaviest mass, the lowest friction.
+    """Return the hold test at the hard end of the squeeze's range: the heaviest mass, the lowest friction.
 
     Raises:
         CommandError: a value out of range.
@@ -59,12 +59,12 @@ def read_grasps(
     """Read files of grasps, and load the models that they name: one hand, and as many objects as there are.
 
     Args:
-        files: solutions, JSON lists of solutions, batches. hand, object: models; None: those that the files name.
-        loaded_with: hand file and palm of the hand. scale: of the objects; None: what the files say.
+        files: solutions, JSON lists of solutions, batches. hand, object: models; None: the models that the files name.
+        loaded_with: hand file and palm of the hand. scale: of the objects; None: the files' own.
 
     Raises:
-        FileError: a file is missing or malformed; a model that was given cannot be read. CommandError: no grasp; a
-            grasp of another hand or object than what was given.
+        FileError: a file is missing or malformed; a model that was given cannot be read. CommandError: no grasp, or a
+            grasp of another hand or object than the given one.
     """
     import clench
 
@@ -116,8 +116,8 @@ class _Objects:
     """Load objects, each once.
 
     Args:
-        given: model of the object of all grasps; None: those that the files name. scale: of it; None: what the files
-            say. hand: of the grasps, None when it is not known. notes: collects sentences about what is missing.
+        given: model of the object of all grasps; None: the models that the files name. scale: of it; None: the files'
+            own. hand: of the grasps, None when it is not known. notes: collects sentences about missing data.
     """
 
     def __init__(self, given: str | None, scale: float | None, hand: Hand | None, notes: list[str]) -> None:
@@ -125,7 +125,7 @@ class _Objects:
         self._loaded: dict[tuple[str, float, str], GraspObject | None] = {}
 
     def of(self, named: GraspSolution | SavedBatch) -> GraspObject | None:
-        """Return the object that is named, or the one that was given; None, with a note, where it cannot be loaded."""
+        """Return the named object, or the given one; None, with a note, if it cannot be loaded."""
         import clench
 
         scale, source = named.object_scale if self._scale is None else self._scale, named.object_collision_source
@@ -140,10 +140,10 @@ class _Objects:
         return self._loaded[key]
 
     def of_solution(self, solution: GraspSolution, source: str) -> GraspObject | None:
-        """Return the object of a solution; None, with a note, where what it names has another geometry.
+        """Return the object of a solution; None, with a note, if the named model has another geometry.
 
         Raises:
-            CommandError: what was given has another geometry.
+            CommandError: the given model has another geometry.
         """
         from clench.execution.executing import check_geometry
 
@@ -177,7 +177,7 @@ def _check_hand(solution: GraspSolution, hand: Hand | None, source: str, first: 
     """Check that a solution is of the hand that was loaded.
 
     Raises:
-        CommandError: it is of another one than the first grasp, or than what was given.
+        CommandError: its hand differs from that of the first grasp, or from the given one.
     """
     from clench.execution.executing import check_geometry
 
@@ -204,7 +204,7 @@ def _solved(batch: SavedBatch, hand: Hand | None, obj: GraspObject | None) -> li
 
 
 def _load(load: Any, given: str | None, named: str, notes: list[str]) -> Any:
-    """Return what was given, or what is named; None, and a note, where nothing can be loaded by that name."""
+    """Return the given model, or the named one; None, and a note, if no model of this name can be loaded."""
     if given is not None or not named:
         return load(given) if given is not None else None
     try:

@@ -1,4 +1,4 @@
-"""`clench generate`: datasets of grasps, in shards that go on where they were ended."""
+"""`clench generate`: datasets of grasps, in shards that continue after an interruption."""
 
 from __future__ import annotations
 
@@ -51,22 +51,22 @@ def generate(
     merge: Path | None = None,
     json: bool = False,
 ) -> int:
-    """Generate a dataset of grasps on all cores, go on where it was ended, and merge it (docs/dataset.md).
+    """Generate a dataset of grasps on all cores, continue interrupted runs, and merge it (docs/dataset.md).
 
     Args:
         out: folder of the dataset; the same call goes on where an ended one stopped.
-        job: file (TOML, or JSON) with these options as keys, without the ones about this run; what is given
-            besides counts instead.
+        job: file (TOML, or JSON) with these options as keys, without the options of this run; options on the command
+            line override it.
         hands: built-in names, paths to .urdf or .xml files, or names that clench[hands] finds (docs/own-hand.md).
         objects: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
         scales: of the objects' lengths, e.g. 0.001 for meshes in millimetres; each object is used at each scale; 1 by
             default.
         count: grasps per hand, object and scale; 100 by default.
         seed: the same seed gives the same grasps, for any number of workers and shards; 0 by default.
-        unit: grasps that are planned together at most; what is ended loses at most a unit per worker; 50 by
+        unit: grasps that are planned together at most; an interruption loses at most one unit per worker; 50 by
             default.
         hold: test every grasp in simulation, in six directions; grasps are planned on convex pieces.
-        friction: that is planned for; two numbers are a range; by default what hand file and object say, else 0.6.
+        friction: for planning; two numbers are a range; by default that of hand file and object, else 0.6.
         mass: of the objects, kg; two numbers are a range; 0.1 by default.
         gravity: its direction; by default objects are held in any direction.
         kinds: of grasps; all by default.
@@ -80,7 +80,7 @@ def generate(
         effort: proposals per grasp; the best one of so many is kept; 40 by default.
         most: proposals of a unit at most.
         without_path: leave out the path from the open hand to the touch, and the pregrasp.
-        shard: i/n: do the units of one of n runs; by default what SLURM's variables of an array say, else all.
+        shard: i/n: do the units of one of n runs; by default as SLURM's variables of an array say, else all.
         workers: processes; all cores by default, 0 works in this process.
         memory: a process that has had more is replaced after its unit, GB; 4 by default.
         merge: merge the parts in this folder, and do nothing else.
@@ -153,7 +153,7 @@ def _generate(
     from .results import print_json
 
     part = clench.dataset.Shard.parse(shard) if shard is not None else clench.dataset.Shard.of_environment()
-    # What cannot be done is told before anything is compiled.
+    # Report impossible requests before compiling anything.
     DatasetFolder(out, job).check()
     options: dict[str, Any] = {} if memory is None else {"memory": memory}
     announce()
@@ -201,7 +201,7 @@ def _progress(units: int, show: bool) -> Iterator[Told]:
 
 
 def _say(report: GenerateReport) -> None:
-    """Print what came of a run."""
+    """Print the result of a run."""
     from .printing import print_files
 
     rows, ok = sum(record.rows for record in report.records), sum(record.ok for record in report.records)

@@ -11,10 +11,10 @@ from types import FrameType
 
 @contextmanager
 def stopped_by_signals(stop: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Turn SIGTERM and SIGHUP into the interrupt that Ctrl-C is, so that whatever moves is stopped on the way out.
+    """Turn SIGTERM and SIGHUP into the interrupt of Ctrl-C, so that a moving hand is stopped on the way out.
 
-    A shell script starts what runs in the background with Ctrl-C ignored; a moving hand heeds it all the same. Only
-    SIGHUP stays ignored where it was, because `nohup` asks for that.
+    A shell script starts background jobs with Ctrl-C ignored; a moving hand heeds it all the same. Only SIGHUP stays
+    ignored if it was, because `nohup` asks for that.
 
     Args:
         stop: called in the signal handler, before the interrupt is raised: code of others may lose the interrupt.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def compile_kernels() -> None:
-    """Compile what any solve calls, where it is not on disk, and say so."""
+    """Compile the kernels that every solve calls, unless they are on disk, and say so."""
     from clench.kernels.runtime.warming import announce, warm_up
 
     announce()
@@ -12,7 +12,7 @@ def compile_kernels() -> None:
 
 
 def load_kernels() -> None:
-    """Load from disk what a solve calls, or compile it."""
+    """Load the kernels that a solve calls from disk, or compile them."""
     from clench.kernels.closing.solve_poses import solve_poses
     from clench.kernels.geometry.link_frames import place_links, relate_poses
     from clench.kernels.runtime.warming import compile_ahead

@@ -1,6 +1,6 @@
 """Entry point of the command line: choose the command, turn errors into one sentence and an exit code.
 
-Exit codes: 0 = grasp or partial, and executed where asked (`--strict`: grasp only); 1 = any other answer, or a failed
+Exit codes: 0 = grasp or partial, and executed if asked (`--strict`: grasp only); 1 = any other answer, or a failed
 execution; 2 = bad input; 70 = a mistake in this program.
 """
 
@@ -21,7 +21,7 @@ from clench.core.errors import ClenchError, UnknownNameError
 from .parsing import EXIT_BAD_INPUT, EXIT_INTERRUPTED, PRINT_COMPLETION, parse_call, print_completion
 
 EXIT_INTERNAL = 70
-#: So many new objects start the first collection, and so many collections the next wider one.
+#: Number of new objects that start the first collection, and of collections that start the next wider one.
 GARBAGE_THRESHOLDS = (50_000, 20, 100)
 
 DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
     Args:
-        argv: the arguments after the program's name; those of the process by default.
+        argv: the arguments after the program's name; by default those of the process.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in arguments
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return say("interrupted.", EXIT_INTERRUPTED)
     except BrokenPipeError:
-        # The reader of our output has seen enough (`clench hand H | head`); what is buffered has nowhere to go.
+        # The reader of our output has closed it (`clench hand H | head`); the buffered rest has nowhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(arguments: list[str]) -> int:
     from .commands import COMMANDS, bench
 
-    # What is imported stays: looking through it for garbage again and again takes a twelfth of a short command's time.
+    # Imported modules stay: repeated garbage collections of them take a twelfth of a short command's time.
     gc.set_threshold(*GARBAGE_THRESHOLDS)
     name, *rest = arguments or ["--help"]
     if name == "--version":
@@ -84,7 +84,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _overview(commands: Mapping[str, Callable[..., int]]) -> str:
-    """Return the help of the whole program; written here because loading what reads options takes half a second."""
+    """Return the help of the whole program, written here because the option parser takes half a second to load."""
     lines = [f"  {name:<10}{(command.__doc__ or '').splitlines()[0]}" for name, command in commands.items()]
     listed = "\n".join(lines)
     return f"usage: clench COMMAND ...\n\n{DESCRIPTION}\n\ncommands (clench COMMAND --help tells more):\n{listed}\n"
@@ -96,7 +96,7 @@ def _warn(message: Warning | str, category: type[Warning], *where: Any, **more: 
 
 
 def _say(sentence: str, code: int, *, as_json: bool) -> int:
-    """Say what went wrong on standard error, and as a document on standard output for a program that reads one."""
+    """Print an error on standard error, and as a document on standard output for a program that reads it."""
     if as_json:
         sys.stdout.write(json.dumps({"error": sentence}) + "\n")
         sys.stdout.flush()

@@ -41,7 +41,7 @@ def object_(
 
 
 def print_object(report: ObjectReport) -> None:
-    """Print what is known of an object."""
+    """Print the report on an object."""
     from .tables import console_out, plain, table_with
 
     out = console_out()

@@ -15,7 +15,7 @@ from clench.core.errors import CommandError
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
-#: The option that prints what a shell needs to complete commands, and the shells that are known.
+#: The option that prints completion scripts, and the known shells.
 PRINT_COMPLETION: Final = "--tyro-print-completion"
 SHELLS: Final = ("bash", "zsh")
 #: The option that may be given several times, as well as once with several values.
@@ -25,7 +25,7 @@ _HELP_INDENT = 8
 
 
 def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, float] | None:
-    """Return what an option of one or two numbers says: nothing, a number, or a range (least, largest).
+    """Return the value of an option of one or two numbers: nothing, a number, or a range (least, largest).
 
     Raises:
         CommandError: more than two numbers.
@@ -39,11 +39,11 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     """Return the call that the arguments ask for; a wrong argument gives exit code 2, `--help` gives 0.
 
     Args:
-        program: what the usage line starts with. command: what is called with the options it names.
+        program: start of the usage line. command: function whose parameters are the options.
         arguments: those after the program's name.
 
     Raises:
-        CommandError: a wrong argument beside `--json`; without it, a box on standard error says what is wrong.
+        CommandError: a wrong argument beside `--json`; without it, a box on standard error names the error.
     """
     import tyro
 
@@ -64,10 +64,10 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
 
 
 def print_completion(program: str, commands: Mapping[str, Callable[..., int]], arguments: Sequence[str]) -> int:
-    """Print what a shell needs to complete commands and options; return the exit code.
+    """Print a shell's completion script for commands and options; return the exit code.
 
     Args:
-        program: what is completed. commands: by name. arguments: the option with the name of a shell.
+        program: name of the program. commands: by name. arguments: the option with the name of a shell.
 
     Raises:
         CommandError: a shell that is not known.
@@ -120,10 +120,10 @@ def options_style() -> tuple[Any, ...]:
 
 
 def _sentence(box: str) -> str:
-    """Return what a box of text says first, on one line, without its title and the help of options."""
+    """Return the first sentence of a box of text on one line, without its title and the help of options."""
     lines = [line.strip("│").rstrip() for line in box.splitlines() if not line.startswith(("╭", "╰"))]
     rules = [i for i, line in enumerate(lines) if line and set(line.strip()) <= set("─-")]
-    # Where boxes are drawn with letters alone, the title is a line above the first rule.
+    # In boxes drawn with plain characters, the title is a line above the first rule.
     start = 0 if box.startswith("╭") or not rules else rules[0] + 1
     first = itertools.takewhile(lambda line: line and not set(line.strip()) <= set("─-"), lines[start:])
     text = " ".join(line.strip() for line in first if not line.startswith(" " * _HELP_INDENT))

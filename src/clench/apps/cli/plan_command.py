@@ -55,10 +55,10 @@ def plan(
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
         count: how many grasps are wanted.
-        hand_file: TOML file that overrides what was found in the hand's model.
+        hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
-        friction: of links on the object; two numbers are a range; by default what hand file and object say, else 0.6.
+        friction: of links on the object; two numbers are a range; by default that of hand file and object, else 0.6.
         mass: of the object [kg]; 0.1 by default; two numbers are a range.
         gravity: its direction in the world; by default the object is held in any direction.
         kinds: of grasps; any by default.

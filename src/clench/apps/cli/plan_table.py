@@ -9,7 +9,7 @@ from .tables import console_out, plain, table_with
 
 
 def print_plan(document: Mapping[str, Any], text: str) -> None:
-    """Print planned grasps, the best ones first, and what became of the other proposals; see `clench plan --json`."""
+    """Print planned grasps, best first, and the fate of the other proposals; see `clench plan --json`."""
     console = console_out()
     columns = ["", "kind", "preshape", "palm [mm]", "epsilon", "holds", "links", "torque [Nm]"]
     tried = any("hold" in grasp for grasp in document["grasps"])

@@ -1,4 +1,4 @@
-"""Tables of preshapes: those of a hand, and those that were compared for a solution."""
+"""Print tables of preshapes: those of a hand, and those that were compared for a solution."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def print_preshapes(preshapes: Sequence[Preshape]) -> None:
 
 
 def print_posture_choice(solution: GraspSolution) -> None:
-    """Print which preshape clench chose, and how the others compare; nothing where the command left no choice."""
+    """Print the preshape that clench chose, and the comparison; print nothing if the command left no choice."""
     said = (solution.choice or {}).get("preshapes")
     if said is None:
         return

@@ -85,7 +85,7 @@ def print_forces(solution: GraspSolution) -> None:
 
 
 def print_pose_error(error: PoseErrorReport) -> None:
-    """Print what an error of the object's pose does to angles and touching links."""
+    """Print the effect of an error of the object's pose on angles and touching links."""
     console = console_out()
     size = f"±{error.translation * 1e3:g} mm and ±{np.rad2deg(error.rotation):g}°"
     table = table_with(f"the object off by {size}", "joint", "stopped by", "to first order [deg]", "solved again [deg]")
@@ -103,7 +103,7 @@ def print_pose_error(error: PoseErrorReport) -> None:
 
 
 def print_hand(report: HandReport) -> None:
-    """Print what was understood of a hand."""
+    """Print the interpretation of a hand."""
     console = console_out()
     summary = table_with(f"hand {report.name}", "", "")
     for row in report.summary_rows():
@@ -134,7 +134,7 @@ def print_hand(report: HandReport) -> None:
 
 
 def print_report(report: ExecutionReport) -> None:
-    """Print what an actuator reached."""
+    """Print the state that an actuator reached."""
     console = console_out()
     good, bad = ("reached", "not reached") if report.joints else ("done", "failed")
     if report.hold is not None:
@@ -235,7 +235,7 @@ def print_weights(weights: Mapping[str, float], sentence: str) -> None:
 
 
 def print_exported(report: ExportReport, notes: Sequence[str]) -> None:
-    """Print the files of an export with the confidence of their grasps, and sentences about what is missing."""
+    """Print the files of an export with the confidence of their grasps, and sentences about missing data."""
     console, each = console_out(), report.confidences
     console.print("files:")
     for i, file in enumerate(report.files):

@@ -1,4 +1,4 @@
-"""What a command leaves behind: one JSON document on standard output, or files in a folder."""
+"""Write the results of a command: one JSON document on standard output, or files in a folder."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def print_json(document: dict[str, Any]) -> None:
 def write_results(
     hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, folder: Path
 ) -> list[Path]:
-    """Write solution.json, trajectory.json where there is a free path, and the figures; return their paths.
+    """Write solution.json, trajectory.json if a path is free, and the figures; return their paths.
 
     Without a free path, one sentence on standard error says why.
 

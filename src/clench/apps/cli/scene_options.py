@@ -1,4 +1,4 @@
-"""The options --table and --obstacle: what stands around the object."""
+"""The options --table and --obstacle: the surroundings of the object."""
 
 from __future__ import annotations
 

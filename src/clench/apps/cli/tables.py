@@ -1,4 +1,4 @@
-"""Make tables for people, on standard output; every text in them is shown as it is."""
+"""Print tables for people on standard output, with every text shown verbatim."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def console_out() -> Console:
-    """Return what prints on standard output."""
+    """Return the printer for standard output."""
     from rich.console import Console
 
     return Console(highlight=False, soft_wrap=False)

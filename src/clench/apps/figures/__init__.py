@@ -25,12 +25,12 @@ def draw_solution(
     """Draw every finger in its curl planes, its alternative sets, and the hand from two sides.
 
     Args:
-        hand, obj, command: what was solved. solution: the answer.
-        directory: a folder, which is made where it is not there; `<finger>_plane.png`, `<finger>_sets.png` and
-            `grasp.png` are written to it.
+        hand, obj, command: the solved problem. solution: the answer.
+        directory: a folder, created if missing; `<finger>_plane.png`, `<finger>_sets.png` and `grasp.png` are written
+            to it.
 
     Returns:
-        the files written; a finger without sets (nothing to close) has no picture of its own.
+        the written files; a finger without sets (nothing to close) has no picture of its own.
 
     Raises:
         FileError: the folder cannot be made, or a file cannot be written.
@@ -61,7 +61,7 @@ def draw_plan(
     """Draw the best grasps of a plan, where all of them touch the object, and the opposition zones of the hand.
 
     Args:
-        plan: the grasps. hand, obj: what was planned for.
+        plan: the grasps. hand, obj: the hand and object of the plan.
         directory: an existing folder; `grasps.png`, `contacts.png` and `zones.png` are written there.
         held: whether each grasp held the object when it was tried; None: not tried.
 

@@ -33,16 +33,16 @@ _PANEL: Final = 400
 _GAP: Final = 22
 _TOP: Final = 78
 _BOTTOM: Final = 96
-#: Part of a panel that the object fills, next to what would fit: axes and scale stay clear of it [-].
+#: Share of a panel that the object fills, so that axes and scale stay clear of it [-].
 _FILLED: Final = 0.86
-#: How much the light and shade of the object is weakened, so that the heat shows [-].
+#: Reduction of the object's light and shade, so that the heat shows [-].
 _EVEN: Final = 0.5
 #: A contact warms the surface around it: standard deviation [m], and where that ends [m].
 _SPREAD: Final = 8e-3
 _END: Final = 3.0 * _SPREAD
 #: Colours of the share of grasps, from none upwards.
 _HEAT: Final = ("#ece5d6", "#f3c98b", style.CONTACT, "#6e1a00")
-#: How contacts are marked.
+#: Marks of contacts.
 _FINGER: Final[dict[str, Any]] = {"marker": "o", "ms": 4.5, "mfc": style.INK, "mec": style.PAPER, "mew": 0.8}
 _THUMB: Final[dict[str, Any]] = {"marker": "s", "ms": 5.5, "mfc": style.JOINT_COLORS[0], "mec": style.PAPER, "mew": 0.8}
 
@@ -50,11 +50,11 @@ _THUMB: Final[dict[str, Any]] = {"marker": "s", "ms": 5.5, "mfc": style.JOINT_CO
 def draw_contacts(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path) -> Path:
     """Write the object from six sides, coloured by the share of the grasps that touch near each place.
 
-    Every contact counts fully where it is, and less around: exp(-d²/2s²) with s = 8 mm. Of several contacts of a grasp
-    the nearest counts. The other side of a thin wall stays cold.
+    Every contact counts fully at its place, and less around it: exp(-d²/2s²) with s = 8 mm. Among several contacts of a
+    grasp, the nearest counts. The other side of a thin wall stays cold.
 
     Args:
-        plan: the grasps. hand, obj: what was planned for. path: of the file.
+        plan: the grasps. hand, obj: the hand and object of the plan. path: of the file.
 
     Raises:
         FileError: the file cannot be written, or no figure has its ending.
@@ -101,7 +101,7 @@ class _Touches:
 
     @classmethod
     def of(cls, contacts: Sequence[Contact], bodies: set[str], hand: Hand) -> _Touches:
-        """Take those that last and are on bodies of these names."""
+        """Take the contacts that last and are on bodies of these names."""
         kept = [c for c in contacts if not c.passed and c.body in bodies]
         thumbs = {finger.name for finger in hand.fingers if finger.is_thumb}
         return cls(
@@ -173,7 +173,7 @@ def _painted(picture: Picture, colors: FloatArray) -> Image:
 
 
 def _dots(axes: Axes, touches: Sequence[_Touches], picture: Picture, camera: Camera) -> None:
-    """Mark the contacts that are seen, those of thumbs in another way."""
+    """Mark the visible contacts, with another mark for thumbs."""
     for of_thumb, mark in ((False, _FINGER), (True, _THUMB)):
         points = np.concatenate([np.empty((0, 3)), *(t.point[t.of_thumb == of_thumb] for t in touches)])
         shown = points[~picture.hides(camera, points)]

@@ -94,7 +94,7 @@ def draw_plane(axes: Axes, scene: PlaneScene, *, small: bool = False) -> None:
     """Draw section, links, joints and contacts of one plane, in millimetres.
 
     Args:
-        axes: drawn on. scene: what to draw. small: leave out what a small panel cannot show.
+        axes: drawn on. scene: the scene. small: leave out details that a small panel cannot show.
     """
     for obstacle in (True, False):
         curves = [c.loop for c in scene.section if c.obstacle is obstacle]
@@ -165,7 +165,7 @@ def _body(axes: Axes, loops: Sequence[Loop], fill: str, edge: str, width: float,
 
 
 def _motion(axes: Axes, joint: JointMotion, links: Sequence[LinkSection]) -> None:
-    """Draw a joint's range of motion as an arc from open to limit, and what it used of it as a wedge."""
+    """Draw a joint's range of motion as an arc from open to limit, and the used part as a wedge."""
     from matplotlib.patches import Wedge
 
     color = style.joint_color(joint.position)
@@ -267,14 +267,14 @@ def _numbers(axes: Axes, contacts: Sequence[PlaneContact], distance: float) -> N
 
 
 def set_name(candidate: Candidate) -> str:
-    """Return what a set is called in titles."""
+    """Return the name of a set in titles."""
     return "full width" if candidate.plane is None else f"plane {candidate.plane + 1}"
 
 
 def _explain(
     figure: Figure, scenes: FingerScenes, shown: Sequence[PlaneScene], result: FingerResult, left: float
 ) -> None:
-    """Write the column on the right: joints, contacts, the chosen set, and what the marks mean."""
+    """Write the column on the right: joints, contacts, the chosen set, and the legend."""
     height = figure.get_figheight() * style.DPI
     top = height - 62.0
 

@@ -25,9 +25,9 @@ from .plane_scene import JointMotion, LinkSection, PlaneContact, PlaneScene, Sec
 _SHORT: Final = 1e-3
 #: Contacts this close to a plane are drawn on it [m].
 _ON_PLANE: Final = 2e-6
-#: Contacts between the planes this close to each other share a plane where nobody sees the difference [m].
+#: Contacts between the planes share a plane within this distance, which is invisible [m].
 _NEARLY: Final = 1e-4
-#: The distance to drawn borders that nobody sees [m].
+#: A smaller distance to drawn borders is invisible [m].
 _UNSEEN: Final = 2e-5
 #: A plane in which a flat side of link or object lies cuts nothing there; this far beside it, it does [m].
 _ASIDE: Final = 1e-6
@@ -73,7 +73,7 @@ class FingerScenes:
         self.closed = _posture(self.hand, self.solution, {**self.solution.open_angles, **candidate.joint_angles})
         self.poses_closed = self.hand.link_poses(self.closed)
         self.frames = [self._frame_now(f) for f in range(len(self.plan.families))]
-        # Of every family: the curl planes of the finger, then those through contacts that lie on none of them.
+        # Per family: the curl planes of the finger, then planes through contacts that lie on no curl plane.
         self.offsets = [f.offsets for f in self.plan.families]
         listed = self.solution.contacts
         numbers = [listed.index(c) if c in listed else i for i, c in enumerate(candidate.contacts)]
@@ -133,7 +133,7 @@ class FingerScenes:
         near = laid and abs(offsets[nearest] - y) <= _NEARLY
         if near and self._missed_by(contact, family, place, float(offsets[nearest])) <= _UNSEEN:
             return nearest
-        # Coarse, so that the plane through the contact itself is taken unless one beside it is clearly better.
+        # A coarse score: the plane through the contact itself wins unless a neighbouring plane is clearly better.
         aside = min(
             (0.0, _ASIDE, -_ASIDE), key=lambda step: round(self._missed_by(contact, family, place, y + step), 4)
         )
@@ -162,7 +162,7 @@ class FingerScenes:
     def touched_planes(self, most: int) -> list[tuple[int, int]]:
         """Return (family, plane) pairs worth a picture, at most `most`: where the set touches, and every family.
 
-        Planes with contacts that last until the end come first, then those with most contacts.
+        Planes with contacts that last until the end come first, then planes with the most contacts.
         """
         result: list[tuple[int, int]] = []
         for family in range(len(self.plan.families)):
@@ -211,7 +211,7 @@ class FingerScenes:
         return tuple(curves)
 
     def _palm(self, family: int, offset: float) -> tuple[Loop, ...]:
-        """Cut what stands still beside the family's links: fixed links, and links of this finger before its joints."""
+        """Cut the fixed shapes beside the family's links: fixed links, and links of this finger before its joints."""
         if family == 0 and offset in self._palms:
             return self._palms[offset]
         still = set(self.hand.fixed_links) | {i for i in self.plan.finger.links if i not in self.moved_by}
@@ -236,7 +236,7 @@ class FingerScenes:
         return places
 
     def _outlines(self, family: int, plane: int) -> Sequence[LinkOutline]:
-        """Return the outlines of a family's links at the open posture: the plan's, or cut as it cuts its own."""
+        """Return the outlines of a family's links at the open posture: the plan's own, or cut by the same method."""
         chosen = self.plan.families[family]
         if plane < len(chosen.outlines):
             return chosen.outlines[plane]
@@ -264,7 +264,7 @@ class FingerScenes:
         )
 
     def _later_links(self, family: int, offset: float) -> list[LinkSection]:
-        """Cut the links that joints of later families move, where they are at the end."""
+        """Cut the links that joints of later families move, at the end posture."""
         T_family_palm = invert(self.frames[family])
         sections = []
         for i, joint in self.moved_by.items():

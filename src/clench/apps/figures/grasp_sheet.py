@@ -51,7 +51,7 @@ def draw_grasps(plan: GraspPlan, hand: Hand, obj: GraspObject, path: Path, held:
     """Write a sheet of the best grasps of a plan, at most `MOST_GRASPS`, all at one scale.
 
     Args:
-        plan: the grasps. hand, obj: what was planned for. path: of the file.
+        plan: the grasps. hand, obj: the hand and object of the plan. path: of the file.
         held: whether each grasp held the object when it was tried; None: not tried.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Draw what was understood of a hand: joint axes, roles, closing directions and curl planes, from two sides."""
+"""Draw the interpretation of a hand: joint axes, roles, closing directions and curl planes, from two sides."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _TEXT: Final = 450
 #: Half the length at which an axis is drawn, as a share of the hand's size [-].
 _AXIS: Final = 0.045
-#: How far the palm's normal is drawn, as a share of the hand's size [-].
+#: Drawn length of the palm's normal, as a share of the hand's size [-].
 _NORMAL: Final = 0.18
 _STEPS: Final = 24
 _PLANES: Final = 3
@@ -41,7 +41,7 @@ _PALE: Final = 0.35
 
 @dataclass(frozen=True, eq=False)
 class FingerMap:
-    """Hold what is drawn of a finger, in the palm frame [m].
+    """The drawn geometry of a finger, in the palm frame [m].
 
     Args:
         finger: which. axes: of every own joint, from and to, shape (n, 2, 3). base: the first closing joint, (3,).
@@ -123,7 +123,7 @@ def _in_planes(hand: Hand, finger: Finger, source: CollisionSource, path: FloatA
 
 
 def _directions(hand: Hand, maps: list[FingerMap]) -> tuple[list[FloatArray], FloatArray]:
-    """Return from where the hand is seen, a little aslant of its palm and of its side, and what is up."""
+    """Return the viewing direction of the hand, oblique to its palm and its side, and the up direction."""
     fingers = [m for m in maps if not m.finger.is_thumb] or maps
     stretch = np.mean([m.paths[:, 0].mean(axis=0) - m.base for m in fingers], axis=0)
     return palm_views(hand.palm_normal, stretch)

@@ -17,7 +17,7 @@ _AROUND = 48
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Hold a curve: points [m], shape (N, 2), and whether it ends where it starts."""
+    """A curve: points [m], shape (N, 2), and whether it is closed."""
 
     points: FloatArray
     closed: bool

@@ -1,4 +1,4 @@
-"""What a curl plane shows at the end of a finger's closing: a plain value, drawn elsewhere."""
+"""The scene of a curl plane at the end of a finger's closing: a plain value, drawn elsewhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .loops import Loop
 
 @dataclass(frozen=True, eq=False)
 class SectionCurve:
-    """Hold one curve of the object's section: the loop, and whether it is of an obstacle."""
+    """One curve of the object's section: the loop, and whether it is of an obstacle."""
 
     loop: Loop
     obstacle: bool
@@ -23,7 +23,7 @@ class SectionCurve:
 
 @dataclass(frozen=True, eq=False)
 class LinkSection:
-    """Hold the section of one link: its name, the joint (index in the plan) that moves it, and its borders."""
+    """The section of one link: its name, the joint (index in the plan) that moves it, and its borders."""
 
     name: str
     joint: int
@@ -70,14 +70,14 @@ class PlaneContact:
 
 @dataclass(frozen=True, eq=False)
 class PlaneScene:
-    """Hold everything that one plane shows.
+    """The content of the picture of one plane.
 
     Args:
         family, plane: which plane, as in `PlaneContact`. place: which one, in words. offset: along y [m].
         section: of the object. palm: loops of the links that do not move.
         open_links, closed_links: sections of the links that the family's joints move.
         joints: of this family, palm side first.
-        contacts: those of the set that lie on this plane; others: those that lie on other planes of the family.
+        contacts: contacts of the set on this plane. others: contacts on other planes of the family.
     """
 
     family: int

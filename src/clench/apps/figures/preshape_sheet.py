@@ -52,7 +52,7 @@ def draw_preshapes(
     Args:
         figure: to draw in. hand: the hand. preshapes: to draw. source: geometry to draw.
         directions: from the hand to the viewer; every preshape is seen from where its axis shows best.
-        above: what is up.
+        above: the up direction.
     """
     if not preshapes:
         return

@@ -1,4 +1,4 @@
-"""Draw a finger's alternative sets side by side: what every curl plane gives alone, and which set was chosen."""
+"""Draw a finger's alternative sets side by side: the result of every curl plane alone, and the chosen set."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
 
 
 def _frame(axes: Axes, chosen: bool) -> None:
-    """Replace an axes' ticks and spines, which cost more to draw than what is in it, by a border."""
+    """Replace an axes' ticks and spines by a border: they take longer to draw than its content."""
     from matplotlib.patches import Rectangle
 
     axes.set_axis_off()
@@ -150,7 +150,7 @@ def _short(names: list[str]) -> list[str]:
 
 
 def _verdict(candidate: Candidate) -> list[str]:
-    """Return up to two lines: how the set scores, and what is known of its overlap."""
+    """Return up to two lines: the scores of the set, and its known overlap."""
     scores = "  ".join(
         f"{name.replace('_', ' ')} {value:.3g}{_UNITS.get(name, '')}" for name, value in candidate.scores.items()
     )

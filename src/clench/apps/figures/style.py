@@ -44,7 +44,7 @@ def check_figure(path: Path) -> None:
     """Refuse a file to which no figure can be written, before anything is drawn.
 
     Raises:
-        FileError: nothing can be written there, or no figure has its ending.
+        FileError: the file cannot be written, or its ending is no figure's.
     """
     check_writable(path)
     format_of_figure(path)

@@ -26,7 +26,7 @@ _BOTTOM: Final = 60
 
 
 def palm_views(normal: FloatArray, stretch: FloatArray) -> tuple[list[FloatArray], FloatArray]:
-    """Return from where a hand is seen, a little aslant of its palm and of its side, and what is up.
+    """Return the viewing direction of a hand, oblique to its palm and its side, and the up direction.
 
     Args:
         normal: of the palm, unit, shape (3,). stretch: along the fingers, shape (3,).
@@ -76,7 +76,7 @@ def show(axes: Axes, image: Image, size: tuple[int, int]) -> None:
 
 
 def frame_axes(axes: Axes, camera: Camera, height: int = VIEW[1]) -> None:
-    """Draw the directions of the axes of the frame of what is drawn in the lower left corner of so high a view."""
+    """Draw the axes of the scene's frame in the lower left corner of a view of the given height."""
     origin = np.array([46.0, height - 46.0])
     for name, axis in zip("xyz", np.eye(3), strict=True):
         step = 32.0 * np.array([axis @ camera.right, -(axis @ camera.up)])

@@ -1,4 +1,4 @@
-"""Draw what changing one weight changes: the criteria of the chosen sets, and the grasp at either end."""
+"""Draw the effect of one weight: the criteria of the chosen sets, and the grasp at either end."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def sweep_weight(
     """Solve once for every weight of a criterion; the command's other weights stay.
 
     Args:
-        hand, obj, command: what is solved; the command's criteria are weights by name. criterion: whose weight changes.
+        hand, obj, command: the problem; the command's criteria are weights by name. criterion: whose weight changes.
         weights: at least two.
 
     Raises:
@@ -67,7 +67,7 @@ def draw_sweep(
     """Write a figure of two criteria over the weight of the first, and of the grasps at the first and the last weight.
 
     Args:
-        hand, obj: what was solved. solutions: of `sweep_weight`, one for every weight. criteria: the one whose weight
+        hand, obj: hand and object. solutions: of `sweep_weight`, one for every weight. criteria: the one whose weight
             changed, and one that pays for it. weights: above 0, rising. path: the PNG file.
     """
     figure = style.new_figure(*_SIZE)

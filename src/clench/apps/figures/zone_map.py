@@ -32,8 +32,8 @@ _COLORS: Final = "viridis"
 def draw_zones(hand: Hand, path: Path) -> Path:
     """Write a picture of the opposition zones of a hand's preshapes, from two sides, on the open hand.
 
-    Of every preshape and every step of aperture the zone that opposes best is drawn: a line from pad to pad, and a dot
-    at its middle, coloured by the aperture.
+    For every preshape and every step of aperture, the zone that opposes best is drawn. A line runs from pad to pad, and
+    a dot marks its middle, coloured by the aperture.
 
     Args:
         hand: the hand. path: of the file.

@@ -1,1 +1,1 @@
-"""Collision: where a posed hand overlaps an object, how far it is from it, and which paths are free."""
+"""Measure collisions: overlap of a posed hand with an object, distance from it, and free paths."""

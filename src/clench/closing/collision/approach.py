@@ -35,11 +35,11 @@ def approach_poses(
 ) -> list[Pose]:
     """Draw poses of the palm, `T_world_palm`, from which the open hand can close around an object.
 
-    A point of the graspable surface is drawn by area; the palm's centre is put over it with the palm's normal into the
-    surface, tilted by up to 30 degrees, and rolled at random. The open hand comes in along its normal until it first
-    touches the object, and is backed off by 1 to 25 mm. A pose from which it touches an obstacle first is drawn again.
-    If every one of 100 draws touches an obstacle first, as around a sheet of paper on a table, the pose is the one that
-    the obstacle stopped nearest to the surface. The first poses are the same for every `count`.
+    Each pose starts from a random point of the graspable surface, drawn by area. The palm's centre is put over the
+    point. The palm's normal points into the surface, tilted by up to 30 degrees, and the roll is random. The open hand
+    comes in along its normal until it first touches the object, and is backed off by 1 to 25 mm. A pose from which it
+    touches an obstacle first is drawn again. If all of 100 draws touch an obstacle first, as around a sheet of paper on
+    a table, the draw that got nearest to the surface gives the pose. The first poses are the same for every `count`.
 
     Args:
         hand: the hand, with its default collision source.
@@ -51,7 +51,7 @@ def approach_poses(
     Raises:
         CommandError: a negative count or seed, an angle that is not finite.
         UnknownNameError: a joint of the preshape that does not exist.
-        ObjectError: no graspable surface, or no free pose found.
+        ObjectError: the object has no graspable surface, or no free pose was found.
     """
     if count < 0:
         raise CommandError(f"approach poses: expected a count of 0 or more, got {count}.")
@@ -70,7 +70,7 @@ def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, 
     T_world_object = obj.pose.matrix
 
     def drawn(number: int) -> Pose:
-        # One stream per pose, so that no pose depends on how many others are drawn or how often they were drawn anew.
+        # One random stream per pose, so that no pose depends on the number of poses or of repeated draws.
         rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence((seed, number))))
         return Pose.from_matrix(T_world_object @ _draw(rng, hand, q, packed, surface, obj.name))
 
@@ -80,7 +80,7 @@ def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, 
 class GraspableSurface:
     """Draw points of the graspable surface by area.
 
-    `triangles` are those of the full tree; `shares` sums their areas up to each, as parts of the whole.
+    `triangles` are indices of the full tree; `shares` are their cumulative shares of the area.
 
     Raises:
         ObjectError: no graspable surface.

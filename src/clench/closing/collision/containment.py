@@ -36,7 +36,7 @@ def contained_link(
 
     Args:
         hand: the hand. q: angles of all its joints [rad], shape (J,). packed: the object.
-        T_palm_object: where it is, shape (4, 4). source: geometry of the hand. links: which links.
+        T_palm_object: pose of the object, shape (4, 4). source: geometry of the hand. links: which links.
     """
     from clench.kernels.geometry.link_meshes import find_contained
 
@@ -64,7 +64,7 @@ def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked
 
 @kept_by_identity(_KEPT_HANDS)
 def _nested(hand: Hand, source: CollisionSource, checked: np.ndarray) -> dict[bytes, tuple[int, int] | None]:
-    """Return what `link_within_link` has found, by posture."""
+    """Return the cached nested links, by posture."""
     return {}
 
 

@@ -1,4 +1,4 @@
-"""How deep every link of a posed hand overlaps an object, and how far back the hand must go to be free."""
+"""Measure how deep every link of a posed hand overlaps an object, and the retreat that frees the hand."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _KEPT_HANDS: Final = 16
 
 @dataclass(frozen=True)
 class LinkDepth:
-    """Hold how deep one link overlaps the object.
+    """The penetration of one link into the object.
 
     Args:
         link: index of the link in the hand.
         depth: [m], 0 when disjoint or just touching.
         place: the deepest point in the object's frame [m], shape (3,); None when the depth is 0.
-        at_least: the link lies inside with all of its size; how much deeper is not measured.
+        at_least: the link lies inside completely; the further depth is not measured.
     """
 
     link: int
@@ -60,8 +60,8 @@ def hand_depths(
     """Return the depth of penetration of every link that has a shape (docs/method.md section 5).
 
     Round shapes are inscribed polyhedra, so their depth is too small by at most `TESSELLATION_DEVIATION` for each side.
-    Depths up to the size of the link (the diameter of a ball around it) are exact. A link that is deeper gets that
-    depth, and the place of a point that is as deep: far inside an object of metres an exact depth takes seconds.
+    Depths up to the size of the link (the diameter of a ball around it) are exact. A deeper link gets the depth of its
+    size, and a point at that depth: far inside an object of metres, an exact depth takes seconds.
 
     Args:
         hand: the hand.
@@ -89,7 +89,7 @@ def hand_depths(
 
 
 def mesh_mask(meshes: LinkMeshArrays, links: Collection[int]) -> NDArray[np.int64]:
-    """Return which meshes are those of the given links, shape (M,)."""
+    """Return a mask of the meshes that belong to the given links, shape (M,)."""
     wanted = set(links)
     return np.array([link in wanted for link in meshes.link.tolist()], dtype=np.int64)
 
@@ -171,10 +171,10 @@ def retreat_distance(
     T_palm_object: FloatArray,
     source: CollisionSource | None = None,
 ) -> float:
-    """Return how far back along its palm normal the hand is free, from there all the way out [m].
+    """Return the retreat along the palm normal from which on the hand is free [m].
 
-    It is found from outside: the hand comes in along the normal from where it is clear, up to its first touch. 0 when
-    it gets to where it is without touching.
+    The search starts outside: the hand comes in along the normal from a clear position, up to its first touch. The
+    distance is 0 if the hand reaches its pose without touching.
     """
     T = np.array(T_palm_object, dtype=np.float64)
     outside = clear_distance(hand, q, packed, T, source)

@@ -1,4 +1,4 @@
-"""The object's surface where it is touched: its outward normals, and whose it is."""
+"""The object's surface for contact reading: outward normals, and the body of each triangle."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def round_arrays(packed: PackedObject) -> RoundArrays:
 
 @kept_while_alive
 def object_surface(packed: PackedObject) -> SurfaceArrays:
-    """Return what reading touches needs of an object."""
+    """Return the object's data for contact reading."""
     from clench.kernels.closing.contact_reading import SurfaceArrays
 
     graspable = [role is BodyRole.GRASPABLE for role in packed.body_roles]

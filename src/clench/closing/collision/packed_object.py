@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
 _KEPT_HANDS: Final = 16
-#: Memory for objects that stay packed, unless `set_object_cache` says otherwise [bytes].
+#: Default memory for objects that stay packed, see `set_object_cache` [bytes].
 OBJECT_CACHE: Final = 512_000_000
 ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
 #: Number of each kind of round shape in `RoundShapes.kind`.
@@ -37,7 +37,7 @@ ROUND_KINDS: Final = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLIN
 
 
 class RoundShapes(NamedTuple):
-    """Hold the round shapes of an object, whose sections are exact curves.
+    """The round shapes of an object, whose sections are exact curves.
 
     Args:
         kind: `ROUND_KINDS`, shape (M,).
@@ -54,7 +54,7 @@ class RoundShapes(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PackedObject:
-    """Hold what the kernels read of an object, in its own frame; it never moves and never changes.
+    """The object data that the kernels read, in the object's own frame. It never moves and never changes.
 
     Args:
         tree: triangles of meshes and boxes.
@@ -116,10 +116,10 @@ def pack_object(obj: GraspObject) -> PackedObject:
 
 
 def set_object_cache(size: int) -> None:
-    """Set how many bytes of packed objects stay in memory, 512 MB by default; those used last stay.
+    """Set the memory for packed objects [bytes], 512 MB by default; the latest ones stay.
 
     The first solve with an object packs its triangles into trees, which takes some ten milliseconds. Later solves use
-    what is kept. A mesh takes about 200 bytes per triangle. The object used last stays, however large it is.
+    the packed object. A mesh takes about 200 bytes per triangle. The object used last stays, however large it is.
 
     Args:
         size: [bytes]; 0 keeps the last object alone.
@@ -133,7 +133,7 @@ def set_object_cache(size: int) -> None:
 
 
 def role_body(obj: GraspObject, role: BodyRole) -> BodyArrays:
-    """Return the bodies of one role as one body, in the object's frame; kept like what `pack_object` returns."""
+    """Return the bodies of one role as one body, in the object's frame; cached like the results of `pack_object`."""
     source = CollisionSource(obj.collision_source)
     found: BodyArrays = _packed.get((obj.bodies, source, role), partial(_pack_role, obj.bodies, source, role))
     return found
@@ -182,7 +182,7 @@ def hash_hand(hand: Hand, source: CollisionSource) -> str:
 
 
 #: The object asked for last, found by identity: comparing bodies by value costs tens of microseconds. One tuple, so
-#: that threads that replace it at once see one or the other.
+#: that concurrent threads read either the old or the new entry.
 _latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", None)
 
 
@@ -201,7 +201,7 @@ def packed_size(packed: PackedObject | BodyArrays) -> int:
     return sum(found.values())
 
 
-#: What is packed, by bodies and collision source, and the bodies of one role.
+#: Packed objects, by bodies and collision source, and the bodies of one role.
 _packed: Final[KeptBySize[Any]] = KeptBySize(OBJECT_CACHE, packed_size)
 
 
@@ -220,7 +220,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     held = _corners(full_tree, np.isin(full_tree.body, graspable))
     center = _middle(held)
     away = np.linalg.norm(_corners(full_tree, slice(None)) - center, axis=1)
-    # With `engine` every mesh became a convex hull, which is closed whatever the mesh was.
+    # With `engine` every mesh became a convex hull, which is always closed.
     closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
     return PackedObject(
         tree=tree,

@@ -60,8 +60,8 @@ class PathOverlap:
         place: number of the way-point before it, plus the share of the way to the next one.
         link: name of a link. other: name of the other link, or of the body of the object.
         with_object: whether `other` is a body of the object.
-        depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm. Not
-            a number where they rub against each other for so long that the proof was given up.
+        depth: how deep the two overlap there [m]; between two looks at a path an overlap may have grown by 10 µm. Not a
+            number if the two rub against each other for so long that the check gave up.
         position: place in the palm's frame [m]; None where the overlap is too shallow to locate.
         from_start: whether the two overlap where the path begins, and go deeper.
     """
@@ -76,7 +76,7 @@ class PathOverlap:
 
     @property
     def sentence(self) -> str:
-        """One sentence without a full stop, e.g. "'thumb_tip' would overlap 'index_tip' by 3.2 mm"."""
+        """The overlap as a sentence without a full stop, e.g. "'thumb_tip' would overlap 'index_tip' by 3.2 mm"."""
         what = f"the object's '{self.other}'" if self.with_object else f"'{self.other}'"
         if np.isnan(self.depth):
             return f"'{self.link}' moves along {what} for so long that it cannot be proven that they stay apart"
@@ -95,10 +95,10 @@ def find_path_overlap(
     """Return the first overlap on a path of the whole hand; None proves that the path is free.
 
     Every link is checked against every other link and against the object with its obstacles, over the whole path. The
-    exact sweep goes on until two bodies touch. From there, steps are so short that the bodies cannot overlap by more
-    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs_for`) are left out. A
-    pair that overlaps where the path begins may stay as deep as it was since, until it is apart. A soft pad may be
-    indented by the object as far as the hand file says.
+    exact sweep continues until two bodies touch. From there, steps are so short that the bodies cannot overlap by more
+    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs_for`) are left out. A pair that
+    overlaps at the start of the path may keep that depth until it separates. A soft pad may be indented by the object
+    as far as the hand file says.
 
     Args:
         hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.
@@ -227,7 +227,7 @@ def _problem(
 
 @dataclass(frozen=True, eq=False)
 class _Tables:
-    """Hold what is the same for every path of a hand; see `PathProblem`. `between` are the pairs without the object."""
+    """The data of a hand that all its paths share; see `PathProblem`. `between` are the pairs without the object."""
 
     mesh: NDArray[np.int64]
     lineage: NDArray[np.int64]

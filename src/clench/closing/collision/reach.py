@@ -1,4 +1,4 @@
-"""How far a posed finger is from an object, and whether closing could bring it there at all."""
+"""Measure the distance of a posed finger from an object, and test whether closing can reach the object."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _KEPT_PLANS: Final = 256
 
 
 def graspable_body(obj: GraspObject, packed: PackedObject) -> BodyArrays:
-    """Return what is to be grasped of an object as one body, in the object's frame; obstacles are left out."""
+    """Return the graspable bodies of an object as one body, in the object's frame, without obstacles."""
     if all(role is BodyRole.GRASPABLE for role in packed.body_roles):
         return packed.bodies
     return role_body(obj, BodyRole.GRASPABLE)
@@ -51,8 +51,8 @@ def nearest_link(
     Exact but for cylinders and ellipsoids, which count as the polyhedra that are swept (docs/method.md section 5).
 
     Args:
-        hand: the hand. q: angles of all its joints [rad], shape (J,). links: indices of those that count.
-        source: their geometry. target: see `graspable_body`. T_palm_target: where it is, shape (4, 4).
+        hand: the hand. q: angles of all its joints [rad], shape (J,). links: indices of the links that count.
+        source: their geometry. target: see `graspable_body`. T_palm_target: its pose, shape (4, 4).
     """
     from clench.kernels.geometry.smallest_gap import smallest_gap
 
@@ -102,7 +102,7 @@ def beside(
 
 
 class _Room(NamedTuple):
-    """Hold what bounds all places that closing takes a finger to, in the palm frame.
+    """Bounds of all places that closing can bring a finger to, in the palm frame.
 
     Args:
         pivot: anchor of the first closing joint, as a body. reach: no point gets farther from it [m].

@@ -1,4 +1,4 @@
-"""Check a hand before it is used: what loading found, links that overlap when it is open, thumbs."""
+"""Check a hand before its use: findings of the loader, links that overlap in the open hand, thumbs."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _KEPT_HANDS: Final = 16
 
 
 def warn_of_size(hand: Hand, obj: GraspObject) -> bool:
-    """Warn, once per object, when what is to be grasped is far larger than the hand, and return whether it is."""
+    """Warn, once per object, if the grasp target is far larger than the hand, and return whether it is."""
     across, size = 2.0 * pack_object(obj).size, hand_size(hand)
     if not across > FAR_LARGER * size > 0.0:
         return False

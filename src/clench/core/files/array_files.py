@@ -28,7 +28,8 @@ def read_array(path: str | Path) -> NDArray[Any]:
     """Return the array of an npy file whose values are plain numbers.
 
     Raises:
-        FileError: missing, no regular file, too large, no npy file, not all there, or other values than real numbers.
+        FileError: the file is missing, no regular file, too large, no npy file, incomplete, or has values other than
+            real numbers.
     """
     try:
         _check_regular(path, "NumPy file (.npy)")
@@ -50,7 +51,8 @@ def read_arrays(path: str | Path, names: Iterable[str]) -> dict[str, NDArray[Any
     The sizes that the archive and the headers claim are checked before anything is unpacked.
 
     Raises:
-        FileError: missing, no regular file, no npz file, too large, damaged, or with other values in these arrays.
+        FileError: the file is missing, no regular file, no npz file, too large, damaged, or has other values in these
+            arrays.
     """
     try:
         _check_regular(path, "NumPy archive (.npz)")
@@ -76,7 +78,7 @@ def read_arrays(path: str | Path, names: Iterable[str]) -> dict[str, NDArray[Any
 
 
 def _check_regular(path: str | Path, expected: str) -> None:
-    """Refuse what is no regular file: a pipe or a device may never end."""
+    """Refuse irregular files: reading a pipe or a device may never end."""
     if not os.path.isfile(path):
         raise FileError(path, f"no such file; expected a {expected}.")
 

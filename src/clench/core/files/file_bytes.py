@@ -1,4 +1,4 @@
-"""Read files whole: whatever is no readable file becomes one sentence."""
+"""Read whole files; every failure becomes one sentence."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from clench.core.errors import CommandError, FileError
 
 
 def read_file(path: str | Path, most: int, missing: str = "no such file.") -> bytes:
-    """Return what a file has.
+    """Return the content of a file.
 
     Args:
         path: the file. most: the largest size that is read [bytes], see `file_limits`.
-        missing: what to say where there is no file.
+        missing: message for a missing file.
 
     Raises:
         FileError: missing, a folder, a pipe or a device, too large, or unreadable.
@@ -48,7 +48,7 @@ def expanded(path: str | Path) -> Path:
     """Return a path with the home folder in place of its `~`, where that is known.
 
     Raises:
-        CommandError: neither text nor a path.
+        CommandError: the value is neither text nor a path.
     """
     if not isinstance(path, str | os.PathLike):
         raise CommandError(f"path: expected text or a pathlib.Path, got {type(path).__name__}.")
@@ -75,10 +75,10 @@ def _too_large(size: int, most: int) -> str:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Make a folder, with those above it, where it is not there; return its path.
+    """Create a folder, with its parents, if it is missing; return its path.
 
     Raises:
-        FileError: it cannot be made. CommandError: neither text nor a path.
+        FileError: it cannot be made. CommandError: the value is neither text nor a path.
     """
     folder = expanded(path)
     try:

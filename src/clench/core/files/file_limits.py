@@ -1,6 +1,6 @@
-"""The largest files that are read, and what may be inside them; docs/security.md lists these limits.
+"""The largest files that are read, and limits on their content; docs/security.md lists them.
 
-They are far above what hands, objects and grasps need. A larger file is refused with one sentence.
+They are far above the needs of hands, objects and grasps. A larger file is refused with one sentence.
 """
 
 from __future__ import annotations

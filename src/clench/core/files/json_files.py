@@ -1,4 +1,4 @@
-"""Read and write JSON files: complete or not there, and never with NaN."""
+"""Read and write JSON files: complete or absent, and never with NaN."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def parse_json(data: bytes, source: str | Path) -> Any:
-    """Return what JSON says; `source` names it in messages.
+    """Return parsed JSON; `source` names it in messages.
 
     Raises:
         FileError: not JSON, or nested too deeply.

@@ -1,4 +1,4 @@
-"""How deeply values are nested: what is nested too deeply would end a program that walks through it."""
+"""Measure how deeply values are nested: recursion into deeply nested values would end the program."""
 
 from __future__ import annotations
 

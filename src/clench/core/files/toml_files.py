@@ -23,7 +23,7 @@ def read_toml(path: str | Path, missing: str = "no such file.", kind: str = "TOM
     """Return the tables of a TOML file.
 
     Args:
-        path: the file. missing: what to say where there is none. kind: what the file should be, for messages.
+        path: the file. missing: message for a missing file. kind: expected kind of the file, for messages.
 
     Raises:
         FileError: missing, unreadable, too large, or not TOML.

@@ -17,7 +17,7 @@ def read_xml(path: Path, expected: str) -> tuple[ET.Element, int]:
     Entities of other files are never read; the parser refuses entities that grow.
 
     Args:
-        path: the file. expected: what it should be, for messages.
+        path: the file. expected: expected kind of the file, for messages.
 
     Raises:
         FileError: missing, unreadable, too large, not XML, or with too many elements or levels of them.

@@ -17,7 +17,7 @@ _EVENTS: Final = 2
 
 
 def read_yaml(path: str | Path) -> Any:
-    """Return what a YAML file says.
+    """Return the content of a YAML file.
 
     Raises:
         FileError: missing, unreadable, too large, not YAML, or with aliases that stand for too many values.
@@ -45,7 +45,7 @@ def read_yaml(path: str | Path) -> Any:
 
 
 def _check_depth(events: Iterable[Any], path: str | Path) -> None:
-    """Refuse what is nested too deeply, and values too long, before any reader walks through them."""
+    """Refuse deep nesting and long values before any reader walks through them."""
     import yaml
 
     depth = 0

@@ -1,8 +1,8 @@
 """The action of a joint_trajectory_controller (control_msgs/FollowJointTrajectory), through `rclpy`.
 
-Every command is a goal of its own that replaces the one before, as short as commands on the topic: a controller that
-has a whole goal would go on to its end when the line is cut. What the topic does not tell is told: refusals, and
-tolerances that were not kept.
+Every command is a goal of its own that replaces the one before. Goals are as short as commands on the topic: a
+controller with a whole path would move on to its end when the connection is cut. The action reports more than the
+topic: refusals, and tolerances that were not kept.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class ActionLink:
 
     def _ended(self, number: int, future: Any) -> None:
         answer = future.result()
-        # A goal that another one replaced ends in whatever way the controller calls that.
+        # Controllers differ in how they end a goal that another goal replaced.
         if answer.status == ABORTED and number == self._sent:
             why = answer.result.error_string or f"error code {answer.result.error_code}"
             self._trouble = f"'{self._action}' gave up: {why}."

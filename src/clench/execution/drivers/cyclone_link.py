@@ -13,7 +13,7 @@ from clench.execution.hardware.driver import DriverError
 from .ros2 import JointStates, on_this_machine_only
 
 QUEUE = 10
-#: States that are read at once.
+#: States per read.
 WAITING = 200
 _TRAJECTORY_TYPE = "trajectory_msgs::msg::dds_::JointTrajectory_"
 _LOOPBACK = """<CycloneDDS><Domain id="any">
@@ -52,7 +52,7 @@ class CycloneLink:
                 Topic(self._participant, f"rt{topic}", JointTrajectory),
                 qos=quality(reliable=True),
             )
-            # Best effort hears senders of either kind, and the newest state is the only one that counts.
+            # Best effort hears senders of either kind, and only the newest state counts.
             self._reader = DataReader(
                 self._participant,
                 Topic(self._participant, f"rt{state_topic}", JointState),
@@ -91,7 +91,7 @@ class CycloneLink:
             raise DriverError(f"Nothing could be sent on '{self._topic}' ({error.msg}).") from None
 
     def flush(self, timeout: float) -> None:
-        """Wait until what was sent has been received, at most so long [s]."""
+        """Wait until the receiver has got everything sent, at most this long [s]."""
         flush(self._writer, timeout)
 
     def trajectory_topics(self) -> list[str]:
@@ -116,7 +116,7 @@ def prepare_domain(domain: int) -> None:
 
 
 def flush(writer: Any, timeout: float) -> None:
-    """Wait until what was written has been received, at most so long [s]."""
+    """Wait until the receiver has got everything written, at most this long [s]."""
     from cyclonedds.core import DDSException
     from cyclonedds.util import duration
 

@@ -20,7 +20,7 @@ class OrcaDriver:
     """Move an ORCA hand; it speaks degrees, by the names of its `config.yaml`, so a joint map is needed.
 
     Args:
-        config: the hand's `config.yaml`; None: the one that orca-core has for the newest hand.
+        config: the hand's `config.yaml`; None: orca-core's configuration of the newest hand.
         mock: move motors in memory, without hardware.
         version: of the hand, e.g. ``"v1"``, when `config` is not given.
 
@@ -65,7 +65,7 @@ class OrcaDriver:
         """Open the line and switch the motors on, without moving.
 
         Raises:
-            DriverError: no hand answers, or it is not calibrated, which would move every joint to its ends.
+            DriverError: no hand answers, or it is not calibrated: a calibration would move every joint to its ends.
         """
         with _trouble():
             there, message = self._hand.connect(interactive=False)
@@ -83,7 +83,7 @@ class OrcaDriver:
         """
         with _trouble():
             positions = self._hand.get_joint_position().as_dict()
-            # Without an answer orca-core repeats what it read before.
+            # Without an answer, orca-core repeats the last reading.
             if not self._hand.last_read_ok:
                 raise DriverError("The motors of the ORCA hand do not answer.")
         return HandState({name: math.nan if angle is None else float(angle) for name, angle in positions.items()})
@@ -94,15 +94,15 @@ class OrcaDriver:
             self._hand.set_joint_positions(path.at(path.period))
 
     def stop(self) -> None:
-        """Stop the joints where they are.
+        """Stop the joints at their present angles.
 
         Raises:
-            DriverError: the motors do not say where they are; they stand still at the last target.
+            DriverError: the motors do not report their positions; they stand still at the last target.
         """
         with _trouble():
             if self._hand.is_connected():
                 positions = self._hand.get_joint_position()
-                # What was read before may be far from where the joints are now.
+                # The last reading may be far from the present angles.
                 if not self._hand.last_read_ok or None in positions.as_dict().values():
                     raise DriverError("The motors of the ORCA hand do not answer; they hold the last target.")
                 self._hand.set_joint_positions(positions)
@@ -115,7 +115,7 @@ class OrcaDriver:
 
 @contextlib.contextmanager
 def _trouble() -> Iterator[None]:
-    """Turn whatever the hand's own program raises into one sentence."""
+    """Turn any error of the hand's own program into one sentence."""
     try:
         with _quiet():
             yield
@@ -127,7 +127,7 @@ def _trouble() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Drop what orca-core prints in this thread: its failures are raised or returned.
+    """Drop the output of orca-core in this thread: its failures are raised or returned.
 
     Other threads, one of which may stop the hand meanwhile, keep their standard output.
     """
@@ -151,7 +151,7 @@ _quiet_threads: list[int] = []
 
 
 class _Sieve:
-    """Pass on what is written, except by quiet threads."""
+    """Pass on written text, except from quiet threads."""
 
     def __init__(self, out: TextIO) -> None:
         self.out = out

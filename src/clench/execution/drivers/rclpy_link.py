@@ -38,7 +38,7 @@ class RclpyLink:
         #: Our node, for those who reach more than the two topics.
         self.node = self._open.enter_context(joined(domain))
         self._publisher = self.node.create_publisher(JointTrajectory, topic, _quality(reliable=True))
-        # Best effort hears senders of either kind, and the newest state is the only one that counts.
+        # Best effort hears senders of either kind, and only the newest state counts.
         self.node.create_subscription(JointState, state_topic, self._heard, _quality(reliable=False))
         self._executor = SingleThreadedExecutor(context=self.node.context)
         self._executor.add_node(self.node)
@@ -62,7 +62,7 @@ class RclpyLink:
         self._publisher.publish(trajectory_message(joints, times, positions))
 
     def flush(self, timeout: float) -> None:
-        """Wait until what was sent has been received, at most so long [s]."""
+        """Wait until the receiver has got everything sent, at most this long [s]."""
         from rclpy.duration import Duration
 
         self._publisher.wait_for_all_acked(Duration(seconds=timeout))
@@ -123,7 +123,7 @@ def joined(domain: int) -> Iterator[Any]:
 
 @contextmanager
 def clear_import() -> Iterator[None]:
-    """Turn the failure to load what ROS 2 needs into one sentence."""
+    """Turn a failed import of ROS 2 modules into one sentence."""
     try:
         yield
     except (ImportError, OSError, RuntimeError) as error:

@@ -1,8 +1,7 @@
 """ROS 2: a joint_trajectory_controller by its topics, through `rclpy` or, without a ROS installation, `cyclonedds`.
 
 Out: `/<controller>/joint_trajectory` (trajectory_msgs/JointTrajectory), in: `/joint_states` (sensor_msgs/JointState).
-Where a ROS installation has `control_msgs`, the action `/<controller>/follow_joint_trajectory` can take the topic's
-place.
+If a ROS installation has `control_msgs`, the action `/<controller>/follow_joint_trajectory` can replace the topic.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ from clench.core.errors import CommandError, UnknownNameError
 from clench.core.short_repr import described
 from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
-#: In this time a hand that was told to stop is back where it was measured [s].
+#: Within this time, a hand that was told to stop is back at its measured angles [s].
 STOP_TIME: Final = 0.1
 #: State that is older is not where the hand is stopped [s]: it may be far from it by then.
 STOP_AGE: Final = 0.3
-#: How often a connection is looked at while it comes up [s].
+#: Interval between checks of a connection that comes up [s].
 LOOK: Final = 0.02
 
 
 class RosInterface(StrEnum):
-    """Name what ROS 2 is spoken through."""
+    """Name the program interfaces to ROS 2."""
 
     AUTO = "auto"
-    """rclpy where it is installed, else cyclonedds"""
+    """rclpy if installed, else cyclonedds"""
     RCLPY = "rclpy"
     """the client library of a ROS installation"""
     CYCLONEDDS = "cyclonedds"
@@ -58,7 +57,7 @@ class JointStates:
 
 
 class RosLink(Protocol):
-    """Reach two topics; every method returns at once but `flush`."""
+    """Reach two topics; every method except `flush` returns without waiting."""
 
     name: str
 
@@ -72,7 +71,7 @@ class RosLink(Protocol):
         """Send a trajectory that starts when it arrives; times [s], positions [rad] of every point."""
 
     def flush(self, timeout: float) -> None:
-        """Wait until what was sent has been received, at most so long [s]."""
+        """Wait until the receiver has got everything sent, at most this long [s]."""
 
     def trajectory_topics(self) -> list[str]:
         """Return the topics on which somebody listens for trajectories."""
@@ -89,7 +88,7 @@ class Ros2Driver:
 
     Args:
         controller: name of the controller. joint_states: topic of the states.
-        interface: what ROS 2 is spoken through, see `RosInterface`.
+        interface: program interface to ROS 2, see `RosInterface`.
         domain: number of the ROS domain; None: that of the environment, else 0.
 
     Raises:
@@ -118,7 +117,7 @@ class Ros2Driver:
         self._positions: dict[str, float] = {}
         self._received: dict[str, float] = {}
         self._stamps: dict[str, int] = {}
-        #: When, and the path from there on, where it began among its points.
+        #: Time of sending, the path from there on, and its first index among the points.
         self._sent: tuple[float, JointPath] | None = None
 
     def __repr__(self) -> str:
@@ -126,7 +125,7 @@ class Ros2Driver:
 
     @property
     def name(self) -> str:
-        """`ros2`, and what it is spoken through."""
+        """`ros2`, and the interface."""
         return f"ros2 ({self._through})" if self._through else "ros2"
 
     @property
@@ -138,7 +137,7 @@ class Ros2Driver:
         """Wait for a controller that listens and for a first state, at most so long [s].
 
         Raises:
-            CommandError: neither rclpy nor cyclonedds is installed, or not the one that was asked for.
+            CommandError: neither rclpy nor cyclonedds is installed, or the requested one is missing.
             DriverError: no controller listens, or no state comes.
         """
         self.disconnect()
@@ -163,13 +162,13 @@ class Ros2Driver:
             return HandState(dict(self._positions), {name: now - at for name, at in self._received.items()})
 
     def command(self, path: JointPath) -> None:
-        """Send the path; it replaces what the controller is doing.
+        """Send a path that replaces the controller's present one.
 
-        It begins with where the joints were told to be by now: else the controller would go on from where they are
-        measured, which is behind, and step back at every command.
+        The path begins with the present targets of the joints. Otherwise the controller would start from the measured
+        angles, which lag behind, and step back at every command.
 
         Raises:
-            DriverError: nobody listens any more.
+            DriverError: no subscriber is left.
         """
         link = self._connected()
         if not link.listeners():
@@ -203,7 +202,7 @@ class Ros2Driver:
         link.flush(STOP_TIME)
 
     def disconnect(self) -> None:
-        """Leave the network and forget what was read."""
+        """Leave the network and forget the last readings."""
         link, self._link = self._link, None
         if link is not None:
             link.close()
@@ -239,10 +238,10 @@ class Ros2Driver:
 
 
 def open_link(interface: RosInterface, topic: str, state_topic: str, domain: int) -> RosLink:
-    """Join the network through what is installed.
+    """Join the network through an installed interface.
 
     Raises:
-        CommandError: neither rclpy nor cyclonedds is installed, or not the one that was asked for.
+        CommandError: neither rclpy nor cyclonedds is installed, or the requested one is missing.
     """
     chosen = installed_interface(interface)
     if chosen is RosInterface.ACTION:
@@ -259,10 +258,10 @@ def open_link(interface: RosInterface, topic: str, state_topic: str, domain: int
 
 
 def installed_interface(interface: RosInterface) -> RosInterface:
-    """Return what ROS 2 is spoken through: what was asked for, else rclpy before cyclonedds.
+    """Return the interface to ROS 2: the requested one, else rclpy before cyclonedds.
 
     Raises:
-        CommandError: neither is installed, or not the one that was asked for.
+        CommandError: neither is installed, or the requested one is missing.
     """
     found = [name for name, module in _MODULES.items() if importlib.util.find_spec(module)]
     if interface is not RosInterface.AUTO and interface not in found:
@@ -301,7 +300,7 @@ def topic_name(text: str, key: str) -> str:
 
 
 def ros_domain(given: int | None) -> int:
-    """Return the number of the ROS domain: what was given, else that of the environment, else 0.
+    """Return the number of the ROS domain: the argument, else the number in the environment, else 0.
 
     Raises:
         CommandError: not a whole number from 0 to 232.

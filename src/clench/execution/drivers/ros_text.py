@@ -1,4 +1,4 @@
-"""One text on a ROS 2 topic (std_msgs/String), through `rclpy` or, without a ROS installation, `cyclonedds`."""
+"""Publish one text on a ROS 2 topic (std_msgs/String), through `rclpy` or, without a ROS installation, `cyclonedds`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from clench.execution.hardware.driver import DriverError
 
 from .ros2 import LOOK, RosInterface, installed_interface
 
-#: How often a text is sent, and how long after the time before [s].
+#: Number of times that a text is sent, and the pause between them [s].
 TIMES: Final = 3
 SPACING: Final = 0.25
 
@@ -19,7 +19,7 @@ def publish_text(topic: str, text: str, domain: int, timeout: float) -> None:
     """Publish a text, three times, once somebody listens, and wait until it was received, at most so long in all [s].
 
     Raises:
-        CommandError: neither rclpy nor cyclonedds is installed. DriverError: nobody listens.
+        CommandError: neither rclpy nor cyclonedds is installed. DriverError: no subscriber.
     """
     through = installed_interface(RosInterface.AUTO)
     send = _by_rclpy if through is RosInterface.RCLPY else _by_cyclonedds

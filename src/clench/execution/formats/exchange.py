@@ -47,11 +47,11 @@ _ENDINGS = {
 
 @dataclass(frozen=True)
 class ExportReport:
-    """The outcome of an export: the files, and what they lack.
+    """The outcome of an export: the files, and the data that they lack.
 
     Args:
         files: in order. confidences: of the grasps, see `export_grasps`.
-        notes: sentences about what the files lack, each once, with the number of grasps.
+        notes: sentences about missing data, each once, with the number of grasps.
     """
 
     files: tuple[Path, ...]
@@ -78,22 +78,22 @@ def export_grasps(
     """Write grasps in the format of another program (docs/exporting.md).
 
     With hand and object, a pregrasp and a squeeze for every direction of gravity are planned where a solution has none.
-    The confidence of a grasp is 1 where the hold test held, and 0.5 where a squeeze is feasible. It is 0 where no
-    squeeze is feasible, where the test did not hold, where a straight line between the postures is not free, and for a
-    solution that is not valid. A note says why.
+    The confidence of a grasp is 1 where the hold test held, and 0.5 where a squeeze is feasible. It is 0 without a
+    feasible squeeze, after a failed test, without a free straight line between the postures, and for an invalid
+    solution. A note says why.
 
     Args:
         path: the file; for several grasps in the format dexgraspbench, a folder. Folders are made.
         solutions: one, several, or a batch, of which the poses that are grasps are solved again.
         format: see `GraspFormat`; None: by the file's ending. A path without an ending is a folder for dexgraspbench.
-        hand, obj: what the solutions were computed for; those of a batch unless given. Of several objects, a sequence
-            has one for each solution; isaac_grasp takes one object a file.
+        hand, obj: the hand and object that were solved for; the default for a batch is its own. For several objects,
+            pass a sequence with one object per solution; isaac_grasp takes one object per file.
         root: the link whose pose is written, or "world": the frame of the hand's model file. None: "world" for
-            dexgraspbench, which attaches the whole file there; else the palm.
+            dexgraspbench, which attaches the whole file there; the palm for the others.
         name: of the object, instead of its own.
-        hold: a test that every grasp goes through; its squeeze is the one that is written.
-        mass, friction: what the squeeze is planned for, numbers or ranges (least, largest) [kg], [-]; None: as the
-            solution's squeeze, or as the test says.
+        hold: a test that every grasp goes through; the file gets the squeeze of the test.
+        mass, friction: for planning the squeeze, numbers or ranges (least, largest) [kg], [-]; None: values of the
+            solution's squeeze, or of the test.
         stiffness: gain of the servos that will hold the postures, at every joint or tendon [Nm/rad]; None: the model's.
 
     Raises:
@@ -167,7 +167,7 @@ def import_grasps(path: str | Path, format: GraspFormat | str | None = None) -> 
 
 
 def format_of(path: str | Path, given: GraspFormat | str | None = None) -> GraspFormat:
-    """Return the format of a file: the one that is given, else by the ending.
+    """Return the format of a file: the given one, or the one that the ending names.
 
     Raises:
         FileError: the ending names no format. UnknownNameError: no such format.

@@ -1,4 +1,4 @@
-"""What the file formats of other programs have in common: a palm pose and the angles of the joints."""
+"""The shared content of other programs' file formats: a palm pose and the angles of the joints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
 from clench.solver.preshapes.named_angles import posture
 
-#: How files call the frame of the hand's own model file.
+#: Name of the frame of the hand's own model file in files.
 BASE: Final = "world"
 
 
@@ -25,9 +25,9 @@ class GraspPosture:
     Args:
         name: in the file. hand_pose: of the link `root` in the world. object_pose: `T_world_object`.
         joint_angles: [rad] by name, or in the order of the hand's model; empty when the file gives none.
-        confidence: what the file says of its quality, None when nothing.
-        root: a link of the hand, or "world" for the frame of the hand's model file; None, or a name that the hand does
-            not have: the palm.
+        confidence: the file's own number, None if missing.
+        root: a link of the hand, or "world" for the frame of the hand's model file. None, or a name that the hand does
+            not have, is the palm.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Read npy files with one pickled dictionary of arrays; nothing that the file names is called, made or cast.
 
-A pickle is a program. Here it runs on a machine that knows lists, dictionaries, text and numbers. Where NumPy's own
-functions and types are named, inert stand-ins take their place: they keep what they are given, and make arrays only of
-plain numbers whose bytes are all there. All other names and instructions are refused.
+A pickle is a program. Here it runs on a machine that knows lists, dictionaries, text and numbers. Inert stand-ins
+replace NumPy's own functions and types. They keep their arguments, and make arrays only of plain numbers whose bytes
+are all present. All other names and instructions are refused.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class _Dtype:
         self.order = state[1]
 
     def plain(self) -> np.dtype[Any] | None:
-        """Return the type where it is one of plain numbers."""
+        """Return the type if it is a type of plain numbers."""
         found = _NUMERIC.fullmatch(self.code)
         return np.dtype((self.order or found[1]) + found[2]) if found else None
 
@@ -137,7 +137,7 @@ def read_pickled_arrays(content: bytes, source: str) -> dict[str, Any]:
         Lists, dictionaries, text, numbers, and arrays of numbers; `NotNumbers` in the place of all other arrays.
 
     Raises:
-        FileError: no npy file, no dictionary, or a pickle that is damaged or asks for more than arrays.
+        FileError: no npy file, no dictionary, or a pickle that is damaged or contains more than arrays.
     """
     stream = io.BytesIO(content)
     try:

@@ -18,7 +18,7 @@ from .outgoing import OutgoingGrasp, all_of_one
 
 FORMAT: Final = "isaac_grasp"
 VERSION: Final = 1.0
-#: How files write it, as a number or as text.
+#: Spellings in files, as a number or as text.
 _VERSIONS: Final = ("1.0", "1")
 
 

@@ -1,4 +1,4 @@
-"""The log of an execution as MCAP with ROS 2 messages: what was told and measured, the solution, the report."""
+"""Log an execution as MCAP with ROS 2 messages: targets and measurements, the solution, the report."""
 
 from __future__ import annotations
 

@@ -34,14 +34,14 @@ NEITHER: Final = 0.0
 
 @dataclass(frozen=True, eq=False)
 class ExportSettings:
-    """Say what is written of grasps; see `export_grasps`.
+    """The content of an export; see `export_grasps`.
 
     Args:
-        hand, obj: what the solutions were computed for, None when not at hand.
+        hand, obj: the hand and object that were solved for, None if missing.
         root: the link whose pose is written, or "world"; None: the palm. name: of the object; None: its own.
         hold: a test that every grasp goes through, None: none.
-        mass, friction: what the squeeze is planned for, numbers or ranges [kg], [-]; None: what the solution's is, or
-            what the test says.
+        mass, friction: for planning the squeeze, numbers or ranges [kg], [-]; None: values of the solution's squeeze,
+            or of the test.
         stiffness: gain of the servos that will hold the postures [Nm/rad]; None: that of the hand's model.
     """
 
@@ -63,10 +63,10 @@ class OutgoingGrasp:
         solution: with all that could be planned. object_name: of the object.
         frame: the link whose pose is written. T_world_frame: its pose.
         pregrasp, squeezed: angles [rad] of the same joints as the solution's, by name.
-        joints: those that the frame carries, in the order of the hand's model.
-        confidence: 1 held in the test, 0.5 with a feasible squeeze, 0 without, dropped in the test, not valid, or where
-            the straight way from pregrasp to squeeze is not free.
-        notes: sentences about what is missing.
+        joints: joints that the frame carries, in the order of the hand's model.
+        confidence: 1 held in the test; 0.5 with a feasible squeeze; 0 without one, dropped in the test, not valid, or
+            without a free straight line from pregrasp to squeeze.
+        notes: sentences about missing data.
     """
 
     solution: GraspSolution
@@ -86,11 +86,11 @@ class OutgoingGrasp:
 
 
 def outgoing(solution: GraspSolution, settings: ExportSettings) -> OutgoingGrasp:
-    """Complete a solution for a file: plan what it lacks, test it if asked, place the frame, name what is missing.
+    """Complete a solution for a file: plan the missing parts, test it if asked, place the frame, name the gaps.
 
     Raises:
-        CommandError: the solution is of another hand or object, or its pregrasp is outside joints' limits; a root
-            without the hand; a test without both.
+        CommandError: the solution is of another hand or object, its pregrasp is outside joints' limits, a root lacks
+            the hand, or a test lacks the hand or the object.
         UnknownNameError: no such root link; the pregrasp or the squeeze is of a joint that the hand does not have.
     """
     hand, obj = settings.hand, settings.obj
@@ -179,7 +179,7 @@ def _completed(solution: GraspSolution, hand: Hand, obj: GraspObject, settings: 
 def _frame(
     solution: GraspSolution, hand: Hand | None, root: str | None
 ) -> tuple[str, Pose, tuple[str, ...], tuple[str, ...]]:
-    """Return the frame's name and pose, the joints that it carries, and what is to be said of it."""
+    """Return the frame's name and pose, the joints that it carries, and notes about it."""
     if hand is None:
         if root is not None:
             raise CommandError(f"root: the pose of '{root}' cannot be told without the hand.")
@@ -214,7 +214,7 @@ def _missing(solution: GraspSolution) -> tuple[str, ...]:
 def _squeezed(
     solution: GraspSolution, hand: Hand | None, stiffness: float | None
 ) -> tuple[Mapping[str, float], tuple[str, ...]]:
-    """Return what position servos are told to squeeze [rad], and a sentence about joints that cannot be told."""
+    """Return the squeezing targets of position servos [rad], and a sentence about joints without one."""
     plan = solution.squeeze or {}
     offsets, torques = dict(plan.get("offsets") or {}), dict(plan.get("torques") or {})
     if stiffness is not None:
@@ -257,7 +257,7 @@ def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], 
 
 
 def _doubts(solution: GraspSolution) -> Iterator[str]:
-    """Yield what is wrong with a solution whose confidence is 0 without any test."""
+    """Yield the defects of a solution whose confidence is 0 without any test."""
     if not solution.is_valid():
         why = next(iter(solution.violations()), f"its status is '{solution.status.value}'")
         yield f"The solution is not valid: {why.rstrip('.')}."

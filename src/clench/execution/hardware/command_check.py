@@ -14,7 +14,7 @@ from clench.models.hand.reading.tendons import TendonMap
 from .driver import DriverLimits, HandState, JointPath, RefusedCommandError
 from .joint_map import MappedJoint
 
-#: Files, and conversions to other units, round: what limits may be passed by, as a fraction of their range [-].
+#: Files, and conversions to other units, round: allowed excess over limits, as a fraction of their range [-].
 ROUNDING = 1e-6
 #: A joint may be found outside its limits by this much, and is only led back inside [rad].
 MEASURED_OUTSIDE = 0.3
@@ -23,11 +23,11 @@ SHORTEST = 1e-6
 
 
 class NotFollowingError(RefusedCommandError):
-    """Say that a joint is too far from where it was told to be.
+    """Report that a joint is too far from its target.
 
     Args:
-        sentence: one line. joint: the controller's name. told: where it was told to be, and positions: where the joints
-            are, by the controller's names and in its units.
+        sentence: one line. joint: the controller's name. told: targets of the joints. positions: their angles, by the
+            controller's names and in its units.
     """
 
     def __init__(self, sentence: str, joint: str, told: float, positions: Mapping[str, float]) -> None:
@@ -79,7 +79,7 @@ class CommandCheck:
 
     Args:
         limits: of its joints, by its names. max_age: oldest state on which a command may be based [s].
-        max_deviation: how far a joint may be from where it was told to be [rad].
+        max_deviation: largest allowed distance of a joint from its target [rad].
     """
 
     limits: Mapping[str, CommandLimits]
@@ -87,10 +87,10 @@ class CommandCheck:
     max_deviation: float
 
     def state(self, state: HandState, expected: Mapping[str, float] | None = None) -> None:
-        """Check that a state is fresh, complete, finite and not far from what was expected.
+        """Check that a state is fresh, complete, finite and near the targets.
 
         Raises:
-            RefusedCommandError: it is not; the message says in what.
+            RefusedCommandError: a check fails; the message names it.
         """
         for name, limits in self.limits.items():
             age = state.age([name])
@@ -125,11 +125,11 @@ class CommandCheck:
         """Check a path before it is sent.
 
         Args:
-            path: what would be sent. start: where the joints are told to be now.
+            path: the path to send. start: where the joints are told to be now.
 
         Raises:
-            RefusedCommandError: unknown joint, number that is not finite, times that do not rise, angle outside the
-                limits, or a step that is faster than allowed; the message says which.
+            RefusedCommandError: a joint is unknown, a number is not finite, times do not rise, an angle is outside the
+                limits, or a step is too fast; the message says which.
         """
         self._form(path)
         for j, name in enumerate(path.joints):

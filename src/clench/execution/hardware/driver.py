@@ -1,4 +1,4 @@
-"""The small interface between a hand's controller and what supervises it: connect, joints, read, command, stop."""
+"""The small interface between a hand's controller and its supervision: connect, joints, read, command, stop."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class JointPath:
     __repr__ = short_repr
 
     def at(self, time: float) -> dict[str, float]:
-        """Return the targets at a time from the moment of sending [s]; before the first point those of the first."""
+        """Return the targets at a time from the moment of sending [s]; before the first point, the first targets."""
         values = [float(np.interp(time, self.times, column)) for column in self.positions.T]
         return dict(zip(self.joints, values, strict=True))
 
@@ -85,18 +85,18 @@ class DriverLimits:
 
 @runtime_checkable
 class TendonDriver(Protocol):
-    """Pull tendons: what a driver of a tendon-driven hand has besides `HandDriver`."""
+    """Pull tendons: the extra methods of a driver of a tendon-driven hand, besides `HandDriver`."""
 
     def pull(self, tensions: FloatArray) -> None:
         """Bring the tendons to these tensions [N], shape (T,), in the order of the hand file, and keep them there.
 
-        `stop` ends it: the joints then hold where they are.
+        `stop` ends it: the joints then hold their angles.
         """
 
 
 @runtime_checkable
 class OneTargetDriver(Protocol):
-    """Pass on one target of a path, ``path.at(path.period)``: what a driver can say of itself besides `HandDriver`."""
+    """Pass on one target of a path, ``path.at(path.period)``: the extra property besides `HandDriver`."""
 
     @property
     def one_target(self) -> bool:
@@ -135,7 +135,7 @@ def connected_joints(driver: HandDriver) -> tuple[str, ...]:
 
 
 def connected_limits(driver: HandDriver) -> DriverLimits:
-    """Return what a connected driver allows.
+    """Return the limits of a connected driver.
 
     Raises:
         DriverError: it is no `DriverLimits`.
@@ -184,7 +184,7 @@ class HandDriver(Protocol):
 
     @property
     def limits(self) -> DriverLimits:
-        """What the controller allows; known once connected."""
+        """Limits of the controller; known once connected."""
 
     def connect(self, timeout: float) -> None:
         """Find the controller and its joints, within a time [s]; moves nothing."""
@@ -193,10 +193,10 @@ class HandDriver(Protocol):
         """Return the newest state, without waiting for another one."""
 
     def command(self, path: JointPath) -> None:
-        """Replace what the hand is doing by a path; at its end the hand stands still, whether more comes or not."""
+        """Replace the present motion by a path; at its end the hand stands still, even if no more commands come."""
 
     def stop(self) -> None:
-        """Make the hand stand still where it is, now; may be called at any time, from any thread, more than once."""
+        """Make the hand stand still immediately. Any thread may call this at any time, more than once."""
 
     def disconnect(self) -> None:
         """Let the controller go; may be called more than once."""

@@ -1,4 +1,4 @@
-"""Call a driver in a thread of its own, so that a call that does not return holds up neither a stop nor the report."""
+"""Call a driver in a thread of its own, so that a call that does not return delays neither a stop nor the report."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from clench.core.errors import ClenchError
 
 from .driver import DriverError, HandDriver
 
-#: How long a call of a driver may take, except `connect` and `disconnect` [s].
+#: Time limit of a driver's call, except `connect` and `disconnect` [s].
 CALL_LIMIT: Final = 1.0
-#: How long `disconnect` may take [s].
+#: Time limit of `disconnect` [s].
 LEAVING_LIMIT: Final = 5.0
-#: How long a stop waits for a call that an interrupt left alone [s]: two messages on one line would mix.
+#: Time that a stop waits for a call that an interrupt left alone [s]: two messages on one line would mix.
 SHORTLY: Final = 0.1
 
 #: Calls whose failure leaves the motion of the hand unknown.
 MOVING_CALLS: Final = ("read", "command", "pull", "stop")
 
-#: What is called when an abandoned call returns after all, where that is not `stop` alone.
+#: Function to call when an abandoned call returns after all, if it is not `stop` alone.
 _WHEN_LATE: Final = {"connect": ("stop", "disconnect"), "disconnect": ()}
 
 T = TypeVar("T")
@@ -34,8 +34,8 @@ class Call:
     """One call of a driver, and its outcome once it has returned.
 
     Args:
-        what: name of the driver's method. function: what is run. returned: whether it has returned.
-        result, error: what it returned or raised. abandoned: whether nobody waits for it any more.
+        what: name of the driver's method. function: the function to run. returned: whether it has returned.
+        result, error: its return value, or its exception. abandoned: whether its caller gave up waiting.
     """
 
     what: str
@@ -66,9 +66,9 @@ class Call:
 class DriverLine:
     """Call a driver, one call after the other, from one thread.
 
-    The caller waits for at most `CALL_LIMIT`. A call that has not returned by then is abandoned: the driver is called
-    no more except to stop and to disconnect, which come from further threads. When the abandoned call returns after
-    all, the hand is told to stop once more: the call may have been a command.
+    The caller waits for at most `CALL_LIMIT`. A call that has not returned by then is abandoned. After that, the driver
+    is called only to stop and to disconnect, in further threads. When the abandoned call returns after all, the hand is
+    told to stop once more: the call may have been a command.
     """
 
     def __init__(self, driver: HandDriver) -> None:
@@ -78,7 +78,7 @@ class DriverLine:
         self._abandoning = threading.Lock()
         self._freed: Callable[[], None] = lambda: None
         self._closing = False
-        #: What the driver has not returned from, empty when it has.
+        #: The driver's method that has not returned, or empty.
         self.stuck = ""
         #: Whether one of `MOVING_CALLS` failed.
         self.failed = False
@@ -89,14 +89,14 @@ class DriverLine:
         self._thread.start()
 
     def call(self, what: str, function: Callable[[], T], limit: float | None = CALL_LIMIT) -> T:
-        """Run a function that calls the driver, and return what it returns.
+        """Run a function that calls the driver, and return its result.
 
         Args:
             what: name of the driver's method. function: runs in the thread of this line.
             limit: how long it may take [s]; None: without end.
 
         Raises:
-            DriverError: it raised an `Exception`, or took too long. BaseException: what else it raised.
+            DriverError: it raised an `Exception`, or took too long. BaseException: any other exception of the function.
         """
         if self.stuck:
             raise DriverError(f"The driver has not returned from {self.stuck}().")
@@ -117,7 +117,7 @@ class DriverLine:
         """Tell the hand to stop, in spite of a call that does not return.
 
         Raises:
-            DriverError: the driver failed. BaseException: what else it raised.
+            DriverError: the driver failed. BaseException: any other exception of the driver.
         """
         self._aside("stop", CALL_LIMIT)
 
@@ -184,7 +184,7 @@ class DriverLine:
 
 
 def _as_driver_error(error: BaseException, what: str) -> BaseException:
-    """Return what is raised for an error of a driver: one kind for all its failures, others as they are."""
+    """Return the exception for an error of a driver: one kind for all its failures, others unchanged."""
     if isinstance(error, DriverError) or not isinstance(error, Exception):
         return error
     if isinstance(error, ClenchError):

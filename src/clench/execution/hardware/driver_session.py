@@ -1,4 +1,4 @@
-"""One execution on a driver: the only way by which anything reaches the hand, with the count of what was sent."""
+"""One execution on a driver: the only access to the hand, with the count of everything sent."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from .driver import (
 from .driver_line import DriverLine
 from .supervision import Event, Supervision, supervision_of
 
-#: How often the hand is told to stop when the driver fails to do so.
+#: Number of attempts to stop the hand when the driver fails.
 STOP_TRIES = 2
-#: How many interrupts a stop outlasts.
+#: Number of interrupts that a stop survives.
 INTERRUPTS = 10
 
 
 @dataclass
 class Sent:
-    """Count what was sent.
+    """The count of messages sent to the hand.
 
     Args:
         commands: that the driver took. unconfirmed: handed to the driver, which failed: they may have reached the hand.
@@ -72,12 +72,12 @@ class DriverSession:
         self.supervision: Supervision = supervision_of(driver)
         self.sent = Sent()
         self._line = DriverLine(driver)
-        #: What interrupted the stop of the hand.
+        #: The exception that interrupted the stop of the hand.
         self.interrupt: BaseException | None = None
         self._disconnected = False
 
     def begin(self) -> None:
-        """Begin; whatever happens then, `close` ends it.
+        """Begin; `close` ends the session in every case.
 
         Raises:
             ExecutionRefusedError: a stop is in force, or another execution uses the driver.
@@ -100,7 +100,7 @@ class DriverSession:
         return self._line.call("joints", lambda: connected_joints(self.driver))
 
     def limits(self) -> DriverLimits:
-        """Return what the controller allows."""
+        """Return the limits of the controller."""
         return self._line.call("limits", lambda: connected_limits(self.driver))
 
     def read(self) -> HandState:
@@ -108,7 +108,7 @@ class DriverSession:
         return self._line.call("read", lambda: read_state(self.driver))
 
     def enter(self, event: Event) -> None:
-        """Go on to what comes next in the execution, unless a stop is in force."""
+        """Go on to the next event of the execution, unless a stop is in force."""
         self.supervision.enter(event)
 
     def command(self, path: JointPath, now: float) -> None:
@@ -138,7 +138,7 @@ class DriverSession:
         self.supervision.wait(seconds)
 
     def stop(self) -> str:
-        """Tell the hand to stop, once more when the driver fails; return why it could not be told, else nothing.
+        """Tell the hand to stop, and repeat if the driver fails; return the failure, or nothing.
 
         An interrupt does not keep the hand from being told; it is in `interrupt` afterwards.
         """

@@ -1,7 +1,7 @@
 """Follow a timed plan on a controller, never further ahead than a short horizon.
 
-A controller is only ever told the next fraction of a second. When this program, its machine or the connection fails,
-no more arrives, and the hand stands still at the end of what it was told.
+A controller is only ever told the next fraction of a second. When this program, its machine or the connection fails, no
+more commands arrive. The hand then stands still at its last target.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from .driver import HandState, JointPath, OneTargetDriver
 from .driver_session import DriverSession
 from .supervision import Event
 
-#: How often the controller is read and told more [s].
+#: Interval of readings and commands [s].
 PERIOD = 0.05
-#: How far ahead it is told [s]: how long a hand moves on after its connection was cut.
+#: Length of a path ahead [s]: the hand moves this long after its connection is cut.
 HORIZON = 0.3
-#: How long after its moment a path may be told [s]; what takes longer is a pause of this program.
+#: Largest delay of a path [s]; a longer delay is a pause of this program.
 LATE = 0.2 * PERIOD
-#: How often a path is computed again that a pause made late.
+#: Number of times that a late path is computed again.
 _TRIES = 3
 #: Points of a path that are closer than this are one [s].
 CLOSEST = 1e-4
@@ -75,8 +75,8 @@ class TimedPlan:
     def window(self, moment: float, horizon: float) -> JointPath:
         """Return the way-points of the next `horizon` [s], with times from `moment` [s] on.
 
-        The first one is where the plan is when the next path is due: a hand that is not quite where it is thought to be
-        has until then to get there, and a driver that passes that one on finds it.
+        The first target is the plan's posture when the next path is due. A hand with a small error has until then to
+        get there, and a driver that passes on one target finds it.
         """
         due = [PERIOD] if horizon - CLOSEST > PERIOD else []
         after, until = moment + sum(due) + CLOSEST, moment + horizon - CLOSEST
@@ -108,13 +108,13 @@ class Followed:
 
 @dataclass
 class _Progress:
-    """Keep how far along a plan a hand is, by what it was told last and when.
+    """The progress of a hand along a plan, from its last command and the time of it.
 
     A controller starts on a path when it receives it, at some time during the call that sends it.
 
     Args:
         ahead: how far the hand goes on along one path [s]. begin: moment of the plan at which the last path begins [s].
-        before, after: between which times that was told [s]; not a number when none was.
+        before, after: bounds on the time of that command [s]; not a number without a command.
     """
 
     ahead: float
@@ -123,14 +123,14 @@ class _Progress:
     after: float = math.nan
 
     def moment(self, now: float) -> float:
-        """Return where on the plan the hand is, at most [s]: after a pause, at the end of what it was told."""
+        """Return the hand's largest possible time on the plan [s]: after a pause, the end of its last path."""
         return self.begin + self._gone(now - self.before, 0.0)
 
     def span(self, first: float, last: float) -> tuple[float, float]:
         """Return between which moments of the plan [s] the hand was at a time between two [s].
 
-        The hand may still lag behind by a path that came up to a period late, or already be at the start of the
-        next one.
+        The hand may still lag behind by a path that came up to a period late, or already be at the start of the next
+        path.
         """
         return self.begin + self._gone(first - self.after, -math.inf) - PERIOD, self.moment(last) + PERIOD
 
@@ -146,10 +146,10 @@ class _Progress:
 
 @dataclass(frozen=True)
 class Follower:
-    """Make a controller follow plans; whatever goes wrong is raised, and the caller stops the hand.
+    """Make a controller follow plans; every failure is raised, and the caller stops the hand.
 
     Args:
-        session: with the driver, connected. check: what every command and state must pass.
+        session: with the driver, connected. check: test for every command and state.
         settling: how long the hand may take to arrive after the plan's end [s].
         arrived: how near to its target every joint shall be, by the controller's names and in its units.
     """
@@ -163,7 +163,8 @@ class Follower:
         """Follow a plan to its end.
 
         Args:
-            plan: what to follow. found: collects the samples. end: event of the supervision at the plan's end, if any.
+            plan: the plan to follow. found: collects the samples. end: event of the supervision at the plan's end, if
+                any.
 
         Raises:
             DriverError: the driver failed, a command or a state was refused, or a stop is in force.
@@ -199,7 +200,7 @@ class Follower:
         return moment
 
     def _tell(self, plan: TimedPlan, progress: _Progress) -> None:
-        """Tell what comes next, computed anew where a pause made it late: it would pull the hand back."""
+        """Send the next path. After a pause it is computed anew: a late path would pull the hand back."""
         for _ in range(_TRIES):
             seen = time.monotonic()
             moment = progress.moment(seen)

@@ -1,4 +1,4 @@
-"""Stop a hand, look whether it stands still, and say what is known."""
+"""Stop a hand, check whether it stands still, and report the known state."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .driver import HandState
 from .driver_session import DriverSession
 from .following import HORIZON, PERIOD, Followed
 
-#: How long is waited for a hand to stand still after a stop [s].
+#: Time to wait for a hand to stand still after a stop [s].
 STOP_WAIT: Final = 1.0
 #: A joint stands still when it is slower than this fraction of its largest speed [-].
 STILL: Final = 0.05
-#: How often it is looked at, and how old a state may be for that [s].
+#: Interval between checks, and largest age of a state for them [s].
 _LOOK: Final = 2.0 * PERIOD
 
 
@@ -52,7 +52,7 @@ def halt(session: DriverSession, check: CommandCheck | None, found: Followed) ->
 
     Args:
         session: with the driver. check: the joints and their limits; None when nothing was planned yet.
-        found: what was sampled on the way; where the hand stands is added to it.
+        found: samples so far; the final positions are added.
     """
     untold, sent = session.stop(), session.sent
     still = None if check is None or not sent.anything else _comes_to_rest(session, check, found)

@@ -34,9 +34,9 @@ from .hardware_way import plan_driven_way
 from .joint_map import JointMap, MappedJoint
 from .supervision import Event, ExecutionRefusedError, State, Supervision, supervision_of
 
-#: How often a stop looks whether a command on its way has arrived [s].
+#: Interval at which a stop checks whether a command on its way has arrived [s].
 WAITING = 0.005
-#: How often the end of an execution is tried when it is interrupted.
+#: Number of attempts to end an interrupted execution.
 ENDINGS = 5
 
 
@@ -55,10 +55,10 @@ class HardwareHand:
         angle_tolerance: largest difference to the computed angles that counts as reached [rad].
         connect_timeout: how long the controller is looked for [s].
         max_age: oldest state of the hand on which a command may be based [s].
-        max_deviation: how far a joint may be from where it was told to be, on the way [rad].
+        max_deviation: largest allowed distance of a joint from its target, on the way [rad].
         settling: how long the hand may take to arrive after the trajectory's end [s].
-        squeeze: share of the angle offsets of the solution's squeeze plan that joints are told beyond the touch, 0 for
-            none [-]; a solution without a plan is not squeezed (see `clench.complete`).
+        squeeze: share of the angle offsets of the solution's squeeze plan that joints get beyond the touch, 0 for none
+            [-]. A solution without a plan is not squeezed (see `clench.complete`).
         stay_connected: leave the driver connected at the end, for hands that let go when it leaves; call
             `driver.disconnect` later.
 
@@ -110,7 +110,7 @@ class HardwareHand:
 
     @property
     def driver(self) -> HandDriver:
-        """What talks to the controller."""
+        """The link to the controller."""
         return self._driver
 
     @property
@@ -125,7 +125,7 @@ class HardwareHand:
 
     @property
     def state(self) -> State:
-        """What the hand is doing."""
+        """The present activity of the hand."""
         return self.supervision.state
 
     @property
@@ -166,8 +166,8 @@ class HardwareHand:
 
         Raises:
             CommandError: the solution, the trajectory or the joint map does not fit the hand. UnknownNameError: the
-                controller lacks a joint. KeyboardInterrupt: and whatever else is no error of the driver; the hand was
-                stopped before, and `last_report` says what was sent.
+                controller lacks a joint. KeyboardInterrupt: like every exception that is no error of the driver. The
+                hand was stopped before, and `last_report` lists the commands sent.
         """
         done = Done(self.joint_map.of(self.hand), obj=self.obj)
         check_for_hand(trajectory, solution, self.hand)
@@ -193,7 +193,7 @@ class HardwareHand:
         return self._last_report
 
     def _move(self, session: DriverSession, solution: GraspSolution, trajectory: Trajectory, done: Done) -> None:
-        """Plan, check and carry out; whatever goes wrong is raised."""
+        """Plan, check and execute; every failure is raised."""
         mapped = done.mapped
         session.connect(self.connect_timeout)
         self._check_joints(mapped, session.joints())
@@ -221,7 +221,7 @@ class HardwareHand:
     def _conclude(
         self, session: DriverSession, solution: GraspSolution, done: Done, raised: BaseException | None
     ) -> BaseException | None:
-        """Stop the hand where it must be, let the driver go, report, and return what is to be raised.
+        """Stop the hand if necessary, disconnect the driver, report, and return the exception to raise.
 
         An interrupt that comes meanwhile begins it again: it must not keep the hand from being stopped.
         """
@@ -306,7 +306,7 @@ class HardwareHand:
 
 
 def _trouble(error: BaseException | None) -> str:
-    """Say in a sentence what ended an execution."""
+    """Describe in a sentence the exception that ended an execution."""
     if isinstance(error, ClenchError):
         return str(error)
     if isinstance(error, Exception):

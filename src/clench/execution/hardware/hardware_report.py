@@ -1,4 +1,4 @@
-"""The report on a driven hand: what was sent, what was reached, and why it ended."""
+"""Report on a hardware hand: commands sent, posture reached, and the reason of the end."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from .supervision import State
 
 @dataclass
 class Done:
-    """Collect what a driven hand has done.
+    """The record of an execution on a hardware hand.
 
     Args:
-        mapped: the joints as the controller says them. check: what commands must pass, None before it is known.
+        mapped: the joints as the controller says them. check: test for commands, None before it is known.
         obj: the object, None when it is not known. way: a sentence about the way to the trajectory's start.
         squeeze: as planned.
         followed, squeezed, stepped: samples of the trajectory, the squeeze, and the next steps that were begun.
-        pulled: a sentence about tendons. during: what was under way at the end. trouble: why it ended early.
-        left_behind: the fault, where a joint was too far from where it was told to be.
-        halted: what came of the stop, None when none was sent.
+        pulled: a sentence about tendons. during: phase at the end. trouble: why it ended early.
+        left_behind: the fault of a joint that was too far from its target.
+        halted: result of the stop, None without a stop.
     """
 
     mapped: Mapping[str, MappedJoint]
@@ -66,7 +66,7 @@ class Done:
         return next((way for way in reversed(self.ways) if way.times), self.followed)
 
     def ending(self) -> str:
-        """Say why it ended early, and what came of the stop; empty when it did not."""
+        """Say why it ended early, and the result of the stop; empty after a complete execution."""
         stopped = "" if self.halted is None else f" {self.halted.text()}"
         return f"{self.trouble}{stopped}" if self.trouble else ""
 
@@ -74,10 +74,10 @@ class Done:
 def report_on(
     done: Done, sent: Sent, solution: GraspSolution, hand: Hand, name: str, tolerance: float
 ) -> ExecutionReport:
-    """Report what a driven hand has done.
+    """Report the execution of a hardware hand.
 
     Args:
-        done: what it has done. sent: what was sent. solution: what it was to do. hand: the model.
+        done: record of the execution. sent: count of commands. solution: the executed solution. hand: the model.
         name: of the driver. tolerance: largest difference to a computed angle that counts as reached [rad].
     """
     counted = _counted(sent, done.mapped)
@@ -129,7 +129,7 @@ def report_on(
     )
 
 
-#: What is said before the trouble, by what was under way.
+#: Sentence before the trouble, by phase.
 _BEFORE = {State.SQUEEZING: "While squeezing: ", State.PULLING: "While pulling the tendons: "}
 
 
@@ -154,7 +154,7 @@ def _left_behind(done: Done, fault: NotFollowingError, solution: GraspSolution, 
 def _blocker(
     done: Done, solution: GraspSolution, hand: Hand, joint: str, told: float, measured: Mapping[str, float]
 ) -> str:
-    """Name what is in the way of a joint that is not where it was told to be [rad]."""
+    """Name the obstruction of a joint that is off its target [rad]."""
     others = posture(solution.joint_angles, hand, "joint_angles")
     reached = found_posture(hand, done.mapped, measured, others)
     return modelled_blocker(solution, hand, done.obj, reached, joint, told)

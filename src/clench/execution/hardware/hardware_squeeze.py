@@ -45,8 +45,8 @@ def plan_driven_squeeze(
     """Plan to tell every joint the angle beyond its touch at which its servo exerts its share of the squeeze plan.
 
     Args:
-        solution: with `squeeze`, see `clench.complete`; without it, or without offsets, nothing is told.
-        hand: the model. mapped: the joints as the controller says them. check: what every command must pass.
+        solution: with `squeeze`, see `clench.complete`; without it, or without offsets, no command is sent.
+        hand: the model. mapped: the joints as the controller says them. check: test for every command.
         share: of the planned offsets [-].
     """
     plan = solution.squeeze or {}
@@ -89,11 +89,11 @@ def squeeze_by_driver(
     check: CommandCheck,
     found: Followed,
 ) -> None:
-    """Squeeze as planned; nothing is done where nothing is told.
+    """Squeeze as planned; do nothing if the plan is empty.
 
     Args:
         squeeze: planned. session: with the driver, at the touch. mapped: the joints as the controller says them.
-        check: what every command and state must pass. found: collects the samples.
+        check: test for every command and state. found: collects the samples.
 
     Raises:
         DriverError: see `Follower.follow`.

@@ -43,13 +43,13 @@ def plan_driven_steps(
     mapped: Mapping[str, MappedJoint],
     check: CommandCheck,
 ) -> tuple[DrivenStep, ...]:
-    """Plan the way to every next step, and check it as it would be sent.
+    """Plan the way to every next step, and check the commands of it.
 
     Args:
         solution: with `next_steps`. hand: the model.
         told: where the joints are told to be before the first step [rad], shape (J,).
         pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
-        mapped: the joints as the controller says them. check: what every command must pass.
+        mapped: the joints as the controller says them. check: test for every command.
 
     Raises:
         RefusedCommandError: a step may not be sent, or drives links into each other; the message says which, and why.
@@ -86,8 +86,8 @@ def go_to_steps(
 
     Args:
         steps: planned. session: with the driver. mapped: the joints as the controller says them.
-        check: what every command and state must pass.
-        arriving: how long the hand may take to arrive [s], and what counts as reached [rad].
+        check: test for every command and state.
+        arriving: time limit for the hand to arrive [s], and tolerance of the angles [rad].
         found: collects the steps that were begun, and the samples of each.
 
     Raises:
@@ -114,7 +114,7 @@ def step_reached(
 
     Args:
         step: the step. followed: samples of the way there. mapped: the joints as the controller says them.
-        tolerance: what counts as reached [rad]. trouble: what ended the way, in words; empty when nothing did.
+        tolerance: of the angles [rad]. trouble: the failure that ended the way, in words, or empty.
     """
     last = followed.measured[-1] if followed.measured else {}
     joints = {

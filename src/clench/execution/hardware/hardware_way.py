@@ -43,9 +43,8 @@ def plan_driven_way(
 ) -> DrivenWay:
     """Plan a free motion from where a hand is found to the touch.
 
-    All joints move to the trajectory's start on a straight line. Where that is not free, fingers wait for each other.
-    Joints that nobody measures are taken to be at the trajectory's start; those that follow others are where the
-    coupling puts them.
+    All joints move to the trajectory's start on a straight line. If this line is not free, fingers wait for each other.
+    Joints without a measurement are taken to be at the trajectory's start; followers are where the coupling puts them.
 
     Args:
         solution: says where the object is. trajectory: to the touch. hand: the model.
@@ -53,8 +52,8 @@ def plan_driven_way(
         check: the limits of the joints. state: where the hand is found.
 
     Raises:
-        RefusedCommandError: no free way was found, or the motion as it would be told is not free; the sentence names
-            what would overlap.
+        RefusedCommandError: no free way was found, or the motion as commanded is not free; the sentence names the
+            overlapping bodies.
     """
     found = found_posture(hand, mapped, state.positions, trajectory.positions[0])
     finder = WayFinder(solution, hand, obj, trajectory.pace).begun_at(found)
@@ -89,7 +88,7 @@ def found_posture(
 
     Args:
         hand: the model. mapped: the joints as the controller says them. measured: by its names and in its units.
-        others: angles of joints that nobody measures and that follow no other one [rad], shape (J,).
+        others: angles of joints that are neither measured nor followers [rad], shape (J,).
     """
     q = np.array(others, dtype=np.float64)
     known = {

@@ -1,4 +1,4 @@
-"""Name what blocks a joint that is not where it was told to be."""
+"""Name the obstruction of a joint that is off its target."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LEAST_FORCE = 1e-6
 def modelled_blocker(
     solution: GraspSolution, hand: Hand, obj: GraspObject | None, reached: FloatArray, joint: str, told: float
 ) -> str:
-    """Say in a sentence what a joint meets first when it goes on from where it is to where it was told to be.
+    """Say in a sentence which body a joint meets first on its way from its present angle to its target.
 
     Args:
         solution: says where the object is. hand: the model. obj: the object; None checks the hand's links alone.
-        reached: all joint angles, as measured [rad], shape (J,). joint: its name. told: where it was told to be [rad].
+        reached: all joint angles, as measured [rad], shape (J,). joint: its name. told: its target [rad].
     """
     target = reached.copy()
     target[hand.joint_index(joint)] = told
@@ -42,7 +42,7 @@ def modelled_blocker(
 
 
 def simulated_blocker(scene: Scene, data: Any, hand: Hand, joint: str) -> str:
-    """Say in a sentence on what the links press hardest that a joint moves; empty when they press on nothing.
+    """Say in a sentence which body the joint's links press hardest; empty without contact.
 
     Args:
         scene, data: the simulation. hand: the hand in it. joint: the joint's name.

@@ -25,7 +25,8 @@ class MappedJoint:
 
     Args:
         name: the controller's name. scale: units of the controller per radian, negative when it turns the other way.
-        offset: what the controller says at 0 rad. lower, upper: what it may be told, None: only the hand's limits.
+        offset: the controller's value at 0 rad. lower, upper: limits of the controller's value, None: only the hand's
+            limits.
         velocity: largest speed [units per second], None: only the hand's. unit: names the unit in messages.
     """
 
@@ -38,11 +39,11 @@ class MappedJoint:
     unit: str = "rad"
 
     def to_controller(self, angle: float) -> float:
-        """Return what the controller says for an angle [rad]."""
+        """Return the controller's value for an angle [rad]."""
         return self.scale * angle + self.offset
 
     def to_angle(self, value: float) -> float:
-        """Return the angle [rad] for what the controller says."""
+        """Return the angle [rad] for the controller's value."""
         return (value - self.offset) / self.scale
 
 
@@ -81,7 +82,7 @@ class JointMap:
     def of(self, hand: Hand) -> dict[str, MappedJoint]:
         """Return how every joint of the hand that a controller may move is said, by the model's names.
 
-        Joints that follow others are left out unless the map names them: the mechanism moves those.
+        Followers are left out unless the map names them: the mechanism moves them.
 
         Raises:
             UnknownNameError: the map names a joint that the hand does not have.

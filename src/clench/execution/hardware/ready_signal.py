@@ -37,7 +37,7 @@ class _Channel:
 class ReadySignal:
     """Append a solution to a record and signal its id; another controller reads it there and moves the hand.
 
-    The signal is one JSON object of schema `clench.ready/1`: written to a file at once or not at all, sent as one line
+    The signal is one JSON object of schema `clench.ready/1`. It is written to a file atomically, sent as one line
     through a socket, or published as std_msgs/String on a ROS 2 topic.
 
     Args:

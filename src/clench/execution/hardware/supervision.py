@@ -1,6 +1,6 @@
-"""The states of a supervised hand, what leads from one to another, and the stop that stays in force until released.
+"""The states of a supervised hand, the events between them, and the stop that stays in force until released.
 
-Nothing here talks to a driver. One thread carries a solution out; any thread, and any signal handler, may stop it.
+Nothing here talks to a driver. One thread executes a solution; any thread, and any signal handler, may stop it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .driver import DriverError
 
 
 class State(StrEnum):
-    """Name what a supervised hand is doing."""
+    """Name the activity of a supervised hand."""
 
     IDLE = "idle"
     """Nothing is carried out, and an execution may begin."""
@@ -44,7 +44,7 @@ class State(StrEnum):
 
 
 class Event(StrEnum):
-    """Name what leads from one state to another."""
+    """Name the events that change the state."""
 
     BEGIN = "begin"
     MOVE = "move"
@@ -67,7 +67,7 @@ ACTIVE: Final = (
     State.PULLING,
     State.STEPPING,
 )
-#: What follows from a state and an event. An event that is not here is refused in that state.
+#: Next state, by state and event. An event that is not here is refused in that state.
 TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
     (State.IDLE, Event.BEGIN): State.PLANNING,
     (State.PLANNING, Event.MOVE): State.MOVING,
@@ -86,7 +86,7 @@ TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
     (State.FAULTED, Event.STOP): State.FAULTED,
     **{(state, Event.RELEASE): State.IDLE for state in (State.IDLE, State.STOPPED, State.FAULTED)},
 }
-#: What is said of a stop that somebody requested.
+#: Sentence about a stop on request.
 ON_REQUEST: Final = "Stopped on request."
 
 
@@ -95,7 +95,7 @@ class HandStoppedError(DriverError):
 
 
 class ExecutionRefusedError(HandStoppedError):
-    """Say why an execution does not begin: the driver was not called."""
+    """Report why an execution does not begin; the driver was not called."""
 
 
 _OWNER: Final = "owner"
@@ -104,13 +104,13 @@ _OWNER: Final = "owner"
 class Supervision:
     """Keep the state of the hand of one driver, for all threads.
 
-    Two facts make up the state: what the executing thread is doing, and the stop in force. Only the executing thread
-    changes the first. Any thread sets the second, with one assignment and without a lock, so that a signal handler may
-    do so at any moment. Only `release` clears it, and never during an execution.
+    The state consists of two facts: the activity of the executing thread, and the stop in force. Only the executing
+    thread changes the activity. Any thread sets the second, with one assignment and without a lock, so that a signal
+    handler may do so at any moment. Only `release` clears the stop, and never during an execution.
     """
 
     def __init__(self) -> None:
-        # Taken with one call that cannot be interrupted half-way, and known to its owner whatever happens then.
+        # Taken with one call that cannot be interrupted half-way, so its owner always knows of it.
         self._owner: dict[str, object] = {}
         self._doing = State.IDLE
         self._stop: tuple[Event, str] | None = None
@@ -120,7 +120,7 @@ class Supervision:
 
     @property
     def state(self) -> State:
-        """What the hand is doing."""
+        """The present activity of the hand."""
         stop, doing = self._stop, self._doing
         if stop is None:
             return doing
@@ -130,7 +130,7 @@ class Supervision:
 
     @property
     def doing(self) -> State:
-        """What the execution is doing, or was when a stop ended it."""
+        """The activity of the execution, at present or when a stop ended it."""
         return self._doing
 
     @property
@@ -142,7 +142,7 @@ class Supervision:
         """Begin an execution, which belongs to an owner until the owner ends it.
 
         Raises:
-            ExecutionRefusedError: a stop is in force, or another execution is under way; the message says what to do.
+            ExecutionRefusedError: a stop is in force, or another execution is under way; the message gives the remedy.
         """
         if self._owner.setdefault(_OWNER, owner) is not owner:
             raise ExecutionRefusedError(
@@ -157,7 +157,7 @@ class Supervision:
         self._doing = TRANSITIONS[State.IDLE, Event.BEGIN]
 
     def enter(self, event: Event) -> None:
-        """Go on to what comes next in the execution.
+        """Go on to the next event of the execution.
 
         Raises:
             HandStoppedError: a stop is in force.
@@ -195,7 +195,7 @@ class Supervision:
         self._set(Event.STOP, cause)
 
     def fault(self, cause: str) -> None:
-        """Put a stop in force because of a fault of the running execution, unless there is one already."""
+        """Put a stop in force because of a fault of the running execution, unless a stop is in force already."""
         self._set(Event.FAULT, cause)
 
     def end(self, owner: object) -> None:
@@ -205,7 +205,7 @@ class Supervision:
             del self._owner[_OWNER]
 
     def release(self) -> None:
-        """Release the stop, so that executions may begin; nothing happens when none is in force.
+        """Release the stop, so that executions may begin; do nothing without a stop.
 
         Raises:
             HandStoppedError: an execution is still under way, or a call of the driver has not returned.
@@ -233,7 +233,7 @@ class Supervision:
         self._wake.put(None)
 
 
-#: By the identity of the driver: the driver where it cannot be referred to weakly, and its supervision.
+#: By the identity of the driver: the driver itself if it has no weak references, and its supervision.
 _supervised: dict[int, tuple[object, Supervision]] = {}
 
 

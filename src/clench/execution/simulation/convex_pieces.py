@@ -66,7 +66,7 @@ def in_pieces(obj: GraspObject, *, show_progress: bool = False) -> GraspObject:
     """Return an object as the engine collides it, so that solver and simulation see the same shapes.
 
     Args:
-        obj: the object; a body of meshes that is not convex and comes without pieces is decomposed.
+        obj: the object. A mesh body that is not convex and has no pieces is decomposed.
         show_progress: show a bar meanwhile.
 
     Raises:

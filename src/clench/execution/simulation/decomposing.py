@@ -61,7 +61,7 @@ if __name__ == "__main__":
     import ast
     import os
 
-    # What CoACD prints goes to standard error: standard output is the answer's.
+    # Output of CoACD goes to standard error: standard output is for the answer.
     out = os.dup(1)
     os.dup2(2, 1)
     with os.fdopen(out, "wb") as stream:

@@ -25,7 +25,7 @@ _WIDTH, _HEIGHT = 640, 480
 _NO_OPENGL: Final = "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1."
 #: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
 _DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
-#: How much higher it looks where the palm moves up [m].
+#: Rise of the camera's target if the palm moves up [m].
 _UP: Final = 0.05
 
 
@@ -51,10 +51,10 @@ class Film:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be written.
+        """Refuse files that cannot be written.
 
         Raises:
-            FileError: another kind of file than GIF or MP4, one that is a folder, or in none.
+            FileError: the file is not GIF or MP4, is a folder, or its folder does not exist.
             ClenchError: MP4 without the library that writes it; an OpenGL that cannot be loaded.
         """
         if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
@@ -110,7 +110,7 @@ class Film:
             self._kept[name] = self._drawn(data)
 
     def finish(self) -> tuple[Path, ...]:
-        """Write what was taken; return the files.
+        """Write the pictures; return the files.
 
         Raises:
             FileError: a file cannot be written.

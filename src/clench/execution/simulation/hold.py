@@ -1,4 +1,4 @@
-"""What a hold test asks, and what came of it."""
+"""The options of a hold test, and its results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class HoldTest(StrEnum):
 class Hold:
     """Tell how a grasp is tested: the hand closes on a free object, squeezes as planned, and pulls or lifts it.
 
-    The values unless told otherwise, but for the time step and the servos, are those of DexGraspBench
+    Apart from the time step and the servos, the default values are those of DexGraspBench
     (https://github.com/JYChen18/DexGraspBench).
 
     Args:
@@ -43,8 +43,8 @@ class Hold:
         max_distance: of the centre of mass from where the object stood before the hand closed [m], and
         max_angle: of the object [rad]: from there on it is dropped.
         test: see `HoldTest`. height: of the lift [m].
-        planned_mass, planned_friction: what the squeeze is planned for, numbers or ranges (least, largest) [kg], [-];
-            None: the mass and the friction of the test.
+        planned_mass, planned_friction: for planning the squeeze, numbers or ranges (least, largest) [kg], [-]; None:
+            the mass and the friction of the test.
 
     Raises:
         CommandError: a value that is not finite or out of range.
@@ -67,7 +67,7 @@ class Hold:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Refuse values that cannot be simulated."""
         if not (np.isfinite(self.mass) and self.mass >= LIGHTEST):
             raise CommandError(f"hold: mass: expected a finite number of at least {LIGHTEST:g} kg, got {self.mass!r}.")
         check_friction(self.friction, "hold: friction")
@@ -97,7 +97,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class ObjectMotion:
-    """How far an object moved: its centre of mass [m], and its rotation [rad]."""
+    """The motion of an object: displacement of its centre of mass [m], and its rotation [rad]."""
 
     distance: float
     angle: float
@@ -141,18 +141,18 @@ class HoldReport:
 
     Args:
         held: the object was held in every direction. reason: one sentence.
-        settings: of the test. plan: what the squeeze plan says of the mass.
+        settings: of the test. plan: statement of the squeeze plan about the mass.
         planned: whether that plan is feasible; if not, the forces that it found are applied.
         torques: told to the joints beyond the touch [Nm], by name. angles: of the joints after the squeeze [rad].
         first_touch: when each finger first touched the free object [s], None when it did not; from the pregrasp on.
         closed: motion from the pregrasp to the touch. squeezed: motion from there by the squeeze.
         forces: of every finger, squeezed, before the first pull.
         pulls: by direction in the world, "+x" to "-z", or "lift"; motions count from before the hand closed.
-        as_given: where the grasp was solved again on the convex pieces that the simulation collides: what came of the
-            grasp as it was given. All else is then of the grasp on the pieces.
+        as_given: if the grasp was solved again on the convex pieces of the simulation, the result of the original
+            grasp. All else is then of the grasp on the pieces.
 
-    Where nothing was tested, because the hand would be in the table or the simulation did not stay finite, there are no
-    motions, forces and pulls, and the reason says so.
+    If nothing was tested, there are no motions, forces and pulls, and the reason says why: the hand would be in the
+    table, or the simulation did not stay finite.
     """
 
     held: bool
@@ -174,7 +174,7 @@ class HoldReport:
 
     @property
     def touch_spread(self) -> float | None:
-        """Time between the first and the last finger's first touch [s]; None unless two fingers touched."""
+        """Time between the first and the last finger's first touch [s]; None if fewer than two fingers touched."""
         times = [time for time in self.first_touch.values() if time is not None]
         return max(times) - min(times) if len(times) > 1 else None
 

@@ -1,4 +1,4 @@
-"""A MuJoCo scene: the hand fixed in space at its palm, what moves its joints, and the object, fixed or free."""
+"""A MuJoCo scene: the hand fixed in space at its palm, the actuators of its joints, and the object, fixed or free."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ TIMESTEP = 0.002
 SERVO_BANDWIDTH = 100.0
 #: Least inertia that a servo moves [kg m²], for links whose model gives next to none.
 ARMATURE = 1e-3
-#: Inertia of joints between the base and the palm [kg m²]: the palm stays where it is, whatever the fingers do.
+#: Inertia of joints between the base and the palm [kg m²]: the palm keeps its pose when the fingers move.
 HEAVY = 100.0
 #: Nearer than that is touching [m]: the engine lists such pairs as contacts, forces begin at 0.
 TOUCHING = 1e-5
-#: Of the object in pictures: red, green, blue, and how solid.
+#: Colour of the object in pictures: red, green, blue, and opacity.
 COLOR = (0.93, 0.55, 0.2, 1.0)
 _ALL_BITS = 0x7FFFFFFF
 
@@ -49,7 +49,7 @@ class Scene:
         link_geoms: colliding geoms of every link.
         object_body: body of the object and its obstacles. object_geoms: its geoms.
         approximated: names of the bodies whose simulated shape is only near the object's.
-        drives: what the hand's actuators are told.
+        drives: targets of the hand's actuators.
         lift: address of the palm's way up, -1 without one.
     """
 
@@ -76,10 +76,10 @@ def build_scene(
 ) -> Scene:
     """Place a hand and an object in a scene without gravity, or for a lift on a table, with gravity on the object.
 
-    Unless the model's own actuators shall move the hand, they, tendons and equalities are left out: every joint has a
-    position servo of `SERVO_BANDWIDTH`, within its effort limit, and coupling holds because trajectories obey it. Joint
-    friction, springs and damping are left out too: the servos are ideal, so differences come from contact alone.
-    Joints before the palm have such a servo in any case: the palm stays where it is.
+    With servos, the model's own actuators, tendons and equalities are left out. Every joint has a position servo of
+    `SERVO_BANDWIDTH`, within its effort limit. Coupling holds because trajectories obey it. Joint friction, springs and
+    damping are left out too: the servos are ideal, so differences come from contact alone. Joints before the palm
+    always have such a servo: the palm keeps its pose.
 
     Args:
         hand: the hand.
@@ -87,7 +87,7 @@ def build_scene(
         hand_pose: `T_world_palm`.
         q: posture [rad], shape (J,), at which the palm is placed (matters when a wrist is upstream of it).
         free: mass and friction of an object that can move; None fixes it in place.
-        drive: what moves the joints.
+        drive: kind of actuators.
         show_progress: show a bar while convex pieces are computed.
 
     Raises:

@@ -24,9 +24,9 @@ def hold_as_collided(
 ) -> HoldReport:
     """Test a grasp on the shapes that the simulation collides.
 
-    A mesh that is not convex is collided as convex pieces, a little off its surface: fingers that touch the mesh press
-    into a piece or miss it. There the same command is solved on the pieces first, and that grasp is tested. The grasp
-    as it was given is tested, too, and reported in `as_given`.
+    The simulation replaces a mesh that is not convex by convex pieces, a little off its surface. Fingers that touch the
+    mesh press into a piece or miss it. There the same command is solved on the pieces first, and that grasp is tested.
+    The original grasp is tested, too, and reported in `as_given`.
 
     Args:
         solution, hand, obj, hold, trajectory: see `hold_and_pull`. options: the others of `hold_and_pull`.

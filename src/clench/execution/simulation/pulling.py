@@ -23,13 +23,13 @@ from .mujoco_scene import TABLE, TIMESTEP, Scene, build_scene
 from .simulated_actuators import Drive
 from .touch_watch import TouchWatch
 
-#: How long the hand stands still at the touch, how long the squeeze takes to build up, and how long it then stands [s].
+#: Durations of the rest at the touch, of the build-up of the squeeze, and of the rest after it [s].
 SETTLING, SQUEEZING, STANDING = 0.1, 0.4, 0.2
-#: How long the palm takes to move up [s].
+#: Duration of the palm's rise [s].
 LIFTING = 0.4
 #: A hand that would be deeper in the table is not tested [m].
 TABLE_OVERLAP = 1e-3
-#: How often the object is looked at while it is pulled [s].
+#: Interval at which the object is observed during a pull [s].
 LOOK_INTERVAL = 0.02
 #: The directions of the pulls in the world.
 DIRECTIONS = {
@@ -63,7 +63,7 @@ class Held:
 
     Args:
         scene, data: the simulation. told: where the joints are told to be [rad], shape (J,).
-        extra: what the controls of the squeeze have besides [of the actuators], shape (A,).
+        extra: controls of the squeeze beyond the touch [of the actuators], shape (A,).
     """
 
     scene: Scene
@@ -86,13 +86,13 @@ def hold_and_pull(
 ) -> HoldReport:
     """Close from the pregrasp on a free object, squeeze it, and pull it in six directions from there, or lift it.
 
-    Obstacles are taken away. The planned forces hold the mass, when pulled in any direction; the servo of every joint
-    is told the angle at which it exerts its share of them at the touch.
+    Obstacles are taken away. The planned forces hold the mass under a pull in any direction. The servo of every joint
+    gets the angle at which it exerts its share of them at the touch.
 
     Args:
         solution: the solution. hand: the hand. obj: the object, at its pose. hold: the test.
-        trajectory: the way to the touch, from its pregrasp on; all of it where it has none.
-        drive: what moves the joints.
+        trajectory: the way to the touch, from its pregrasp on, or all of it without one.
+        drive: kind of actuators.
         film: takes pictures of closing, squeeze, and the last pull or the lift.
         show_progress: show a bar while convex pieces are computed.
         then: called with the squeezed state, or the lifted one, where the object was held.
@@ -144,7 +144,7 @@ def hold_and_pull(
     )
     if report.held and then is not None:
         pressing = ends[1] - ends[0]
-        # A servo is told angles; what actuators of the model are told besides is no angle.
+        # A servo gets angles; an actuator of the model may get other quantities.
         by_model = scene.drives.driven.by_model
         then(Held(scene, state, computed if by_model else computed + pressing, pressing * by_model))
     return report
@@ -168,7 +168,7 @@ def joint_torques(plan: SqueezePlan, hand: Hand, q: FloatArray) -> FloatArray:
     """Return the torque with which every joint, followers too, exerts the forces of a plan [Nm], shape (J,).
 
     Args:
-        plan: the plan; nothing is exerted where there is none. hand: the hand. q: its posture [rad], shape (J,).
+        plan: the plan; without one the torques are 0. hand: the hand. q: its posture [rad], shape (J,).
     """
     count = len(hand.joints)
     if plan.found.plan is None:
@@ -223,7 +223,7 @@ def _squeeze(scene: Scene, data: Any, ends: tuple[FloatArray, FloatArray], watch
 
 
 def _tested(scene: Scene, squeezed: Any, hold: Hold, before: Place, film: Film | None) -> tuple[dict[str, Pulled], Any]:
-    """Pull or lift; return what came of it, and the state from which to go on: squeezed, or lifted."""
+    """Pull or lift; return the result, and the next state: squeezed, or lifted."""
     if hold.test == HoldTest.LIFT:
         data = _copied(scene, squeezed)
         return {HoldTest.LIFT.value: _pull(scene, data, hold, before, film, lifted=True)}, data
@@ -231,10 +231,10 @@ def _tested(scene: Scene, squeezed: Any, hold: Hold, before: Place, film: Film |
 
 
 def pull_each_way(scene: Scene, state: Any, hold: Hold, before: Place, film: Film | None = None) -> dict[str, Pulled]:
-    """Pull the object in six directions, or leave it to gravity where there is some, each time anew from a state.
+    """Pull the object in six directions, or leave it to gravity if there is some, each time anew from a state.
 
     Args:
-        scene: the scene. state: its `mujoco.MjData`, which stays as it is. hold: the test.
+        scene: the scene. state: its `mujoco.MjData`, which is not changed. hold: the test.
         before: where the object is compared with. film: takes pictures of the last pull.
     """
     weighs = hold.test == HoldTest.LIFT
@@ -256,7 +256,7 @@ def _copied(scene: Scene, state: Any) -> Any:
 
 
 def _pull(scene: Scene, data: Any, hold: Hold, before: Place, film: Film | None, *, lifted: bool = False) -> Pulled:
-    """Simulate a pull, or the lift; the object is compared with where it was before, raised with the palm."""
+    """Simulate a pull, or the lift; the object is compared with its pose before, raised with the palm."""
     import mujoco
 
     duration = hold.duration + (LIFTING if lifted else 0.0)
@@ -296,7 +296,7 @@ def _within(motion: ObjectMotion, hold: Hold) -> bool:
 
 
 def is_stable(data: Any) -> bool:
-    """Return whether the simulation has stayed finite: the engine starts again from the beginning where it has not."""
+    """Return whether the simulation has stayed finite: otherwise the engine restarts from the beginning."""
     import mujoco
 
     kinds = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)

@@ -1,4 +1,4 @@
-"""What moves the joints of a simulated hand: actuators of its own model, or servos that the simulation adds."""
+"""The actuators of a simulated hand: those of its own model, or servos that the simulation adds."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ _REPLACED = ("sensor", "keyframe", "option", "size", "statistic", "visual")
 #: Elements that would compete with servos at every joint.
 _DRIVING = ("actuator", "tendon", "equality")
 SERVO = "servo "
-#: How `driven_by` says that equalities of the model move a joint along.
+#: Value of `driven_by` for joints that equalities of the model move along.
 COUPLED = "coupled"
 
 
 class Drive(StrEnum):
-    """Name what moves the joints of a simulated hand."""
+    """Name the kinds of actuators of a simulated hand."""
 
     SERVO = "servo"
     """a stiff position servo at every joint; couplings hold because trajectories obey them"""
     MODEL = "model"
-    """position actuators, tendons, couplings, friction and damping of the model; servos where there are none"""
+    """position actuators, tendons, couplings, friction and damping of the model; servos for the remaining joints"""
 
 
 def check_drive(drive: Drive | str) -> Drive:
@@ -50,11 +50,11 @@ def check_drive(drive: Drive | str) -> Drive:
 
 @dataclass(frozen=True)
 class Driven:
-    """Tell what moves every joint of a hand.
+    """The drive of every joint of a hand.
 
     Args:
         by: name of the model's actuator, "servo" or "coupled", by joint.
-        unfit: names of actuators of the model that are not used, because they are no position servos.
+        unfit: names of actuators of the model that are unused because they are no position servos.
     """
 
     by: Mapping[str, str]
@@ -72,12 +72,12 @@ class Driven:
 
 
 def driving_spec(hand: Hand, drive: Drive, still: tuple[int, ...]) -> tuple[Any, Driven]:
-    """Return the hand's `mujoco.MjSpec` with the actuators that are used, and what moves each joint.
+    """Return the hand's `mujoco.MjSpec` with the used actuators, and the drive of each joint.
 
     Used are position servos (affine bias, no dynamics) of joints and of fixed tendons that belong to the hand.
 
     Args:
-        hand: the hand. drive: see `Drive`. still: joints that servos hold, whatever the model has.
+        hand: the hand. drive: see `Drive`. still: joints that servos hold, regardless of the model.
 
     Raises:
         HandError: the hand has no model.
@@ -104,7 +104,7 @@ def _spec(hand: Hand, without: tuple[str, ...]) -> Any:
 
 
 def _chosen(spec: Any, hand: Hand, still: set[str]) -> Driven:
-    """Delete the actuators of a spec that are not used, and equalities of bodies; tell what moves each joint."""
+    """Delete unused actuators and equalities of bodies from a spec; return the drive of each joint."""
     import mujoco
 
     of_joints = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtEq.mjEQ_TENDON
@@ -147,7 +147,7 @@ def _is_servo(model: Any, a: int) -> bool:
 
 
 def arms_of(model: Any, a: int) -> dict[int, float]:
-    """Return how an actuator's length grows with the angles of joints; empty unless a joint or a fixed tendon."""
+    """Return how an actuator's length grows with joint angles; empty unless it acts on a joint or a fixed tendon."""
     import mujoco
 
     target, gear = int(model.actuator_trnid[a, 0]), float(model.actuator_gear[a, 0])
@@ -160,7 +160,7 @@ def arms_of(model: Any, a: int) -> dict[int, float]:
 
 
 def _follow(model: Any, by: dict[str, str]) -> None:
-    """Add the joints that equalities of the model tie to those that are moved."""
+    """Add the joints that equalities of the model tie to the driven ones."""
     import mujoco
 
     ties = []
@@ -178,10 +178,10 @@ def _follow(model: Any, by: dict[str, str]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Tell the actuators of a scene what to do.
+    """Set the controls of a scene's actuators.
 
     Args:
-        numbers: of the hand's actuators in the scene, shape (A,). driven: what moves each joint.
+        numbers: of the hand's actuators in the scene, shape (A,). driven: drive of each joint.
         arms: how lengths of actuators grow with joint angles, shape (A, J).
         gains: force per control, shape (A,). ratios, offsets: of the control that holds a length, shape (A,).
     """
@@ -199,10 +199,9 @@ class Drives:
         return told
 
     def pressing(self, hand: Hand, q: FloatArray, torques: FloatArray) -> FloatArray:
-        """Return what to add to the controls so that the hand exerts torques [Nm], shape (A,).
+        """Return the change of the controls by which the hand exerts torques [Nm], shape (A,).
 
-        Where fewer actuators than joints move the hand, the torques are those that do the same work in every motion
-        that couplings allow.
+        With fewer actuators than joints, the torques do the same work in every motion that couplings allow.
         """
         if not self.driven.by_model:
             return torques / self.gains
@@ -216,7 +215,7 @@ def find_drives(model: Any, joints: IndexArray, hand_actuators: IndexArray, driv
 
     Args:
         model: the scene's. joints: numbers of the hand's joints in it, shape (J,).
-        hand_actuators: numbers of the hand's actuators, shape (A,). driven: what moves each joint.
+        hand_actuators: numbers of the hand's actuators, shape (A,). driven: drive of each joint.
     """
     columns = {int(joint): k for k, joint in enumerate(joints)}
     arms = np.zeros((len(hand_actuators), len(joints)))
@@ -228,7 +227,7 @@ def find_drives(model: Any, joints: IndexArray, hand_actuators: IndexArray, driv
 
 
 def sentences(driven: Driven, asked: Drive | str) -> tuple[str, ...]:
-    """Say what moved the joints where it is not the plain servo that nobody asked anything else of."""
+    """Describe the drives of the joints, unless all are plain default servos."""
     if asked != Drive.MODEL:
         return ()
     found = []

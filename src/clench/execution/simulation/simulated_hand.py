@@ -1,4 +1,4 @@
-"""A simulated hand (MuJoCo): opens, closes to the computed angles, and tells what it reached."""
+"""A simulated hand (MuJoCo): opens, closes to the computed angles, and reports the reached posture."""
 
 from __future__ import annotations
 
@@ -37,28 +37,28 @@ from .simulated_actuators import Drive, check_drive, sentences
 from .stepping import Stepper
 from .touch_watch import TouchWatch
 
-#: How long the hand stands still after the motion [s], so that the servos settle.
+#: Rest of the hand after the motion, in which the servos settle [s].
 SETTLING = 0.4
-#: How often the posture is noted [s].
+#: Interval of posture samples [s].
 WATCH_INTERVAL = 0.02
 
 
 class SimulatedHand:
     """Move a hand in simulation, with the palm fixed and the object held in place.
 
-    The simulated object is made of convex pieces and its contacts are a little soft, so angles and contacts are reached
-    up to tolerances, which the report names.
+    The simulated object consists of convex pieces, and its contacts are a little soft. Angles and contacts are
+    therefore reached up to tolerances, which the report names.
 
     Args:
         hand: the hand.
-        obj: the object; the solution says where it is.
+        obj: the object, at the solution's pose.
         angle_tolerance: largest difference to the computed angles that counts as reached [rad].
         contact_tolerance: largest distance that counts as touching [m].
         show_progress: show a bar while convex pieces are computed.
-        hold: once the touch is reached, do it again with a free object, squeeze it as planned, and pull or lift it;
-            without it the object stays where it is.
-        drive: what moves its joints, in the hold test, too: "servo" or "model", see `Drive`.
-        film: takes pictures: of the hold test where there is one, else of closing.
+        hold: after the touch, repeat the grasp with a free object, squeeze it as planned, and pull or lift it. Without
+            it the object is fixed.
+        drive: actuators of its joints, also in the hold test: "servo" or "model", see `Drive`.
+        film: takes pictures of the hold test, or of closing without one.
         on_step: called with time [s], joint angles [rad] in model order, shape (J,), every 20 ms and at the end.
     """
 
@@ -257,7 +257,7 @@ class SimulatedHand:
 
 @dataclass
 class _Samples:
-    """Note what was told and measured every `WATCH_INTERVAL`, and show it to whoever watches."""
+    """Record targets and measurements every `WATCH_INTERVAL`, and pass them to the observer."""
 
     scene: Scene
     joints: tuple[str, ...]
@@ -282,7 +282,7 @@ class _Samples:
             self.on_step(float(data.time), np.array(data.qpos[self.scene.qpos]))
 
     def history(self) -> ExecutionHistory:
-        """Return what was noted."""
+        """Return the recorded history."""
         return ExecutionHistory(self.joints, np.array(self.times), np.array(self.told), np.array(self.measured))
 
 

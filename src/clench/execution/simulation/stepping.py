@@ -21,7 +21,7 @@ from .mujoco_scene import TIMESTEP, Scene
 from .pulling import Held, is_stable, place_of, pull_each_way
 from .touch_watch import TouchWatch
 
-#: How long the hand stands still after a step [s], so that the servos settle.
+#: Rest of the hand after a step, in which the servos settle [s].
 SETTLING: Final = 0.4
 _Each = Callable[[Any, FloatArray], None] | None
 
@@ -31,7 +31,7 @@ class Stepper:
     """Take a simulated hand through the next steps of a solution.
 
     Args:
-        solution: with `next_steps`. hand: what it was computed for.
+        solution: with `next_steps`. hand: the hand that was solved for.
         pace: largest velocity [rad/s] and acceleration [rad/s²] of every joint, shape (J,) each.
         tolerance: largest difference to a step's angles that counts as reached [rad].
     """
@@ -125,7 +125,7 @@ class Stepper:
         return NextStepReached(joints, reached, reason, touching)
 
     def _still_held(self, scene: Scene, data: Any, hold: Hold, before: Any, found: NextStepReached) -> NextStepReached:
-        """Return what was found, with whether the object is still held: touched, not lost, and pulled or hung anew."""
+        """Return the result, with whether the object is still held: touched, not lost, and pulled or hung anew."""
         if not is_stable(data):
             return replace(found, held=False)
         after = place_of(scene, data)

@@ -16,7 +16,7 @@ class TouchWatch:
     """Note when each finger first touches the object, and how hard the fingers press.
 
     Args:
-        scene: the scene. hand: the hand in it. film: takes a picture of what is looked at, too.
+        scene: the scene. hand: the hand in it. film: takes pictures, too.
     """
 
     def __init__(self, scene: Scene, hand: Hand, film: Film | None = None) -> None:

@@ -66,13 +66,13 @@ def read_item(
 
 @kernel
 def holds(touches: TouchArrays, i: int, n: int) -> bool:
-    """Say whether a touch is one with what is to be grasped, and still there."""
+    """Say whether a contact is with a graspable body and still exists."""
     return bool(touches.number[i, n, TOUCH_GRASPABLE] != 0 and not touches.value[i, n, TOUCH_GAP] > PASSED_GAP)
 
 
 @kernel
 def holding_links(touches: TouchArrays, i: int, contacts: int) -> int:
-    """Return how many links touch what is to be grasped."""
+    """Return how many links touch a graspable body."""
     count = 0
     for n in range(contacts):
         if holds(touches, i, n):

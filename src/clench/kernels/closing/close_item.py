@@ -1,8 +1,8 @@
 """Close a finger, one degree of freedom after another, or all at once (docs/method.md section 4).
 
-The groups of a finger are gone through up to `times` over, fewer where nothing moves any more. Where joints of several
-families move at once, or in several rounds, an item has no planes: those of later families are cut where the earlier
-joints are at rest.
+The groups of a finger are gone through up to `times` over, fewer where nothing moves any more. If joints of several
+families move simultaneously, or in several rounds, an item has no planes: the planes of later families are cut with the
+earlier joints at rest.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def group_family(hand: HandArrays, group: int) -> int:
 
 @kernel
 def stops_same(chain: ChainArrays, hit: Ints, group: int, joint: int) -> bool:
-    """Say whether a contact stops what another one stops: a group, or its joints up to one that later ones leave."""
+    """Say whether two contacts stop the same joints: a group, or its joints up to the ones that break away."""
     return hit[HIT_GROUP] == group and (not chain.breaks[group] or hit[HIT_JOINT] == joint)
 
 
@@ -173,7 +173,7 @@ def write_contact(
 ) -> None:
     """Write a contact that stops the group of `joint`, up to it; in a further round it takes the earlier one's place.
 
-    Where a plane's contact and an exact one are the same touch, the plane describes it: it says more.
+    If a plane's contact and an exact one are the same touch, the plane describes it, because it has more data.
     """
     family, group = hand.chain.joint_family[joint], hand.chain.joint_group[joint]
     n = 0
@@ -223,7 +223,7 @@ def close_item(
         for link in range(sweep.poses.shape[0]):
             copy_pose(exact.link_pose[entry, link], sweep.poses[link])
     sweep.skipped[0] = 0
-    # Those of other entries' joints are never written: they would go on with what the item before left there.
+    # Travels of other entries' joints are never written: they would continue with the values of the item before.
     for j in range(work.rates.shape[0]):
         work.rates[j] = 0.0
     for _ in range(times):

@@ -38,8 +38,8 @@ from .layout import (
     RoundArrays,
 )
 
-#: Columns of `TouchArrays.number`: link and the joint that is stopped (in the hand), body or -1 - link of the hand,
-#: kind, plane in its family or -1, whether what is touched is to be grasped.
+#: Columns of `TouchArrays.number`: link and the stopped joint (in the hand), body or -1 - link of the hand, kind, plane
+#: in its family or -1, whether the touched body is graspable.
 TOUCH_LINK, TOUCH_JOINT, TOUCH_BODY, TOUCH_KIND, TOUCH_PLANE, TOUCH_GRASPABLE = 0, 1, 2, 3, 4, 5
 TOUCH_INTEGERS = 6
 #: Columns of `TouchArrays.value`: position, normal out of the object, gap, angle of the object's curve, angle of the
@@ -49,14 +49,14 @@ TOUCH_FLOATS = 10
 
 
 class TouchArrays(NamedTuple):
-    """Hold touches; I items, S contacts at most: `number` (I, S, 6), `value` (I, S, 10), see the columns above."""
+    """The contacts; I items, S contacts at most: `number` (I, S, 6), `value` (I, S, 10), see the columns above."""
 
     number: Ints
     value: Floats
 
 
 class SurfaceArrays(NamedTuple):
-    """Hold what reading a touch needs of the object.
+    """The object's data for contact reading.
 
     Args:
         normals: of the tree's triangles, (T, 3). body: of each, (T,). rounds: its round shapes. round_body: of each.
@@ -195,7 +195,7 @@ def read_exact_touch(
         z += pose[r, 2] * point[3 + r]
         offset += pose[r, 1] * (point[r] - pose[r, 3])
     value[TOUCH_GAP], value[TOUCH_CURVE], value[TOUCH_OFFSET] = point[HIT_GAP], math.atan2(x, -z), offset
-    # Where the side of a round link touches, the two surfaces have one tangent.
+    # At a contact with the side of a round link, the two surfaces have one tangent.
     value[TOUCH_SIDE] = value[TOUCH_CURVE] if hit[HIT_KIND] == KIND_SIDE else math.nan
 
 
@@ -219,7 +219,7 @@ def read_touch(
         read_exact_touch(surface, frames.parent.shape[0], hit, point, pose, number, value)
     else:
         read_plane_touch(hand, frames, surface, entry, hit, point, pose, answer.travel[i], T_palm_object, number, value)
-    # What stops is the leader of a group, or the last joint before those that break away.
+    # The stopped joint is the leader of a group, or the last joint before those that break away.
     group, body = hit[HIT_GROUP], number[TOUCH_BODY]
     breaks = hand.chain.breaks[group] != 0
     number[TOUCH_JOINT] = frames.chain_joint[hit[HIT_JOINT]] if breaks else frames.group_leader[group]

@@ -120,7 +120,7 @@ def close_on_device(problem: ProblemArrays, T_palm_objects: Floats, arena: Arena
 
 
 class _Device(NamedTuple):
-    """Hold how arrays get to the device and back, and how they are made there."""
+    """Functions that move arrays to the device and back, and create them there."""
 
     put: Callable[[Any], Any]
     get: Callable[[Any], Any]
@@ -144,7 +144,7 @@ def _each(change: Callable[[Any], Any], value: Any) -> Any:
 
 
 def _rows(arrays: Any, count: int) -> Any:
-    """Return arrays of the same shapes on the device, so many of each; what is in them is not known."""
+    """Return this many arrays of the same shapes on the device, with undefined content."""
     return _each(lambda array: _device().make((count, *array.shape), array.dtype), arrays)
 
 

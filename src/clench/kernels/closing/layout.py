@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 
 
 class ChainArrays(NamedTuple):
-    """Hold the joints; J joints, G groups.
+    """The joints; J joints, G groups.
 
     Args:
         joint_family: (J,), ascending. joint_group: (J,).
@@ -41,13 +41,13 @@ class ChainArrays(NamedTuple):
 
 
 class OutlineArrays(NamedTuple):
-    """Hold the links' outlines on all planes; O outlines, V vertices, S sides.
+    """The links' outlines on all planes; O outlines, V vertices, S sides.
 
     Args:
         joint: joint that moves it, (O,). link: (O,). radius: [m], (O,).
         both: 1 where the sides' winding is not known, (O,).
-        stadium: what it lies in, relative to its joint's pivot, (O, 5): all points within a radius, the fifth column,
-            of the line between two ends, (x, z) each [m].
+        stadium: bound of the outline, relative to its joint's pivot, (O, 5): all points within a radius, the fifth
+            column, of the line between two ends, (x, z) each [m].
         vertex_first: first vertex of each outline, (O + 1,). vertex: relative to the joint's pivot [m], (V, 2).
         side_first: first side of each outline, (O + 1,).
         side: rows (n_x, n_z, g, t_a, t_b) relative to the joint's pivot, (S, 5): outward unit normal, offset, and the
@@ -79,7 +79,7 @@ class Outline(NamedTuple):
 
 
 class HandArrays(NamedTuple):
-    """Hold the fingers of a hand, each at one or several postures ("entries"), in one piece.
+    """The fingers of a hand, each at one or several postures ("entries"), in one piece.
 
     E entries, F families, P planes. Every index is global, and what belongs to one entry stands together: an item of
     work is a range of groups and a range of planes.
@@ -87,8 +87,8 @@ class HandArrays(NamedTuple):
     Args:
         entry_group: first group of each entry, (E + 1,). entry_family: first family of each entry, (E + 1,).
         chain: the joints. outlines: the links, by plane.
-        family_pose: (F, 3, 4); an entry's first in the palm frame, others in the frame that sits on the last pivot of
-            the family before, with that family's axes, and turns with its last joint.
+        family_pose: (F, 3, 4). An entry's first is in the palm frame. Each other one is in a frame on the last pivot of
+            the family before: it has that family's axes, and turns with its last joint.
         family_plane: first plane of each family, (F + 1,). plane_offset: place along y [m], (P,).
         family_reach: no moved point gets farther from the family's origin in the plane [m], (F,).
         family_length: length of the finger [m], the scale of its tolerances, (F,).
@@ -108,7 +108,7 @@ class HandArrays(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Hold the scratch space of one item, so that closing allocates nothing.
+    """The scratch space of one item, so that closing allocates nothing.
 
     Args:
         place: joints at the start of the segment, rows (x, z, turn, its cosine and sine), (J, 5). moved, turns: joints
@@ -142,7 +142,7 @@ RUN = 8
 
 
 class SectionArrays(NamedTuple):
-    """Hold the object's sections with P planes, one row each; a fixed arena with a count per plane.
+    """The object's sections with P planes, one row each; a fixed arena with a count per plane.
 
     Args:
         segments: rows (a_x, a_z, b_x, b_z, n_x, n_z) [m], (P, capacity, 6), outward unit normals.
@@ -167,7 +167,7 @@ class SectionArrays(NamedTuple):
 
 
 class RoundArrays(NamedTuple):
-    """Hold an object's round primitives; R primitives.
+    """An object's round primitives; R primitives.
 
     Args:
         kind: 0 sphere, 1 capsule, 2 cylinder, 3 ellipsoid, (R,). size: as `ShapeKind` says [m], (R, 3).
@@ -189,7 +189,7 @@ class ItemArrays(NamedTuple):
 
     Args:
         entry: (I,). low, high: range of planes, counted from the first plane of each family of the entry, (I,).
-        until: where in the motion each joint is held from outside, infinite where it is not, (I, J).
+        until: place in the motion from which each joint is held from outside, infinite without one, (I, J).
     """
 
     entry: Ints
@@ -199,7 +199,7 @@ class ItemArrays(NamedTuple):
 
 
 class ClosingArrays(NamedTuple):
-    """Hold the answers of all items; I items, S contacts at most.
+    """The answers of all items; I items, S contacts at most.
 
     Args:
         travel: of every group [rad], (I, G). turn: of every joint [rad], (I, J); only the entry's own are set.
@@ -230,10 +230,10 @@ HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE
 #: The last joint that the contact stops.
 HIT_JOINT = 8
 HIT_INTEGERS = 9
-#: For an exact contact the plane is -1, and the columns mean: link, kind, element that is met, group, family, element
-#: of the link, and what is met (a link, or the number of links for the object).
-#: Columns of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at
-#: the item's final posture; for an exact contact point and normal in the palm frame, and the gap.
+#: For an exact contact the plane is -1, and the columns mean: link, kind, element of the other body, group, family,
+#: element of the link, and the other body (a link, or the number of links for the object). Columns of
+#: `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at the item's
+#: final posture; for an exact contact point and normal in the palm frame, and the gap.
 HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_GAP = 0, 1, 2, 3, 4, 5, 6
 HIT_FLOATS = 7
 

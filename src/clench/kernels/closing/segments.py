@@ -1,4 +1,4 @@
-"""What moves next while a finger closes: the path segments of every order (docs/method.md section 4)."""
+"""Find the next motion while a finger closes: the path segments of every order (docs/method.md section 4)."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def next_segment(
     along: float,
     rates: Floats,
 ) -> float:
-    """Write how fast every joint moves from here; return for how long it stays so, 0 when nothing moves any more.
+    """Write the present speed of every joint; return how long it lasts, 0 when nothing moves any more.
 
     Args:
-        joints: range of the finger's. group: the one that moves, or `ALL`. travel: of every group [rad], (G,).
+        joints: range of the finger's. group: the moving one, or `ALL`. travel: of every group [rad], (G,).
         locked: joints that stand still, (J,). until: see `ItemArrays`, (J,). along: the motion so far.
     """
     end = math.inf
@@ -85,7 +85,7 @@ def move_groups(
 
 @kernel
 def lock_joints(chain: ChainArrays, joints: tuple[int, int], last: int, locked: Ints) -> None:
-    """Hold the joints up to `last`, and with each all of its group, unless the group's later joints break away."""
+    """Lock the joints up to `last`, and with each all of its group, unless the group's later joints break away."""
     for j in range(joints[0], last + 1):
         locked[j] = 1
         if not chain.breaks[chain.joint_group[j]]:
@@ -96,7 +96,7 @@ def lock_joints(chain: ChainArrays, joints: tuple[int, int], last: int, locked: 
 
 @kernel
 def lock_held(chain: ChainArrays, joints: tuple[int, int], until: Floats, along: float, locked: Ints) -> None:
-    """Hold the joints that are held from outside from here on."""
+    """Lock the joints that are stopped from outside from here on."""
     for j in range(joints[0], joints[1]):
         if until[j] <= along and not locked[j]:
             lock_joints(chain, joints, j, locked)

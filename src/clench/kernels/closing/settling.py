@@ -76,7 +76,7 @@ def later_turned(hand: HandArrays, entry: int, family: int, turns: Floats) -> bo
 
 @kernel
 def closest_pair(exact: ExactArrays, T_palm_object: Floats, m: int, met: int, bound: float, sweep: SweepWork) -> float:
-    """Find the elements of a link and of what it met that are closest at `sweep.poses`; return their gap."""
+    """Find the closest elements of a link and of the body that it met, at `sweep.poses`; return their gap."""
     on_object = met == exact.checked.shape[0]
     copy_pose(sweep.poses[m], sweep.moving)
     copy_pose(T_palm_object if on_object else sweep.poses[met], sweep.resting)

@@ -37,14 +37,15 @@ class CommandArrays(NamedTuple):
 
     Args:
         start: posture before closing [rad], (J,). start_pose: `T_palm_link` of every link there, (L, 3, 4).
-        fixed: whether a mesh is on a link that no finger moves, (M,). fingers: on one that a finger moves, (M,).
+        fixed: whether a mesh is on a link that no finger moves, (M,). fingers: whether it is on a link that a finger
+            moves, (M,).
         own, resting: whether a mesh is on a link of the finger, and on one of these that closing does not move, (E, M).
         joints: joints of each entry's finger, palm side first, then -1, (E, K). finger: finger of each entry, (E,).
         thumb: whether a finger is a thumb, (F,). tip: the link that alone may touch, -1 where every link may, (F,).
         worth: what one unit of a criterion adds to the sum, in the order of the sum. term: which criterion of
             `clench.scoring.criterion_registry.ALWAYS` it is.
         present: item of each finger that goes before others up to `margin` better [steps of a sum], or -1, (F,).
-        times: how often the groups of a finger are gone through. together: all joints of a hand move at once.
+        times: number of passes through the groups of a finger. together: all joints of a hand move at once.
         whole: items over the full width are among those of the plan. chosen: every finger has one item.
         crossing: the sections of the first families tell which entries overlap the object at the start.
         several: entries of one finger differ in posture. nested: links lie inside each other at the start.
@@ -149,8 +150,8 @@ class Closed(NamedTuple):
     Args:
         free: answers of all items, each without the other fingers, with the poses first.
         crossed: an outline of each entry that overlaps the object at the start, or -1, (N, E).
-        blocked: why an entry overlaps the object before anything moves, see `start_overlap`; `CROSSED` + link where a
-            plane or a sweep tells the link; 0 where it does not, (N, E).
+        blocked: reason why an entry overlaps the object before anything moves, see `start_overlap`; `CROSSED` + link if
+            a plane or a sweep tells the link; 0 without an overlap, (N, E).
         nested: whether links lie inside each other at the start of the chosen items, (N,).
         final: answers of the chosen items, each with the other fingers in its way, (N, F).
         anew: whether a finger closed again, as another one was in its way, (N, F).

@@ -22,7 +22,7 @@ ROUNDING: Final = 1e-9
 
 
 class BodyArrays(NamedTuple):
-    """Hold several bodies, each in its own frame, one tree each; V vertices, T elements, N nodes, B bodies.
+    """Several bodies, each in its own frame, one tree each; V vertices, T elements, N nodes, B bodies.
 
     Nodes are in preorder, the left child of `i` is `i + 1`. An element is the convex hull of its vertices, grown by its
     radius: a triangle of a mesh, the core of a capsule or of a sphere (docs/method.md section 5).

@@ -53,7 +53,7 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
 
 @kernel
 def square_axes(u: Vector, v: Vector) -> tuple[Vector, Vector]:
-    """Return the unit vectors along u and across both, whatever their sizes, up to none."""
+    """Return the unit vectors along u and across both, for any sizes, up to none."""
     size = math.sqrt(dot(u, u))
     first = scaled(u, 1.0 / size) if size > 0.0 else (1.0, 0.0, 0.0)
     third = cross(first, v)
@@ -142,7 +142,7 @@ def off_box(core: Floats, corners: int, box: Floats, local: Floats) -> tuple[flo
 
 @kernel
 def clamped(x: float, half: float) -> float:
-    """Return what is closest to a coordinate within half a size to either side."""
+    """Return the nearest point to a coordinate within half a size to either side."""
     return min(max(x, -half), half)
 
 
@@ -168,7 +168,7 @@ def walk_to_box(
 ) -> float:
     """Return a travel up to which a core, that is apart from a box until `begin`, stays farther than `w` from it.
 
-    It is infinite where it does until `best`. Every step goes to a plane between the two, see `step_to_plane`, but ends
+    It is infinite if it does until `best`. Every step goes to a plane between the two, see `step_to_plane`, but ends
     where they are nearer than `near`, or after some steps.
     """
     s = begin

@@ -24,7 +24,7 @@ _FLAT = 1e-14
 
 
 class MeshTree(NamedTuple):
-    """Hold a triangle mesh in the order of its tree; nodes are in preorder, the left child of `i` is `i + 1`.
+    """A triangle mesh in the order of its tree; nodes are in preorder, the left child of `i` is `i + 1`.
 
     A walk that needs no order needs no stack: go to `i + 1`, or to `skip[i]` when node `i` is of no interest.
 
@@ -89,7 +89,7 @@ def feature_owners(tree: MeshTree) -> NDArray[np.uint8]:
     masks = np.zeros(len(tree.triangles), dtype=np.uint8)
     vertices = tree.triangles.ravel()
     first = np.full(len(tree.vertices), -1, dtype=np.int32)
-    # What is assigned last stays: the first triangle that names a vertex.
+    # The last assignment wins: the first triangle that names a vertex.
     first[vertices[::-1]] = np.arange(len(vertices), dtype=np.int32)[::-1]
     _own(masks, first[first >= 0], 0)
     nexts = np.roll(tree.triangles, -1, axis=1).ravel()
@@ -178,7 +178,7 @@ def part_nodes(
     areas: Floats,
     todo: Any,
 ) -> int:
-    """Part the triangles into nodes until leaves are left; write `order` and the nodes, return how many there are.
+    """Split the triangles into nodes down to leaves; write `order` and the nodes, return their number.
 
     Args:
         boxes, centers: see `triangle_boxes`. order: triangles, 0 ... T - 1 at the start, (T,).

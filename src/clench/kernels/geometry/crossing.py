@@ -14,7 +14,7 @@ from .vectors import Vector
 
 #: Surfaces that cross by no more than this touch [m].
 DEEP = 1e-9
-#: Directions shorter than this fraction of what they are made of are none [-].
+#: Directions shorter than this fraction of their factors count as none [-].
 _NONE = 1e-9
 
 
@@ -59,8 +59,8 @@ def across(u: Vector, v: Vector) -> tuple[bool, Vector]:
 def only_touch(a: Floats, ka: int, b: Floats, kb: int) -> bool:
     """Say whether two sharp cores that cross do so by no more than `DEEP`, with their bodies on either side of a plane.
 
-    Flush faces do: an edge of one lies in the other. So does the end of a body inside another one of the same section,
-    which the faces' directions tell from it: those of bodies side by side look at each other.
+    Flush faces do: an edge of one lies in the other. This also counts for the end of a body inside another body of the
+    same section. The directions of the faces tell it from bodies side by side, whose faces look at each other.
     """
     for face in range(2):
         if (ka if face == 0 else kb) < 3:

@@ -1,4 +1,4 @@
-"""Where the links of a hand are, and its joints' angles when groups have travelled: kinematics for kernels."""
+"""Compute the frames of a hand's links, and its joints' angles from the travel of groups: kinematics for kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_po
 
 
 class FrameArrays(NamedTuple):
-    """Hold the kinematics of a whole hand; L links, J joints, C couplings, E entries, G groups.
+    """The kinematics of a whole hand; L links, J joints, C couplings, E entries, G groups.
 
     Args:
         parent: of each link, -1 for the root, (L,). joint: that moves it, -1 when fixed, (L,).

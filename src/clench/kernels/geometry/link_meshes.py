@@ -19,7 +19,7 @@ from .penetration import CROSSINGS, penetration
 
 
 class LinkMeshArrays(NamedTuple):
-    """Hold the trees of M links, one after another; M may be smaller than the number of links of the hand.
+    """The trees of M links, one after another; M may be smaller than the number of links of the hand.
 
     Args:
         link: index in the hand, (M,). closed: watertight with outward normals, (M,).
@@ -43,7 +43,7 @@ class LinkMeshArrays(NamedTuple):
 
 
 class ObjectMesh(NamedTuple):
-    """Hold an object's surface: tree of all its triangles, their owners, whether closed, a point of every part."""
+    """An object's surface: tree of all its triangles, their owners, whether closed, a point of every part."""
 
     tree: MeshTree
     owners: NDArray[np.uint8]
@@ -95,7 +95,7 @@ def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTr
 
 
 class DepthWork(NamedTuple):
-    """Hold the scratch space of `depth_of`: for `penetration`, two poses, two points, and pairs of nodes."""
+    """The scratch space of `depth_of`: for `penetration`, two poses, two points, and pairs of nodes."""
 
     crossings: Floats
     stack: Ints
@@ -122,7 +122,7 @@ def measure_depths(
 ) -> None:
     """Write depth and place of links, (M, 4), zeros where nothing overlaps; see `penetration`.
 
-    No depth is larger than the ball around its link: what is deeper lies inside with all of its size.
+    No depth exceeds the ball around its link: a deeper link lies inside completely.
 
     Args:
         meshes: of the links. which: of them, (M,). poses: `T_palm_link` of every link, (L, 3, 4).
@@ -155,7 +155,7 @@ def depth_of(
     mesh, closed = mesh_of(meshes, k), meshes.closed[k] != 0
     if boxes_apart(mesh, 0, solid.tree, 0, T):
         return 0.0, 0.0, 0.0, 0.0
-    # Where an open mesh has an inside, a surface gets into it without crossing.
+    # A surface can get into an open mesh without crossing it.
     apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, work.pairs)
     if apart and not has_contained(meshes, k, T, solid, work.points[0]):
         return 0.0, 0.0, 0.0, 0.0

@@ -95,8 +95,9 @@ def closest_within(tree: MeshTree, p: Point, bound: float, stack: Ints) -> tuple
 def is_inside(tree: MeshTree, p: Any, closed: bool) -> bool:
     """Say whether a point lies inside a mesh.
 
-    For a closed mesh two of three rays in fixed directions decide by their signed crossings; when they disagree, or hit
-    an edge, and for open meshes, the winding number decides (more than one half in magnitude is inside).
+    For a closed mesh, the signed crossings of three rays in fixed directions decide by majority of two. If the rays
+    disagree or hit an edge, and for open meshes, the winding number decides (more than one half in magnitude is
+    inside).
     """
     if tree.low.shape[0] == 0:
         return False
@@ -118,7 +119,7 @@ def is_inside(tree: MeshTree, p: Any, closed: bool) -> bool:
 
 @entry_kernel
 def winding_number(tree: MeshTree, p: Any) -> float:
-    """Return how often the mesh winds around a point: its exact solid angle over 4π (van Oosterom and Strackee)."""
+    """Return the winding number around a point: the exact solid angle over 4π (van Oosterom and Strackee)."""
     vertices, triangles = tree.vertices, tree.triangles
     total = 0.0
     for t in range(triangles.shape[0]):

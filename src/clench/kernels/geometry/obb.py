@@ -23,7 +23,7 @@ SLAB: Final = 13
 RECTANGLE: Final = 4
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
 THIN: Final = 0.75
-#: A box that is no thinner than that, as a fraction of what is across its longest edge, is not seen as flat [-].
+#: A box that is no thinner than this fraction of the width across its longest edge does not count as flat [-].
 FLAT: Final = 0.5
 #: How much of a box's width counts as slack beside its thickness [-].
 SOME: Final = 0.1
@@ -36,7 +36,7 @@ TINY: Final = 1e-37
 def node_slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats) -> NDArray[np.float32]:
     """Return a box around the elements of each node, along their principal axes.
 
-    Single precision halves what is kept and read; every box is grown by what rounding may have taken.
+    Single precision halves the memory that is kept and read; every box is grown by a bound on the rounding.
 
     Args:
         tree: of the elements. begin, end: each node's elements, (N,). grown: their largest radius [m], (N,).
@@ -121,7 +121,7 @@ def measure_extent(vertices: Floats, elements: Any, begin: Any, end: Any, axes: 
 
 @kernel
 def slab_half(slab: Any, nx: float, ny: float, nz: float) -> float:
-    """Return half the extent of a box along a vector n, times the vector's length, without what it is grown by."""
+    """Return half the extent of a box along a vector n, times the vector's length, without its margin."""
     half = 0.0
     for k in range(3, 12, 3):
         half += abs(nx * slab[k] + ny * slab[k + 1] + nz * slab[k + 2])
@@ -144,7 +144,7 @@ def edge_square(slab: Any, k: int) -> float:
 
 @kernel
 def slab_slack(slab: Any) -> float:
-    """Return about how far a box reaches beyond what is in it: its thickness, and some of its width [m]."""
+    """Return about how far a box reaches beyond its content: its thickness, and some of its width [m]."""
     return math.sqrt(edge_square(slab, 9)) + SOME * math.sqrt(edge_square(slab, 6))
 
 
@@ -201,7 +201,7 @@ def put_slab_face(slab: Any, T: Floats, out: Floats) -> tuple[int, float]:
     """Write a core of a box, in a pose: the rectangle through its middle along its longer edges, or `put_slab_core`'s.
 
     Returns:
-        how many corners the core has, and what it is to be grown by to hold the box [m].
+        number of corners of the core, and the margin by which it holds the box [m].
     """
     wide, thin = edge_square(slab, 6), edge_square(slab, 9)
     if thin >= FLAT * FLAT * (wide + thin):

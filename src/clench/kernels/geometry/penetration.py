@@ -1,4 +1,4 @@
-"""How deep two meshes overlap (docs/method.md section 5): the surface point of one that is deepest inside the other."""
+"""Measure how deep two meshes overlap: the deepest surface point of one inside the other (docs/method.md section 5)."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Mechanics: bounds of what grasps resist, and the approach of an open hand."""
+"""Mechanics: bounds of the wrenches that grasps resist, and the approach of an open hand."""

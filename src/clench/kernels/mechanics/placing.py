@@ -15,12 +15,13 @@ from clench.kernels.toi.toi_translation import PAIRS, first_contact
 
 
 class Placed(NamedTuple):
-    """Where hands stop, for N proposals.
+    """Find the stops of hands that approach, for N proposals.
 
     Args:
-        travel: how far past its place each hand may go before it touches anything [m], shape (N,): below 0 when it is
-            stopped before, and some such number when it is stopped by more than `short`; `ahead` when nothing stops it.
-        body: what it touches first there, as numbered by the object's tree, -1 for nothing, shape (N,).
+        travel: distance that each hand may go past its place before it touches anything [m], shape (N,). It is below 0
+            if the hand is stopped before its place, and any such number if it is stopped by more than `short`; it is
+            `ahead` if nothing stops the hand.
+        body: the body that it touches first there, as numbered by the object's tree, -1 for none, shape (N,).
         link: mesh of the hand that touches, -1 for none, shape (N,).
     """
 

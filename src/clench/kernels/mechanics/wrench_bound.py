@@ -1,9 +1,10 @@
-"""A lower bound of what a grasp resists, in closed form: affine responses to wrenches (docs/method.md section 6).
+"""Bound the wrenches that a grasp resists from below, in closed form: affine responses to wrenches (docs/method.md
+section 6).
 
 Forces `f = s f0 + K w` exert the wrench w when `G f0 = 0` and `G K = 1`. They stay inside every face `a f >= 0` of the
-friction polyhedra for all `|w| <= r` when `s a f0 >= r |K^T a|`, and below every cap `c f <= b` when
-`s |c f0| + r |K^T c| <= b`. So r is resisted; how near it comes to the largest depends on f0 and K, which a few rounds
-of reweighting improve: contacts that bind get more preload and answer less.
+friction polyhedra for all `|w| <= r` when `s a f0 >= r |K^T a|`, and below every cap `c f <= b` when `s |c f0| + r |K^T
+c| <= b`. Thus r is resisted. Its distance from the largest radius depends on f0 and K, which a few rounds of
+reweighting improve: contacts that bind get more preload and answer less.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def leave_out_fingers(a: int, b: int, count: int, room: MeetingWork) -> None:
 def hold_up_to(
     exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, at: float, blocked: bool, until: Floats
 ) -> int:
-    """Hold the joints of a finger up to a link from a place of the motion on; return the last of them, or -1 if none.
+    """Stop the joints of a finger up to a link from a place of the motion on; return the last of them, or -1 if none.
 
     Args:
         k: the link, of `fingers`. blocked: nothing moves. until: of the finger's item, written, (J,).

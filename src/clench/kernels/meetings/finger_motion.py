@@ -1,4 +1,4 @@
-"""Where the links of fingers are that move at once, how fast, and how their paths bend along a direction."""
+"""Compute how links of simultaneously closing fingers move: places, speeds, bend of their paths along a direction."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SPREAD = 4.0
 def put_motion(
     exact: ExactArrays, chain: ChainArrays, entry: int, blocked: bool, answer: ClosingArrays, i: int, room: MeetingWork
 ) -> None:
-    """Write in which part of the motion the joints of an item move, how fast and how far.
+    """Write the part of the motion in which each joint of an item moves, its speed and its travel.
 
     Args:
         blocked: nothing moves. answer, i: how the item closed.
@@ -56,7 +56,7 @@ def place_link(
 
 @kernel
 def last_end(exact: ExactArrays, fingers: FingerLinks, entry: int, k: int, room: MeetingWork) -> float:
-    """Return after how much motion a link is at rest."""
+    """Return the motion after which a link is at rest."""
     end = 0.0
     for j in range(exact.joint_first[entry], fingers.joint[k] + 1):
         end = max(end, room.end[j])
@@ -146,7 +146,7 @@ def approach_along(
     end: float,
     room: MeetingWork,
 ) -> tuple[float, float, float]:
-    """Return the sums of what `motion_along` returns for two links, one of either entry."""
+    """Return the sums of the results of `motion_along` for two links, one of either entry."""
     way, speed, bend = motion_along(exact, fingers, entries[0], rows[0], n, at, end, room)
     other, more, further = motion_along(exact, fingers, entries[1], rows[1], n, at, end, room)
     return way + other, speed + more, bend + further

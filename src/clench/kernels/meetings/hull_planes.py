@@ -39,7 +39,7 @@ def farthest_point(
             top, second = slab_top(bodies.slab[one], x, y, z), slab_top(bodies.slab[other], x, y, z)
             if top > second:
                 one, other, top, second = other, one, second, top
-            # The one that reaches farther is looked at next.
+            # The farther-reaching one is tested next.
             if top > best:
                 stack[waiting, 0] = one
                 waiting += 1
@@ -120,8 +120,8 @@ def find_plane(
     """Return how far a plane keeps two bodies apart, and its unit normal, from body `r` to `m`.
 
     The first direction that is tried is given; those that follow lead to the triangle, among differences of points of
-    the two hulls, that is nearest to the origin (Gilbert, Johnson and Keerthi). Where hulls overlap, what is returned
-    is not positive.
+    the two hulls, that is nearest to the origin (Gilbert, Johnson and Keerthi). If hulls overlap, the result is not
+    positive.
     """
     best, bx, by, bz = -math.inf, nx, ny, nz
     size, away = 0, math.inf

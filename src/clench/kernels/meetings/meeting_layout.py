@@ -1,4 +1,4 @@
-"""Layout of the arrays of fingers that move at once: what is known of their links, and the search's scratch space."""
+"""Layout of the arrays of simultaneously closing fingers: data of their links, and the search's scratch space."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from clench.kernels.runtime.compiling import kernel
 
 
 class FingerLinks(NamedTuple):
-    """Hold what a plan says about the links of its fingers; E entries, K links of them that can touch, J joints.
+    """A plan's data of the links of its fingers; E entries, K links of them that can touch, J joints.
 
     Args:
         first: first link of each entry, (E + 1,). link: index in the hand, (K,).
-        joint: last closing joint that moves it, -1 for one that rests, (K,).
+        joint: last closing joint that moves it, -1 for a resting link, (K,).
         arm: no point of the link gets farther from a joint's pivot [m], (K, J).
         tilt: largest sine of the angle between two axes of an entry's joints [-], (E,).
         apart: whether links of different fingers may not overlap each other, (L, L).
@@ -30,7 +30,7 @@ class FingerLinks(NamedTuple):
 
 
 class Meetings(NamedTuple):
-    """Hold where fingers met, in order; M meetings at most.
+    """The places where fingers met, in order; M meetings at most.
 
     Args:
         size: how many there are, (1,).
@@ -45,7 +45,7 @@ class Meetings(NamedTuple):
 
 
 class MeetingWork(NamedTuple):
-    """Hold the scratch space of the search; K links, P pairs of them, I items, J joints, L links of the hand.
+    """The scratch space of the search; K links, P pairs of them, I items, J joints, L links of the hand.
 
     Args:
         until: see `ItemArrays`, (I, J).
@@ -55,7 +55,7 @@ class MeetingWork(NamedTuple):
         lane: extent of each link along a direction [m], (K, 2).
         pair: the two items among those chosen, their links, whether the pair counts, how often it was looked at, and
             its elements that were nearest, (P, 8). at: up to where it is free, infinite if to the end, (P,).
-        plane: normal of one that kept it apart, (P, 3). reach: up to which gap it is measured [m], (P,).
+        plane: normal of a plane that separated it, (P, 3). reach: up to which gap it is measured [m], (P,).
         ahead: poses of two links further on, (2, 3, 4).
         touch: how the pair that was looked at last touches, as `Meetings.value`, (8,).
     """

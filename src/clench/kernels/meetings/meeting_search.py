@@ -1,8 +1,8 @@
-"""Where links of fingers that move at once first meet (docs/method.md section 5).
+"""Find the first meetings of links of simultaneously closing fingers (docs/method.md section 5).
 
-A pair of links goes on in steps that cannot pass a meeting, and the pair that has come least far goes on next. A plane
-that keeps their hulls apart at both ends of a step does so in between, but for how far paths can bend. Where hulls are
-near, the closest elements give the plane. Where no plane keeps links apart, a step is as long as their gap allows.
+A pair of links advances in steps that cannot pass a meeting. The pair that has advanced least goes next. A plane that
+keeps their hulls apart at both ends of a step does so in between, except for the bend of the paths. If hulls are near,
+the closest elements give the plane. If no plane keeps links apart, a step is as long as their gap allows.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shor
 NEAR = 1e-5
 #: Up to which gap elements are measured at first, and how that grows while they are farther apart [m, -].
 REACH, WIDER = 1e-4, 4.0
-#: A pair that is looked at so often is taken for one that meets, which is safe.
+#: A pair counts as meeting after this many looks, which is safe.
 LOOKS = 20_000
-#: What a look tells: the pair goes on, it is free to the end, it meets.
+#: Result of a look: the pair continues, it is free to the end, it meets.
 ON, FREE, MEETS = 0, 1, 2
 
 
@@ -103,7 +103,7 @@ def step_by_plane(
     room: MeetingWork,
     sweep: SweepWork,
 ) -> float:
-    """Return how far two links go on from a place of the motion, kept apart by planes across one direction.
+    """Return how far two links advance from a place of the motion, kept apart by planes across one direction.
 
     Args:
         entries, rows: of the links, which stand in `sweep`. n: unit vector from the second link to the first.

@@ -100,7 +100,7 @@ def links_gap(links: BodyArrays, m: int, r: int, bound: float, n: Vector, near: 
 
 @kernel
 def lowest_on(step: float, margin: float, left: float, bend: float) -> float:
-    """Return a bound from below on how far two parts are apart along a direction anywhere on a step.
+    """Return a lower bound of the gap between two parts along a direction, anywhere on a step.
 
     Args:
         margin, left: how far they are where it begins and ends. bend: how fast the rate may change at which that
@@ -136,7 +136,7 @@ def step_by_elements(
     room: MeetingWork,
     sweep: SweepWork,
 ) -> float:
-    """Return how far two links go on from a place of the motion, as planes between their elements tell.
+    """Return how far two links advance from a place of the motion, kept apart by planes between their elements.
 
     Elements that are farther apart than links approach each other on the step do not count.
 

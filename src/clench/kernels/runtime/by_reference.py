@@ -1,7 +1,8 @@
 """How kernels hand arrays on: a pointer to a tuple of arrays instead of every number of every array.
 
 A hand, an object and the scratch space are hundreds of numbers: handing them over took longer than what many short
-functions do. So a kernel that calls another one hands over where a tuple is. Python does the same with what it `keeps`.
+functions do. A kernel that calls another one therefore passes the address of a tuple. Python does the same with the
+values that it `keeps`.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Handed(types.Type):
 
     @property
     def key(self) -> Any:
-        """What two equal types have in common."""
+        """The key that two equal types share."""
         return self.content
 
     @cached_property

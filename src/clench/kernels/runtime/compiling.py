@@ -67,8 +67,8 @@ def source_stamp(module: Path) -> bytes:
     """Return a digest of the sources that a module's kernels are compiled from, and of the numbers in them.
 
     A kernel on disk is good for as long as this digest is the same. Numba looks at the kernel's own file only, while a
-    kernel contains the kernels that it calls. So the digest covers the modules that the module imports, directly or
-    over others, and these decorators.
+    kernel contains the kernels that it calls. Thus the digest covers these decorators and the modules that the module
+    imports, directly or over others.
 
     Args:
         module: file of the module, in any folder.

@@ -6,7 +6,7 @@ import pickle
 from collections.abc import Callable
 from typing import Any
 
-#: What reading a file raises that names modules or classes which this version does not have, or that is damaged.
+#: Errors of reading a damaged file, or one that names modules or classes which this version does not have.
 _UNREADABLE = (ImportError, AttributeError, pickle.UnpicklingError, EOFError, TypeError, ValueError, IndexError)
 
 

@@ -1,8 +1,8 @@
 """Compile the kernels of a solve ahead of it, in two processes at once.
 
 A first solve compiles for minutes, one kernel after another. Half of it is the closing, so a second process compiles
-that into the cache on disk, from where this one loads it. Nothing depends on the second process: what it does
-not deliver is compiled when it is called.
+that into the cache on disk, from where this one loads it. Nothing depends on the second process: kernels that it does
+not deliver are compiled when they are called.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ from clench.kernels.toi.toi_work import SweepWork
 from .by_reference import handed, kept
 from .compiling import is_kept
 
-#: What each process compiles, in this order: first the parts of what both end with.
+#: The kernels that each process compiles, in this order: first the parts that both need.
 HERE: tuple[Any, ...] = (
     sweep_stage,
     settle_pair,
@@ -164,7 +164,7 @@ def sample_values() -> dict[str, Any]:
 
 
 def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
-    """Return values of what `solve_poses` takes, and of its scratch space."""
+    """Return values of the arguments of `solve_poses`, and of its scratch space."""
     target = ObjectArrays(values["tree"], values["rounds"], True, values["exact"].object)
     counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 i1 i1 f1 i1 i1"), 0.0, 0, *[True] * 6, 0, True]
     parts: list[Any] = [values[name] for name in ("hand", "exact", "items")]

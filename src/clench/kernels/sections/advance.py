@@ -129,8 +129,9 @@ def advance_outline(
     """Return the first contact of one outline with a plane's section before `best`, else `best`.
 
     Behind one active joint an outline turns about that joint's pivot (mirrored when it turns clockwise). Behind
-    several, its features are relative to the last of them. What is certainly free is passed at once, the rest is cut
-    into short strides: at the start of a stride a feature's gap costs no trigonometry, and most are too wide for it.
+    several, its features are relative to the last of them. Certainly free motion is passed in one step, and the rest is
+    cut into short strides. At the start of a stride a feature's gap costs no trigonometry, and most gaps are too wide
+    for it.
     """
     joint, place = outlines.joint[o], work.place
     count, last, rate, speed = fill_chain(joint, first, rates, place, work)

@@ -135,8 +135,8 @@ def curve_range(e: Floats) -> tuple[float, float]:
 def turn_to_curve(e: Floats, first: float, last: float, nx: float, nz: float, sense: float) -> float:
     """Return how far a side with normal n turns until the curved part of a region has a tangent along it.
 
-    Between two caps the normals of the curve are in two ranges, narrow ones where the ellipse is long: elsewhere a side
-    meets the corners, and the support of the whole ellipse would only tell of what is not there.
+    Between two caps the normals of the curve are in two ranges, narrow ones if the ellipse is long. Elsewhere a side
+    meets the corners, and the support of the whole ellipse would belong to points that do not exist.
 
     Args:
         first, last: see `curve_range`. sense: of the turn, 1 from x to z.

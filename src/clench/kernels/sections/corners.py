@@ -1,9 +1,9 @@
 """Sharp features that touch at the start, and whether they block (docs/method.md section 3).
 
-The gap of one vertex and one line decides alone where the touch lies inside the line's segment. Where two corners
-meet, the line of either side is only one of several that separate them: the motion is blocked when it closes the gap
-of every separating line. In a notch no line separates them: there no side of the notch may close in. And where a
-surface counts from both sides, a touching vertex lies on the side of its body.
+The gap of one vertex and one line decides alone where the touch lies inside the line's segment. If two corners meet,
+the line of either side is only one of several that separate them. The motion is blocked when it closes the gap of every
+separating line. In a notch no line separates them: there no side of the notch may close in. And where a surface counts
+from both sides, a touching vertex lies on the side of its body.
 """
 
 from __future__ import annotations

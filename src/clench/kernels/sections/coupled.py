@@ -1,9 +1,9 @@
 """First contact when several joints turn at once (docs/method.md section 4).
 
-Along one path segment every joint turns at its own constant rate, so a point of a link moves as
-`p(s) = P + Σ R(Ω_i s) e_i`, and every gap of section 3 is a sum `C + Σ A_i cos(ω_i s) + B_i sin(ω_i s)`.
-The second derivative of such a sum is bounded by `M = Σ ω_i² hypot(A_i, B_i)`; a step to the zero of the parabola
-`f + f' d - M d²/2` can therefore never pass a root, and near a root it is a Newton step from the safe side.
+Along one path segment every joint turns at its own constant rate, so a point of a link moves as `p(s) = P + Σ R(Ω_i s)
+e_i`, and every gap of section 3 is a sum `C + Σ A_i cos(ω_i s) + B_i sin(ω_i s)`. The second derivative of such a sum
+is bounded by `M = Σ ω_i² hypot(A_i, B_i)`. A step to the zero of the parabola `f + f' d - M d²/2` can therefore never
+pass a root, and near a root it is a Newton step from the safe side.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What closing does where joints about another axis begin to move, in their own planes (docs/method.md section 4)."""
+"""Close after joints about another axis begin to move, in their own planes (docs/method.md section 4)."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def turn_outline(
     segments, disks, stadium, o = sections.segments, sections.disks, work.stadium, outline.number
     circles, count = sections.circles, sections.counts[row, 0]
     vertex, side, pair = work.vertex, work.side, work.best
-    # The circle around the stadium, which turns, and where it is at the end.
+    # The circle around the turning stadium, and its place at the end.
     cx, cz = stadium[o, 0] + 0.5 * stadium[o, 2], stadium[o, 1] + 0.5 * stadium[o, 3]
     reach = 0.5 * math.sqrt(stadium[o, 2] ** 2 + stadium[o, 3] ** 2) + stadium[o, 5] + touch
     d = math.sqrt(cx * cx + cz * cz)

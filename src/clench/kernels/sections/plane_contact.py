@@ -1,4 +1,4 @@
-"""Where and how a link touches on a curl plane, at the contact and at the final posture (docs/method.md section 4)."""
+"""Compute a link's contact on a curl plane, at the contact and at the final posture (docs/method.md section 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a family of curl planes is, given the turns of the joints before it."""
+"""Compute the pose of a family of curl planes from the turns of the joints before it."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from .plane_pose import compose, compose_inverse
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere
 from .section import cut
 
-#: What rounding takes from the radius of a circle [-].
+#: Factor that covers the rounding of the radius of a circle [-].
 WIDER = 1.0 + 1e-12
 
 
@@ -113,7 +113,7 @@ def cut_planes(
 
 @entry_kernel
 def needs_planes(items: ItemArrays) -> bool:
-    """Say whether any item has planes; the full width has none around what it sweeps exactly."""
+    """Say whether any item has planes; the full width has none around exactly swept shapes."""
     planes = 0
     for i in range(items.entry.shape[0]):
         planes += items.high[i] - items.low[i]

@@ -167,7 +167,7 @@ def _start_counts(tree: MeshTree, scale: float, offsets: Floats, low: int, high:
 
 @kernel
 def _end_counts(first: int, last: int, counts: Any, capacity: int) -> int:
-    """Return the largest count where it is above the capacity, else 0; rows that got too many have none."""
+    """Return the largest count above the capacity, else 0; rows with too many segments have none."""
     wanted = 0
     for row in range(first, last):
         if counts[row, 0] > capacity:

@@ -34,7 +34,7 @@ def move_core(core: Floats, corners: int, chain: Floats, count: int, s: float, o
 def base_motion(
     chain: Floats, count: int, nx: float, nz: float, s: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Return the last pivot at `s`, its speed and acceleration along n, and bounds on both (of the speed: whatever n).
+    """Return the last pivot at `s`, its speed and acceleration along n, and bounds on both (of the speed: for any n).
 
     The axes are parallel: along them nothing moves, so only the part of n across them counts.
     """
@@ -57,7 +57,7 @@ def base_motion(
 def corner_motion(
     core: Floats, k: int, chain: Floats, count: int, nx: float, ny: float, nz: float, s: float
 ) -> tuple[float, float, float, float]:
-    """Return speed and acceleration of a corner along n at `s`, and bounds (of the speed: whatever n)."""
+    """Return speed and acceleration of a corner along n at `s`, and bounds (of the speed: for any n)."""
     if is_spatial(chain):
         corner, n = (core[k, 0], core[k, 1], core[k, 2]), (nx, ny, nz)
         velocity, acceleration = point_motion(corner, chain, count, s)

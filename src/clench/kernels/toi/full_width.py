@@ -41,7 +41,7 @@ PRESSED = 1e-8
 
 
 class ExactArrays(NamedTuple):
-    """Hold what the exact sweeps read; L links of the hand, M moving links of all entries, J joints.
+    """The input of the exact sweeps; L links of the hand, M moving links of all entries, J joints.
 
     Args:
         joint_first: first joint of each entry, (E + 1,).
@@ -153,8 +153,8 @@ def overlap_truly(
 ) -> bool:
     """Say whether a link crosses another body, and not only presses on it; see `bodies_overlap`.
 
-    What comes to a stop crosses by what rounding and the touch tolerance leave: a shift by `PRESSED` takes it off,
-    across a face or along two edges of the elements that cross. Bodies that lie in each other still cross then.
+    Bodies that come to a stop cross by at most the rounding and the touch tolerance: a shift by `PRESSED` separates
+    them, across a face or along two edges of the elements that cross. Bodies that lie in each other still cross then.
 
     Args:
         sweep: has their poses.

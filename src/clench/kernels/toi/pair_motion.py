@@ -1,6 +1,6 @@
 """How two bodies of a hand move relative to each other while its joints move on lines (docs/method.md section 7).
 
-Joints that move both bodies leave their gap as it is. So only the joints that move one of them count.
+Joints that move both bodies leave their gap as it is. Only the joints that move one of them count.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class PathProblem(NamedTuple):
 
 
 class PathWork(NamedTuple):
-    """Hold the scratch space of a check: posture, poses of the links from the root, and what gaps and depths need.
+    """The scratch space of a check: posture, poses of the links from the root, and buffers for gaps and depths.
 
     Args:
         normal: of the plane that parted the pair last, in the frame of the second body; 0 without one, (3,).
@@ -179,7 +179,7 @@ def put_chain(
 
 @kernel
 def free_share(problem: PathProblem, m: int, r: int, k: int, t: float, touch: float, work: PathWork) -> float:
-    """Return which share of what is left of a segment a pair goes until it touches, 1 for all; `OVERLAP` as a sweep.
+    """Return the share of the rest of a segment that a pair goes until it touches, 1 for all; `OVERLAP` as a sweep.
 
     The poses of the pair are those of `place_pair`.
 

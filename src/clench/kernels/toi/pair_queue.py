@@ -27,7 +27,7 @@ def lift_pair(work: SweepWork, i: int) -> None:
 
 @kernel
 def take_first(work: SweepWork, size: int) -> int:
-    """Move the earliest pair of a heap to the heap's last row; return the size of what is left, where it lies."""
+    """Move the earliest pair of a heap to the heap's last row; return the size of the rest, where the pair lies."""
     size -= 1
     swap_pairs(work, 0, size)
     i = 0

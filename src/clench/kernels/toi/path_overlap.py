@@ -1,8 +1,8 @@
-"""Where a hand that moves along a path first overlaps itself or the object (docs/method.md section 7).
+"""Find where a hand that moves along a path first overlaps itself or the object (docs/method.md section 7).
 
 The exact sweep takes a pair of bodies along every segment of the path until the two touch. From there on the pair is
 looked at in steps so short that it cannot overlap by more than `OVERLAP` between two looks, until it is apart again.
-So no overlap that is deeper is missed.
+Thus no deeper overlap is missed.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from .toi_work import ball_gap, body_gap
 
 #: Two bodies may overlap by this much and still count as touching: the tolerance of the proof [m].
 OVERLAP: Final = 1e-5
-#: A look finds an overlap from this depth on [m]. What is left of `OVERLAP` is the least motion between two looks.
+#: A look finds an overlap from this depth on [m]. The rest of `OVERLAP` is the least motion between two looks.
 FOUND: Final = 5e-6
 #: The sweep takes a pair up to this gap [m].
 TOUCH: Final = 1e-6
-#: The sweep goes on with a pair whose gap has grown to this [m].
+#: The sweep continues with a pair whose gap has grown to this [m].
 APART: Final = 1e-4
 #: Bodies that overlapped where the path began are looked at in steps of this motion until they are apart [m].
 EXEMPT_STEP: Final = 2e-4
@@ -103,7 +103,7 @@ def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: Pat
 
 @kernel
 def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tuple[float, float]:
-    """Return the place at which a pair first overlaps, and how deep [m]; infinite and 0 where it does not.
+    """Return the place at which a pair first overlaps, and the depth there [m]; infinite and 0 without an overlap.
 
     The depth is not a number where `MOST_LOOKS` are not enough to prove that the pair stays apart.
 

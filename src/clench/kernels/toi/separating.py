@@ -1,8 +1,9 @@
-"""Whether two convex cores that touch may move on, and how far (docs/method.md section 3, touching at the start).
+"""Decide whether two convex cores that touch may move on, and how far (docs/method.md section 3, touching at the
+start).
 
-They may when a plane separates them now and goes on to do so. Planes that rest are looked at first: those of faces and
-those along two edges. A core that tilts off a corner, or rolls off an edge, takes its plane along; that is probed by
-a step so short that nothing is missed on it.
+They may if a plane separates them now and continues to do so. Planes that rest are looked at first: those of faces and
+those along two edges. A core that tilts off a corner, or rolls off an edge, takes its plane along; that is probed by a
+step so short that nothing is missed on it.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def leave_plane(
     touch: float,
     best: float,
 ) -> float:
-    """Return for how long after `s` a plane that permits the motion goes on to separate, at most `best`."""
+    """Return for how long after `s` a plane that permits the motion keeps separating, at most `best`."""
     step = best
     rate = abs(chain[count - 1, 0])
     for k in range(corners):
@@ -100,7 +101,7 @@ def leave_plane(
 
 @kernel
 def lies_in_plane(a: Floats, ka: int, b: Floats, kb: int, nx: float, ny: float, nz: float, touch: float) -> bool:
-    """Say whether two cores lie in one plane with normal n, so that it separates them whichever way it looks."""
+    """Say whether two cores lie in one plane with normal n, so that it separates them with either orientation."""
     return -plane_gap(a, ka, b, kb, nx, ny, nz) <= touch and -plane_gap(b, kb, a, ka, nx, ny, nz) <= touch
 
 
@@ -184,7 +185,7 @@ def try_across(
     if square <= ALONG * ALONG * scale:
         return OVERLAP
     if square <= BARELY * BARELY * scale:
-        # Rounding leaves a part along the edges, over whose length the plane would cut into what it keeps apart.
+        # Rounding leaves a part along the edges; over their length the plane would cut into the elements.
         along = (nx * u[0] + ny * u[1] + nz * u[2]) / uu
         nx, ny, nz = nx - along * u[0], ny - along * u[1], nz - along * u[2]
         square = nx * nx + ny * ny + nz * nz
@@ -256,8 +257,8 @@ def starts_apart(
     Tried are m itself, m on its way with the moving core, and the planes along two edges.
 
     Args:
-        m: unit direction across the plane that separates the pair after the step. back: what it was before the step if
-            it goes along with the moving core. turn: of that core on the step, at most [rad].
+        m: unit direction across the plane that separates the pair after the step. back: the same direction before the
+            step if it goes along with the moving core. turn: of that core on the step, at most [rad].
     """
     if separates(placed, ka, fixed, kb, w, m[0], m[1], m[2], touch):
         return True
@@ -296,8 +297,8 @@ def probe(
 ) -> float:
     """Return a short step after which a touching pair is apart and on which it does not overlap, or `BLOCKED`.
 
-    Between two planes, one that separates the pair now and one that does after the step, a plane that turns evenly
-    separates it on the way, up to the bends of the corners' paths: the step keeps those below the touch tolerance.
+    One plane separates the pair now, and another one after the step. A plane that turns evenly between them separates
+    the pair on the way, up to the bends of the corners' paths. The step keeps these below the touch tolerance.
 
     Args:
         placed: (6, 3); the first rows have the moving core at `s`, the others are scratch space.

@@ -1,4 +1,4 @@
-"""Planes between two bodies, one of which moves: what they keep apart cannot meet (docs/method.md section 5)."""
+"""Separating planes between two bodies, one of which moves: separated parts cannot meet (docs/method.md section 5)."""
 
 from __future__ import annotations
 

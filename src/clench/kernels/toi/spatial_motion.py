@@ -1,8 +1,8 @@
 """How joints about axes that are not parallel move points (docs/method.md section 4, *several joints at once*).
 
 A chain of such joints has rows (rate, a_x, a_y, a_z, e_x, e_y, e_z): turn per travel, unit axis, and the way to the
-next pivot [m], all where the motion begins. What it moves is given relative to the last pivot, and the answer is
-relative to the first.
+next pivot [m], all where the motion begins. The points that it moves are given relative to the last pivot, and the
+answer is relative to the first.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def moved(p: Vector, chain: Floats, count: int, s: float) -> Vector:
 
 @kernel
 def moved_back(m: Vector, chain: Floats, count: int, s: float, step: float) -> Vector:
-    """Return a direction that goes along with what moves as it was a step before `s + step`."""
+    """Return a direction that moves with the body, as it was a step before `s + step`."""
     for i in range(count):
         m = turned_about(m, axis_of(chain, i), -chain[i, 0] * (s + step))
     for k in range(count):

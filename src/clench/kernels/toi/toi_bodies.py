@@ -39,8 +39,8 @@ def earliest_meeting(
     """Return a bound on when the balls of two items come within `touch`: a `turn_measure`, for several joints a travel.
 
     Args:
-        begin: a travel before which they do not. limit: later ones are of no interest, in the measure of what is
-            returned. The rest as in `sweep_body`.
+        begin: a travel before which they do not. limit: later ones are of no interest, in the measure of the result.
+            The rest as in `sweep_body`.
     """
     reach = put_ball(moving, a, work.moving, work.core[0]) + put_ball(resting, b, work.resting, work.fixed[0]) + touch
     if count > 1:
@@ -121,7 +121,7 @@ def walk_item(
 ) -> float:
     """Return a travel up to which a pair of items, of which one is a node at least, is farther apart than `touch`.
 
-    It is infinite where it is until `best`.
+    It is infinite if it is until `best`.
 
     Args:
         ka, wa: corners and radius of the moving item `a`, which is in `work`. since: a travel before which it is known.
@@ -165,9 +165,9 @@ def sweep_body(
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
     Pairs of items are looked at in the order in which they can meet, as far as balls, and boxes after those, tell. A
-    pair is left out when that is not before `best`; when the items pass beside each other; or when a plane keeps them
-    apart, as one does everywhere on a convex body: that between the elements that met last, before that one by which
-    two never met. Elements that are left are swept.
+    pair is left out in three cases: it cannot meet before `best`; its items pass beside each other; or a plane keeps
+    them apart, as one does everywhere on a convex body. The tested planes are the plane between the elements that met
+    last, and the plane by which two never met. Elements that are left are swept.
 
     Args:
         chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
@@ -197,7 +197,7 @@ def sweep_body(
                 if s == math.inf or (within and s > since and stays_beyond(ka, wa, chain, count, s, best, work)):
                     continue
                 stack[row, 2], work.since[row], keys[row] = 1, s, max(keys[row], measure(s, chain, count))
-                # What others come before waits.
+                # A pair waits while others can meet earlier.
                 if row < QUEUE and queue > 0 and keys[0] < keys[row]:
                     queue = take_in(work, queue, row)
                     continue

@@ -43,7 +43,7 @@ def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> flo
         ax, az: the point, which turns from x to z. bx, bz: the other one. square: of the distance [m²].
     """
     aa, bb = ax * ax + az * az, bx * bx + bz * bz
-    # What rounding puts just outside, and is about to enter, would come round a whole turn later.
+    # A point that rounding puts just outside, and that is about to enter, would come round a whole turn later.
     if (ax - bx) ** 2 + (az - bz) ** 2 <= square + ROUNDING * (aa + bb):
         return 0.0
     size = math.sqrt(aa * bb)
@@ -74,8 +74,8 @@ def walk_core(
 ) -> float:
     """Return a travel up to which two cores, that are apart until `begin`, stay farther than `w` apart.
 
-    It is infinite where they do until `best`; what is near at the start never is. Every step goes to a plane between
-    the two, as in `sweep_pair`, but ends where they are nearer than `near`, or after some steps.
+    It is infinite if they do until `best`; a pair that is near at the start never is. Every step goes to a plane
+    between the two, as in `sweep_pair`, but ends where they are nearer than `near`, or after some steps.
     """
     s = begin
     for step in range(STEPS):

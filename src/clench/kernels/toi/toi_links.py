@@ -121,7 +121,7 @@ def sweep_link(
     """Return the first contact of one moving link with one resting body before `best`; see `sweep_body`.
 
     Args:
-        first, joint: first active joint, and the last one that moves the link. T_palm_resting: where the body is.
+        first, joint: first active joint, and the last joint that moves the link. T_palm_resting: where the body is.
         The rest as in `sweep_stage`, which has placed joints, axes and links.
     """
     if resting.root[r] < 0:
@@ -188,7 +188,7 @@ def sweep_links(
     """Return the first contact of a moving link with other links of the hand before `best`, and that link or -1.
 
     Args:
-        m: the moving link. first, joint: first active joint, and the last one that moves it; see `sweep_link`.
+        m: the moving link. first, joint: first active joint, and the last joint that moves it; see `sweep_link`.
     """
     met, lane = -1, sweep.lane
     for r in range(exact.checked.shape[0]):
@@ -230,7 +230,7 @@ def sweep_stage(
         T_palm_object: (3, 4). length: of the finger [m]. turns: of every joint [rad], (J,). rates: (J,).
 
     Returns:
-        the travel; what is met: -1 nothing, L the object, else a link of the hand. `sweep.winner` and `sweep.poses`,
+        the travel; the met body: -1 nothing, L the object, else a link of the hand. `sweep.winner` and `sweep.poses`,
         which has every link where it is at the start of the segment, describe it. A link that overlaps the object
         already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
     """

@@ -42,7 +42,7 @@ def fall_to_plane(
     s: float,
     best: float,
 ) -> float:
-    """Return what `step_to_plane` does, by bounds on the corners' accelerations, whatever the axes."""
+    """Return the result of `step_to_plane` from bounds on the corners' accelerations, for any axes."""
     step = best
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
@@ -76,7 +76,7 @@ def step_to_plane(
     if is_spatial(chain):
         return float(fall_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best))
     rate, step, across = chain[count - 1, 0], best, math.sqrt(nx * nx + nz * nz)
-    # Where the last pivot is and how it moves is the same for all corners; where they are is known.
+    # The position and motion of the last pivot are the same for all corners, and the corners' positions are known.
     px, pz, base_slope, _, _, base_bound = base_motion(chain, count, nx, nz, s)
     for k in range(corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
@@ -162,8 +162,8 @@ def sweep_pair(
 ) -> float:
     """Return the first `s` before `best` at which two cores come within `w` of each other, else `best`.
 
-    The gap that is left is positive and at most the touch tolerance. A pair that starts closer than that may close
-    half of what it has. `OVERLAP` where the cores are nearer than `w` at the start.
+    The gap that is left is positive and at most the touch tolerance. A pair that starts closer than that may close half
+    of its gap. `OVERLAP` where the cores are nearer than `w` at the start.
 
     Args:
         core: the moving core relative to the last pivot [m], (3, 3). ka: its corners.
@@ -172,9 +172,9 @@ def sweep_pair(
         chain, count: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
             see `spatial_motion`.
         touch: gaps up to this touch [m]. begin: a travel up to which they are known to be farther apart, or 0.
-        placed: scratch space, (6, 3); its first rows are the moving core at the contact. Where nothing is
-            met before a positive `best`, its last row is the normal of a plane that keeps the cores apart all the way
-            from `begin`, or zero.
+        placed: scratch space, (6, 3); its first rows are the moving core at the contact. If nothing is met before a
+            positive `best`, its last row is the normal of a plane that keeps the cores apart all the way from `begin`,
+            or zero.
     """
     s, level, leap = begin, -1.0, 1.0
     for turn in range(PLANES):
@@ -191,7 +191,7 @@ def sweep_pair(
             offset = plane_offset(fixed, kb, nx, ny, nz) + w + level
             step = step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, best - s)
         if step <= 0.0:
-            # They touch. What moves along a wall is not stopped by the sides of the triangles that make it up.
+            # They touch. The sides of the triangles of a wall do not stop a body that moves along the wall.
             if flat and w == 0.0:
                 nx, ny, nz = 0.0, 0.0, 0.0
             free = move_on(core, placed, ka, fixed, kb, w, nx, ny, nz, chain, count, s, touch, best - s)

@@ -55,7 +55,7 @@ def first_contact(
     if moving.low.shape[0] == 0 or rest.low.shape[0] == 0:
         return np.inf, -1, -1
     along = _frame(direction)
-    # What lies behind by rounding only is a touch at the start.
+    # A meeting that lies behind only by rounding is a contact at the start.
     slack = _FOOT * (_reach(moving.low, moving.high) + _reach(rest.low, rest.high))
     slack += _FOOT * (abs(T_rest_moving[0, 3]) + abs(T_rest_moving[1, 3]) + abs(T_rest_moving[2, 3]))
     stack[0, 0], stack[0, 1] = 0, 0

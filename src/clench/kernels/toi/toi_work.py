@@ -20,12 +20,12 @@ from .spatial_motion import SPATIAL
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
 PAIRS = 512
-#: Pairs that wait in the order in which they can meet at most; what is more waits in order of depth.
+#: Largest number of pairs that wait in the order in which they can meet; further pairs wait in order of depth.
 QUEUE = 256
 
 
 class SweepWork(NamedTuple):
-    """Hold the scratch space of a sweep.
+    """The scratch space of a sweep.
 
     Args:
         core, fixed: corners of a pair, (4, 3) and (3, 3). placed: those of the moving one on its way, and scratch
@@ -39,8 +39,8 @@ class SweepWork(NamedTuple):
         stack: pairs of items that wait, and whether `walk_item` has been there, (PAIRS, 3). keys: when they can meet at
             the earliest, for one joint as a `turn_measure`; since: a travel before which they do not, (PAIRS,) each.
         box: that around a node of either body, see `put_box`, (5, 3).
-        plane: normal and offset of one that keeps bodies apart, relative to the first pivot, then in the resting body's
-            frame, (8,).
+        plane: normal and offset of a separating plane, relative to the first pivot, then in the resting body's frame,
+            (8,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
@@ -162,7 +162,7 @@ def is_wider(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
 
 @kernel
 def is_looser(moving: BodyArrays, a: int, resting: BodyArrays, b: int) -> bool:
-    """Say whether the moving one of two items has the box that tells less about what is in it, or is the only node.
+    """Say whether the moving one of two items has the looser box, or is the only node.
 
     It need not be the wider one, which may be a strip of a wall.
     """
@@ -184,8 +184,8 @@ def body_gap(
     """Return the gap between two bodies if it is below `bound`, else `bound`; writes the closest pair.
 
     Args:
-        slack: what is found may be larger than the gap by up to this factor, which saves most of the work where
-            many pairs are about as close [-]. work: has `moving` and `resting`, the bodies' poses in one frame.
+        slack: the result may be larger than the gap by up to this factor, which saves most of the work if many pairs
+            are about as close [-]. work: has `moving` and `resting`, the bodies' poses in one frame.
     """
     stack, best = work.stack, bound
     waiting = push_roots(moving, m, resting, r, stack)
@@ -262,7 +262,7 @@ def bodies_overlap(
         if a < 0 or b < 0:
             ka, wa = put_item(moving, a, work.moving, work.core)
             kb, wb = put_item(resting, b, work.resting, work.fixed)
-            # What parted two elements parts most of what is beside them.
+            # A plane that separated two elements separates most of their neighbours.
             if plane_gap(work.core, ka, work.fixed, kb, nx, ny, nz) > wa + wb:
                 continue
             if a < 0 and b < 0:

@@ -12,10 +12,10 @@ from clench.kernels.sections.plane_pose import copy_pose
 
 from .toi_work import SweepWork, ball_gap, is_wider, make_sweep_work, put_item, split_pair
 
-#: Columns of the integers: posture, moving link, what it touches (a link, or the number of links for the object).
+#: Columns of the integers: posture, moving link, touched body (a link, or the number of links for the object).
 PAIR_STAGE, PAIR_LINK, PAIR_MET = 0, 1, 2
 PAIR_INTEGERS = 3
-#: Columns of the numbers: where it touches, the direction from what it touches to the link, and the gap.
+#: Columns of the numbers: place of the contact, direction from the touched body to the link, and the gap.
 PAIR_X, PAIR_NX, PAIR_GAP = 0, 3, 6
 PAIR_FLOATS = 7
 #: Directions that differ by less are the same [-].
@@ -35,7 +35,7 @@ def touching_pairs(
     found: Ints,
     numbers: Floats,
 ) -> int:
-    """List the pairs of elements of moving links and of what they must not overlap that are as close as given.
+    """List the pairs of elements, of moving links and of forbidden bodies, that are as close as given.
 
     Args:
         links: one body per link of the hand. obj: one body. checked: whether two links may not overlap, (L, L).

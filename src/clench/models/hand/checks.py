@@ -24,7 +24,7 @@ _OUT_OF_SCALE = 50.0
 
 
 def check_understood(hand: Hand) -> list[Finding]:
-    """Return what looks wrong or is worth knowing about axes, lengths, shapes and thumb of a hand."""
+    """Return findings about axes, lengths, shapes and thumb of a hand."""
     found = [*_lengths(hand), *check_couplings(hand)]
     for finger in hand.fingers:
         found += _axes(hand, finger)
@@ -66,7 +66,7 @@ def _almost_parallel(hand: Hand, finger: Finger, a: int, b: int, angle: float) -
 
 
 def _lengths(hand: Hand) -> list[Finding]:
-    """Compare the sizes of links and the distances between joints with those of hands."""
+    """Compare the sizes of links and the distances between joints with those of real hands."""
     spans: dict[str, float] = {}
     sizes: dict[int, float] = {}
     for finger in hand.fingers:

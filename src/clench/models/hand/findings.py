@@ -1,4 +1,4 @@
-"""What looks wrong or worth knowing about a hand: a code, names, numbers, a sentence, and what to do about it."""
+"""Findings about a hand: a code, names, numbers, a sentence, and advice."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Severity(StrEnum):
     WARNING = "warning"
     """something looks wrong; answers may be wrong until it is settled"""
     NOTE = "note"
-    """nothing looks wrong, but it explains what the hand does"""
+    """nothing looks wrong, but it explains the behaviour of the hand"""
 
 
 class FindingCode(StrEnum):
-    """Name the kinds of findings; docs/hand-report.md says what to do about each."""
+    """Name the kinds of findings; docs/hand-report.md gives advice for each."""
 
     AXIS_NOT_UNIT = "axis_not_unit"
     """the model gives an axis of another length than 1"""
@@ -44,7 +44,7 @@ class FindingCode(StrEnum):
     LENGTHS_TOO_SMALL = "lengths_too_small"
     """lengths as if they were scaled down once too often"""
     COLLISION_FROM_VISUALS = "collision_from_visuals"
-    """links without collision shapes collide with what is drawn"""
+    """links without collision shapes collide with their visual shapes"""
     HULL_OFF_MESH = "hull_off_mesh"
     """convex hulls replace concave meshes"""
     NO_SHAPE = "no_shape"
@@ -86,7 +86,7 @@ class Finding:
     """State one finding about a hand.
 
     Args:
-        code: its kind. text: what was found, with numbers. advice: what to do about it, often a line of the hand file.
+        code: its kind. text: the finding, with numbers. advice: the remedy, often a line of the hand file.
         severity: see `Severity`. joints, links: names concerned.
         numbers: by name, units in the name (`angle_deg`, `depth_m`).
     """
@@ -103,7 +103,7 @@ class Finding:
 
 
 def in_hand_file(table: str, name: str, line: str) -> str:
-    """Return what to write in the hand file, e.g. ``under [joints.X]: direction = 1``."""
+    """Return the entry for the hand file, e.g. ``under [joints.X]: direction = 1``."""
     return f"under {table_header(table, name)}: {line}"
 
 

@@ -1,4 +1,4 @@
-"""Where the links of a hand are at its postures (forward kinematics)."""
+"""Compute where the links of a hand are at its postures (forward kinematics)."""
 
 from __future__ import annotations
 

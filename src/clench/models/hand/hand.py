@@ -32,7 +32,7 @@ DEFAULT_SPEED: Final = 2.0
 
 
 class JointRole(StrEnum):
-    """Name what a joint does in a grasp (docs/method.md section 1)."""
+    """Name the roles of a joint in a grasp (docs/method.md section 1)."""
 
     CLOSING = "closing"
     """moves its finger in curl planes; its angle is solved for"""
@@ -54,11 +54,11 @@ class Joint:
         reference: the angle [rad] at which `Link.T_parent_link` holds.
         velocity: limit [rad/s], or None when the model gives none.
         effort: limit [Nm], or None when the model gives none.
-        stiffness: gain of its position servo [Nm/rad], or None when the model has none. A servo of a fixed tendon
-            with gain k_p and coefficients c_i counts as k_p times the sum of c_i² for every joint of the tendon.
+        stiffness: gain of its position servo [Nm/rad], or None when the model has none. A servo of a fixed tendon with
+            gain k_p and coefficients c_i counts for every joint of the tendon as k_p times the sum of c_i².
         servo_share: `stiffness` beside the servo's own gain [-]: the sum of c_i² for a tendon's servo, 1 without one.
         friction_loss: torque that dry friction in the joint takes [Nm].
-        role, role_reason: what it does in a grasp, and why that was concluded.
+        role, role_reason: role in a grasp, and the reason for it.
         direction: +1 when its angle grows while the finger closes, else -1.
         direction_reason: why.
         open_value: angle [rad] of the open finger; `open_reason` says why.
@@ -171,17 +171,17 @@ class Hand(Keeper, Displayed):
         links, joints, couplings, fingers: see their types.
         palm: index of the palm link.
         fixed_links: indices of links that no finger moves (palm included) and that objects can hit.
-        allowed_pairs: link index pairs that may overlap whatever their shapes (adjacent, or excluded by the model or
-            the hand file), sorted; see `allowed_pairs_for`.
+        allowed_pairs: sorted link index pairs that may always overlap (adjacent, or excluded by the model or the hand
+            file); see `allowed_pairs_for`.
         palm_center: centroid of the finger bases in the palm frame [m]; palm_normal: mean closing direction
             of the tips, unit.
-        default_source: the collision source used unless a command names one.
-        overlaps_allowed: whether links may overlap that do so in every posture, or when the hand is open, besides
-            `allowed_pairs`: so it is with hands that are read from a model.
+        default_source: the collision source unless a command names one.
+        overlaps_allowed: whether links may also overlap, besides `allowed_pairs`, if they do so in every posture or in
+            the open hand. This holds for hands that are read from a model.
         tendons: of the hand file, or else of the model; None when joints are driven by themselves.
-        findings: what loading found wrong or worth knowing; `clench.check_hand` looks for more.
-        spec_xml: MJCF or URDF text that MuJoCo compiles, with `assets`, for simulation: the model's own numbers, or
-            six digits of them where other limbs were left out or drawn geometry had to collide.
+        findings: problems and notes of the loader; `clench.check_hand` looks for more.
+        spec_xml: MJCF or URDF text for simulation that MuJoCo compiles with `assets`. It has the model's own numbers,
+            or six digits of them if other limbs were removed or visual geometry had to collide.
     """
 
     name: str
@@ -228,11 +228,11 @@ class Hand(Keeper, Displayed):
         """Read a hand by name or from a `.urdf` / `.xml` / `.mjcf` file.
 
         Args:
-            model: a built-in name (``"robonaut2"``), a path, or a name that mujoco_menagerie or robot_descriptions
-                knows (``"shadow_hand/right_hand"``; these packages come with ``clench[hands]``).
+            model: a built-in name (``"robonaut2"``), a path, or a name of mujoco_menagerie or robot_descriptions
+                (``"shadow_hand/right_hand"``; these packages come with ``clench[hands]``).
             hand_file: TOML overrides; by default `<model>.hand.toml` beside the model when it exists.
             palm: the palm link's name, to pick a hand inside a whole robot.
-            collision_source: which geometry is meant unless a command says otherwise.
+            collision_source: the geometry to use unless a command names one.
 
         Raises:
             FileError: missing, unreadable or malformed file. HandError: unsupported or contradictory model.
@@ -259,7 +259,7 @@ class Hand(Keeper, Displayed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences about what looks wrong: the findings that are more than notes."""
+        """Sentences about problems: the findings above notes."""
         return tuple(finding.text for finding in self.findings if finding.severity is Severity.WARNING)
 
     @cached_property
@@ -274,22 +274,22 @@ class Hand(Keeper, Displayed):
 
     @property
     def solid_links(self) -> tuple[int, ...]:
-        """Indices of the links that can touch, ascending: the fixed ones and those of the fingers."""
+        """Indices of the links that can touch, ascending: fixed links and links of the fingers."""
         return tuple(sorted({*self.fixed_links, *(link for finger in self.fingers for link in finger.links)}))
 
     def allowed_pairs_for(self, source: CollisionSource) -> tuple[tuple[int, int], ...]:
         """Return the pairs of link indices that may overlap when links have the shapes of one source, sorted.
 
-        These are `allowed_pairs` and the pairs whose shapes overlap in the open posture and in every other one that is
-        looked at. They are found once and kept.
+        These are `allowed_pairs` and the pairs whose shapes overlap in the open posture and in every other sampled
+        posture. They are found once and kept.
         """
         return self._with_overlapping(source, self._overlaps(source).always)
 
     def allowed_pairs_from(self, source: CollisionSource, q: FloatArray) -> tuple[tuple[int, int], ...]:
         """Return the pairs of link indices that may overlap in a motion that starts at a posture, sorted.
 
-        These are `allowed_pairs_for` and the pairs that overlap there because they do so when the hand is open: a link
-        and the palm, or links of one finger. A motion that starts with them apart must keep them apart.
+        These are `allowed_pairs_for` and the pairs that overlap there because they overlap in the open hand: a link and
+        the palm, or links of one finger. A motion that starts with them apart must keep them apart.
 
         Args:
             source: which shapes the links have. q: angles of all joints [rad], shape (J,).
@@ -355,7 +355,7 @@ class Hand(Keeper, Displayed):
         return self._tied(q, self.couplings)
 
     def tied(self, q: FloatArray) -> FloatArray:
-        """Return a posture as `coupled` does, but with followers that can break away where they are."""
+        """Return a posture as `coupled` does, but keep followers that can break away."""
         return self._tied(q, [c for c in self.couplings if not c.breakaway])
 
     def _tied(self, q: FloatArray, couplings: Iterable[Coupling]) -> FloatArray:

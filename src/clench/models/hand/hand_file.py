@@ -1,4 +1,4 @@
-"""Read the hand file: TOML that overrides what was found in a model, validated with the same care."""
+"""Read the hand file: TOML that overrides the findings from a model, validated with the same care."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class FingerOverride:
 
 @dataclass(frozen=True)
 class JointOverride:
-    """Override a joint: role, direction, open value [rad], limits [rad], and whom it follows (`""`: nobody)."""
+    """Override a joint: role, direction, open value [rad], limits [rad], and the joint that it follows (`""`: none)."""
 
     role: JointRole | None = None
     direction: int | None = None
@@ -187,7 +187,7 @@ def _tendons(top: _Table) -> TendonMap | None:
 
 
 def _tensions(table: _Table, key: str, missing: float, count: int) -> tuple[float, ...]:
-    """Return one number for every tendon: those of a list, or the same for all."""
+    """Return one number for every tendon: the numbers of a list, or one number for all."""
     value = table.data.get(key, missing)
     if isinstance(value, list) and len(value) == count and all(map(is_finite_number, value)):
         return tuple(float(v) for v in value)

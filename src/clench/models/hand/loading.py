@@ -46,7 +46,7 @@ def load_hand(
 
     Args:
         model: built-in name or path. hand_file: TOML overrides. palm: the palm link's name.
-        collision_source: which geometry is meant unless a command says otherwise.
+        collision_source: the geometry to use unless a command names one.
     """
     text = with_whole_meshes(read_model(model))
     overrides = find_hand_file(text.path, hand_file or text.hand_file)
@@ -163,7 +163,7 @@ def _tendons(compiled: CompiledModel, skeleton: Skeleton, overrides: HandFile) -
 
 
 def _with_given_couplings(found: FoundCouplings, skeleton: Skeleton, overrides: HandFile, label: str) -> FoundCouplings:
-    """Return the couplings with those that the hand file adds, replaces or removes."""
+    """Return the couplings with the hand file's additions, replacements and removals."""
     names = [j.name for j in skeleton.joints]
     given = {name: o for name, o in overrides.joints.items() if o.follows is not None}
     if not given:
@@ -234,10 +234,10 @@ def _unlike_others(hand: Hand, finger: Finger) -> bool:
 
 
 def _directions(hand: Hand) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return what every finger looks like when open, each of shape (F, 3).
+    """Return the geometry of every open finger, each of shape (F, 3).
 
-    Base (anchor of its first joint) and tip [m]; unit direction from its first closing joint to the tip; unit
-    direction in which the tip closes.
+    The arrays are: base (anchor of its first joint) and tip [m]; unit direction from its first closing joint to the
+    tip; unit direction in which the tip closes.
     """
     q = hand.open_angles()
     bases, tips, stretch, closing = [], [], [], []

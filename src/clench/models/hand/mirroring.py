@@ -76,7 +76,7 @@ def _model_text(hand: Hand) -> str:
     mujoco = import_mujoco()
     assets: Mapping[str, bytes] = dict(hand.assets)
     try:
-        # What MuJoCo writes has places and quaternions alone, whichever way the model says them.
+        # MuJoCo writes positions and quaternions only, for every notation of the model.
         spec = mujoco.MjSpec.from_string(hand.spec_xml, assets=assets)
         spec.compile()
         spec = mujoco.MjSpec.from_string(spec.to_xml(), assets=assets)

@@ -1,4 +1,4 @@
-"""Describe what was understood of a hand, with the reasons: what `clench hand` prints."""
+"""Describe the interpretation of a hand, with the reasons: the output of `clench hand`."""
 
 from __future__ import annotations
 
@@ -113,10 +113,10 @@ class HandReport:
 
 
 def describe_hand(hand: Hand, findings: tuple[Finding, ...] | None = None) -> HandReport:
-    """Return what was understood of a hand.
+    """Return the interpretation of a hand.
 
     Args:
-        hand: as loaded. findings: of a closer look; None: what loading found.
+        hand: as loaded. findings: of a closer look; None: findings of the loader.
     """
     return HandReport(
         name=hand.name,

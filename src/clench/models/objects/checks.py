@@ -1,4 +1,4 @@
-"""What is looked at before a mesh is used: numbers, degenerate triangles, holes, winding, units."""
+"""Check a mesh before its use: numbers, degenerate triangles, holes, winding, units."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from .topology import compact, components, edge_defects, parted, winding_number,
 
 #: Objects larger than this probably have units of millimetres [m]; smaller than `SMALL`, something else is wrong.
 LARGE: Final = 2.0
-#: What lengths in millimetres are multiplied by.
+#: Factor for lengths in millimetres.
 MILLIMETRE: Final = 1e-3
 SMALL: Final = 1e-3
-#: Coordinates of meshes are below this before they are scaled to metres, whatever their units are [-].
+#: Coordinates of meshes are below this before they are scaled to metres, in every unit [-].
 LARGEST_COORDINATE: Final = 1e15
 #: A triangle is degenerate when its height is below this fraction of its longest side [-].
 DEGENERATE_HEIGHT: Final = 1e-10
@@ -41,7 +41,7 @@ class CheckedMesh:
 
 
 def check_mesh(vertices: ArrayLike, triangles: ArrayLike, name: str) -> CheckedMesh:
-    """Check the arrays of a mesh and repair what has one answer.
+    """Check the arrays of a mesh and repair defects that have one repair.
 
     Degenerate and repeated triangles are dropped, parts that are wound inwards are turned. `closed` is true when every
     edge has exactly two uses, in opposite directions, and every part of the surface is wound outwards.
@@ -92,7 +92,7 @@ def check_size(shape: Shape, name: str) -> None:
     """Check that a shape has the size of a thing, in metres.
 
     Raises:
-        ObjectError: with its size and what is expected.
+        ObjectError: names its size and the expected size.
     """
     if shape.mesh is not None:
         sizes = [float(np.ptp(shape.mesh.vertices, axis=0).max())]
@@ -142,7 +142,7 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
 
 
 def _without_repeats(faces: IntArray, name: str, warnings: list[str]) -> IntArray:
-    """Drop triangles that name a vertex twice, and all but one of those that are equal."""
+    """Drop triangles that name a vertex twice, and duplicates."""
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     if not distinct.all():
         warnings.append(
@@ -154,7 +154,7 @@ def _without_repeats(faces: IntArray, name: str, warnings: list[str]) -> IntArra
     start = np.argmin(faces, axis=1)
     each, size = np.arange(len(faces)), np.uint64(faces.max() + 1)
     a, b, c = (faces[each, (start + k) % 3].astype(np.uint64) for k in range(3))
-    # Sums that run over are equal for equal triangles still: where none are equal, no triangle is.
+    # Sums that overflow are still equal for equal triangles: without equal sums, there are no equal triangles.
     if len(np.unique((a * size + b) * size + c)) == len(faces):
         return faces
     turned = np.column_stack([a, b, c])
@@ -185,10 +185,10 @@ def _have_area(points: FloatArray, faces: IntArray) -> NDArray[np.bool_]:
 
 
 def _manifold(faces: IntArray, vertices: int, name: str, warnings: list[str]) -> tuple[IntArray, bool]:
-    """Return triangles and whether the surface is closed; say what is wrong otherwise.
+    """Return triangles and whether the surface is closed; report the defects otherwise.
 
-    Edges with more than two uses have two harmless causes that are undone here: flaps (two triangles back to back, left
-    where rounding collapsed a short edge), and solids that share an edge, which get vertices of their own.
+    Edges with more than two uses have two harmless causes, which are undone here. Flaps are two triangles back to back,
+    left after rounding collapsed a short edge. Solids that share an edge get vertices of their own.
     """
     defects = edge_defects(faces)
     if defects.crowded:

@@ -1,4 +1,4 @@
-"""The object: bodies made of shapes, with a pose, a role and a note of what was checked."""
+"""The object: bodies made of shapes, with a pose, a role and the warnings of the checks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from clench.models.shapes import CollisionSource, Shape
 
 
 class BodyRole(StrEnum):
-    """Name what a body is to the hand."""
+    """Name the roles of a body for the hand."""
 
     GRASPABLE = "graspable"
     """the fingers close around it"""
@@ -82,8 +82,8 @@ class GraspObject:
         bodies: at least one graspable body.
         pose: `T_world_object`.
         collision_source: which geometry is meant.
-        warnings: sentences about what looks wrong (units, winding, holes).
-        path: the file it was read from, or None. scale: what the lengths of the file were multiplied by [-].
+        warnings: sentences about problems (units, winding, holes).
+        path: the file it was read from, or None. scale: factor on the lengths of the file [-].
     """
 
     name: str
@@ -120,8 +120,8 @@ class GraspObject:
                 ``"box:x=0.1,y=0.05,z=0.03"`` (full lengths), ``"ellipsoid:a=0.03,b=0.02,c=0.05"`` (semi-axes).
             scale: multiplies every length.
             pose: `T_world_object`, identity by default.
-            collision_source: `raw` (default), `engine` (what a simulator collides: the convex pieces where known,
-                else the convex hull of every mesh) or `visual` (as raw).
+            collision_source: `raw` (default), `engine` (the simulator's geometry: convex pieces if known, else the
+                convex hull of every mesh) or `visual` (as raw).
 
         Raises:
             FileError: missing file, not a mesh. ObjectError: empty, NaN, bad parameter. UnknownNameError.
@@ -197,7 +197,7 @@ class GraspObject:
         Args:
             other: its own `T_world_object` is not used.
             pose: `T_object_other`, where the other stands in this object's frame; identity by default.
-            role: what its bodies are to the hand; None keeps their own.
+            role: role of its bodies for the hand; None keeps their own.
 
         Raises:
             UnknownNameError: no such role.

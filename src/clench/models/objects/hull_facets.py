@@ -137,7 +137,7 @@ def _coplanar(
     Returns:
         Facet of every triangle, shape (K,), and the triangle that gives each facet its plane, shape (F,).
     """
-    # Only a neighbour whose far corner is near the plane can join: on round objects hardly any is looked at.
+    # Only a neighbour whose far corner is near the plane can join: on round objects this excludes nearly all.
     across = _far_corner(triangles, neighbors)
     gap = np.abs(np.einsum("kij,kj->ki", points[across], planes[:, :3]) + planes[:, 3:])
     joins = gap <= 10.0 * COPLANAR

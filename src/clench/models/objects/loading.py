@@ -90,7 +90,7 @@ def load_object(
 
 
 def size_warnings(obj: GraspObject) -> tuple[str, ...]:
-    """Return those of the warnings of an object read by `load_object` that are about its size."""
+    """Return the warnings about size of an object read by `load_object`."""
     label = obj.path.name if obj.path else obj.name
     return unit_warnings(np.vstack([_body_points(body) for body in obj.bodies]), label, obj.scale)
 

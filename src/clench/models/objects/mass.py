@@ -1,4 +1,4 @@
-"""Where the mass of an object is: its centre, its volume, and how far its surface is from the centre."""
+"""Compute the mass properties of an object: centre, volume, and largest distance of the surface from the centre."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class MassProperties:
         center: centre of mass in the object's frame [m], shape (3,).
         volume: [m³].
         length: largest distance of its surface from the centre of mass [m], the length scale of grasp wrenches.
-        exact: every body is closed; the convex hull stands in for those that are not.
+        exact: every body is closed; open bodies are replaced by their convex hulls.
     """
 
     center: FloatArray

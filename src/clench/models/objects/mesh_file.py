@@ -25,10 +25,10 @@ SUFFIXES: Final = (".obj", ".stl", ".ply", ".off", ".glb")
 def read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
     """Read vertices (V, 3) and triangles (T, 3) of a mesh file, in the file's units; a scene becomes one mesh.
 
-    Vertices at one place are merged whatever their texture or normal, so that a closed surface is seen to be closed.
+    Vertices at one place are merged regardless of texture or normal, so that a closed surface is recognised.
 
     Raises:
-        FileError: missing, a directory, not one of `SUFFIXES`, not a mesh.
+        FileError: the file is missing, a directory, not one of `SUFFIXES`, or no mesh.
     """
     suffix = path.suffix.lower()
     if os.path.exists(path) and not os.path.isdir(path) and suffix not in SUFFIXES:
@@ -68,7 +68,7 @@ def merged(vertices: ArrayLike, triangles: ArrayLike) -> tuple[FloatArray, IntAr
     try:
         mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=8)
     except OverflowError:
-        # One coordinate far larger than all others overflows trimesh's packing of rows into whole numbers.
+        # A coordinate far larger than all others overflows trimesh's packing of rows into whole numbers.
         rounded = np.round(scaled * 1e8).astype(np.int64)
         _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
         return points[first], place.reshape(-1)[faces]

@@ -1,7 +1,7 @@
 """A mug with a handle: one closed surface, and the convex pieces it is made of.
 
-The wall is a body of revolution. Two rectangles of its grid, above one another, are left out; the handle is a tube
-whose first and last ring are the borders of these rectangles, so wall and handle are one surface without inner faces.
+The wall is a body of revolution. Two rectangles of its grid, above one another, are left out. The handle is a tube
+whose first and last ring are the borders of these rectangles. Thus wall and handle are one surface without inner faces.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def mug() -> Body:
     surface = _compact(vertices, np.vstack([wall.triangles[kept], handle]))
 
     rings = vertices[index].reshape(HANDLE_STEPS + 1, count, 3)
-    # Only simulation asks for the pieces: making them takes longer than all the rest.
+    # Only simulation needs the pieces: making them takes longer than all the rest.
     pieces = DeferredSequence(lambda: (_base(), *_wall_pieces(), *_handle_pieces(rings)))
     return Body("mug", (Shape(ShapeKind.MESH, mesh=surface, name="mug"),), pieces=pieces)
 

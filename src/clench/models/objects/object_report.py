@@ -1,4 +1,4 @@
-"""Describe an object: what `clench object` prints."""
+"""Describe an object: the output of `clench object`."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ class ObjectReport:
     """Describe an object in its own frame; obstacles count in `bodies` only.
 
     Args:
-        name: of the object. path: its file, or None. scale: what the lengths of the file were multiplied by [-].
+        name: of the object. path: its file, or None. scale: factor on the lengths of the file [-].
         lower, upper: corners of the bounding box [m], shape (3,). size: its sides [m].
         volume: [m³]. center_of_mass: [m], the given one, or that of uniform density.
-        watertight: every graspable body is; the convex hull stands in for the volume of those that are not.
+        watertight: every graspable body is closed; the volume of an open one is that of its convex hull.
         bodies: see `BodyReport`.
         stable_poses: see `clench.stable_poses`; empty for a flat object.
         no_stable_pose: a sentence that says why there is none, or None.
-        warnings: sentences about what looks wrong.
+        warnings: sentences about problems.
     """
 
     name: str
@@ -73,7 +73,7 @@ class ObjectReport:
         return document
 
     def summary_rows(self) -> list[tuple[str, str]]:
-        """Return label and text: size, volume, centre of mass, what it is made of."""
+        """Return label and text: size, volume, centre of mass, shapes."""
         sides = " x ".join(f"{side * 1e3:.4g}" for side in self.size)
         box = f"{sides} mm, from {_vector(self.lower)} to {_vector(self.upper)} m"
         hull = "" if self.watertight else " (the convex hull stands in for what is not watertight)"
@@ -87,7 +87,7 @@ class ObjectReport:
         ]
 
     def pose_rows(self) -> list[tuple[str, ...]]:
-        """Return probability, direction that points down, height of the centre of mass [mm], and what it stands on."""
+        """Return probability, direction that points down, height of the centre of mass [mm], and supporting face."""
         return [_pose_row(stable) for stable in self.stable_poses]
 
 
@@ -154,5 +154,5 @@ def _pose_row(stable: StablePose) -> tuple[str, ...]:
 
 
 def _vector(values: tuple[float, ...], digits: int = 6) -> str:
-    """Return numbers as text, rounded so that what is nothing but rounding is 0."""
+    """Return numbers as text, rounded so that rounding errors become 0."""
     return "[" + ", ".join(f"{round(value, digits) + 0.0:.4g}" for value in values) + "]"

@@ -52,7 +52,7 @@ def screwdriver() -> Body:
 
 
 def convex_pieces(profile: Profile, section: FloatArray) -> tuple[TriangleMesh, ...]:
-    """Split a body of revolution, with a convex section, into convex ones that fill it exactly.
+    """Split a body of revolution, with a convex section, into convex bodies that fill it exactly.
 
     A run of the profile whose radius is a concave function of height makes a convex body; a step at one height ends it.
 

@@ -1,10 +1,11 @@
 """Stable poses: how an object rests on a horizontal table, and how likely each rest is.
 
 The object rests on a facet of its convex hull. A facet is stable when the centre of mass projects into it. The model of
-a random drop is quasi-static, the first of Goldberg et al., "Part pose statistics: estimators and experiments" (IEEE
-Transactions on Robotics and Automation 15(5), 1999). The object lands on the facet below its centre of mass in a random
-orientation, so the probability of a facet is its solid angle, seen from the centre of mass, over 4 pi. From an unstable
-facet the object rolls over the edge that the centre of mass overhangs most. Every roll lowers the centre of mass.
+a random drop is quasi-static. It is the first model of Goldberg et al., "Part pose statistics: estimators and
+experiments" (IEEE Transactions on Robotics and Automation 15(5), 1999). The object lands on the facet below its centre
+of mass in a random orientation. The probability of a facet is therefore its solid angle, seen from the centre of mass,
+over 4 pi. From an unstable facet the object rolls over the edge that the centre of mass overhangs most. Every roll
+lowers the centre of mass.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ ROUND_FRACTION: Final = 1e-3
 _INSIDE: Final = 1e-9
 #: Overhangs that differ by less than this fraction of the object's size are equal [-].
 _TIE: Final = 1e-6
-#: So many directions have too many near pairs.
+#: This many directions have too many near pairs.
 _MANY: Final = 1000
 #: Digits up to which probabilities count when poses are sorted: the rest is rounding.
 _DIGITS: Final = 9
@@ -53,8 +54,8 @@ class StablePose:
         margin: distance of the projected centre of mass from the nearest edge of the supporting facet [m].
         center_height: of the centre of mass above the table [m].
         facets: how many facets of the hull were merged; more than 1 on round objects.
-        spread: largest angle between the down direction of this pose and that of a merged facet [rad]: 0 for a flat
-            base, pi for a cylinder on its side.
+        spread: largest angle between the down directions of this pose and of a merged facet [rad]: 0 for a flat base,
+            pi for a cylinder on its side.
         table_height: z of the table [m].
     """
 
@@ -97,10 +98,10 @@ def stable_poses(
 ) -> tuple[StablePose, ...]:
     """Return the poses in which an object rests on a horizontal table, the most probable first.
 
-    Only graspable bodies count, and only their shape: the present pose of the object does not matter. Round shapes are
-    polyhedra here, and rest on many facets. Facets whose down directions differ by no more than `merge_angle`, from
-    one to the next, count as one rest: the most probable of them gives the pose. So a cylinder has two ends and one
-    side, and a ball has a single pose of probability 1, as good as every other one.
+    Only the shape of graspable bodies counts: the present pose of the object does not matter. Round shapes are
+    polyhedra here, and rest on many facets. Facets whose down directions differ by no more than `merge_angle`, from one
+    to the next, count as one rest. The most probable facet gives the pose. Thus a cylinder has two ends and one side,
+    and a ball has a single pose of probability 1, which stands for all.
 
     Args:
         obj: the object.
@@ -171,10 +172,10 @@ def _without_upward_rolls(hull: HullFacets, center: FloatArray) -> HullFacets:
 
 
 def _rests(hull: HullFacets, center: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return probability [-] and margin [m] of every facet; probability 0 stands for those that do not stay.
+    """Return probability [-] and margin [m] of every facet; probability 0 marks unstable facets.
 
-    Facets roll in the order of their height. Where the object may roll over several edges equally well, each of the
-    facets beyond gets the same share.
+    Facets roll in the order of their height. If the object may roll over several edges equally well, the facets beyond
+    get equal shares.
     """
     probability, height = hull.shares(center), hull.heights(center)
     probability /= probability.sum()
@@ -211,8 +212,8 @@ def _groups(normals: FloatArray, stable: Indices, angle: float) -> list[Indices]
 def _near_pairs(directions: FloatArray, chord: float) -> Indices:
     """Return pairs of points of the unit sphere by which those hang together that are a chord apart or less [-].
 
-    Of many points there are too many near pairs. The shortest tree over points of a sphere lies in their convex hull,
-    so its edges join the same points.
+    Many points have too many near pairs. The shortest tree over points of a sphere lies in their convex hull, so its
+    edges join the same points.
     """
     from scipy.spatial import ConvexHull, QhullError, cKDTree
 
@@ -238,7 +239,7 @@ def _pose(
     margin: FloatArray,
     table_height: float,
 ) -> tuple[StablePose, tuple[float, ...]]:
-    """Return the pose of a group of facets, and what it is sorted by among equally probable ones."""
+    """Return the pose of a group of facets, and its sort key among equally probable ones."""
     down = np.round(hull.normals[group], _DIGITS) + 0.0
     order = np.lexsort((*down.T[::-1], -np.round(probability[group], _DIGITS)))
     best = int(group[order[0]])

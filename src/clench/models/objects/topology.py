@@ -1,4 +1,4 @@
-"""How the triangles of a mesh hang together: edges, parts, flaps, and how often a surface goes around a point."""
+"""Analyse the topology of a mesh: edges, parts, flaps, and how often a surface goes around a point."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class EdgeDefects(NamedTuple):
 
 
 def edge_defects(faces: IntArray) -> EdgeDefects:
-    """Return what is wrong with the edges of triangles, shape (T, 3)."""
+    """Return the defects of the edges of triangles, shape (T, 3)."""
     # Products of names that are far apart would run over. Sides of one edge stand next to each other.
     sides = _sides(compact(faces)[1])
     sides.sort()
@@ -92,7 +92,7 @@ def winding_number(point: FloatArray, points: FloatArray, faces: IntArray) -> fl
 
 
 def _sides(faces: IntArray) -> IntArray:
-    """Return a number for each of the 3 T sides: twice that of its edge, and 1 more where it runs upwards."""
+    """Return a number for each of the 3 T sides: twice the number of its edge, plus 1 if it runs upwards."""
     size, keys = int(faces.max()) + 1, []
     for i in range(3):
         start, end = faces[:, i], faces[:, (i + 1) % 3]

@@ -127,14 +127,14 @@ def recorded_outcomes(path: str | Path) -> ScoredExamples:
     """Return the outcomes that a record holds, see `Record.note_outcome`.
 
     Raises:
-        FileError: no such record, or not one.
+        FileError: the file is missing or is no record.
     """
     with _existing(Path(path)) as record:
         return ScoredExamples([], [(solve_scores(record.read(n)), held) for n, held in record.outcomes()])
 
 
 def solve_scores(solution: GraspSolution) -> dict[str, float]:
-    """Return the scores of a whole solution: sums over the fingers' chosen sets, and those of the whole hand."""
+    """Return the scores of a whole solution: sums over the fingers' chosen sets, and the scores of the whole hand."""
     chosen = [f.best.scores for f in solution.fingers.values() if f.best is not None]
     names = dict.fromkeys(name for scores in chosen for name in scores)
     sums = {n: float(sum(s[n] for s in chosen)) for n in names if all(n in s for s in chosen)}

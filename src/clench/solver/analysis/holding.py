@@ -55,7 +55,7 @@ class HeldSolution:
         return np.asarray(self.T_world_palm.rotation.T @ checked_vector(direction, 3, "gravity", "[x, y, z]"))
 
     def conventions(self) -> dict[str, Any]:
-        """Return what numbers about forces depend on, in plain values."""
+        """Return the settings that force numbers depend on, as plain values."""
         torsion = self.held.contacts.torsion
         return {
             "contact_model": self.model.value,
@@ -80,7 +80,7 @@ def hold(
     """Return a solution as mechanics sees it; contacts with obstacles, passed ones and repeated ones are left out.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for.
+        solution: the solution. hand, obj: the hand and object that were solved for.
         contact_model: see `ContactModel`. friction: of all contacts [-]; None takes that of links and object.
         torsion: torsional coefficient of soft fingers [m].
         center_of_mass: in the object's frame [m]; None is that of a uniform density.

@@ -37,8 +37,8 @@ class HandSets:
 def hand_front(solution: GraspSolution) -> list[HandSets]:
     """Return the Pareto front over all fingers, best weighted sum first; empty where the solution says no choice.
 
-    The criteria are those that add up over the fingers and that every set in question has a score for. What is best
-    for the sum cannot have a part that another set of its finger beats, so the fingers' own fronts are enough.
+    The criteria are those that add up over the fingers and for which every set in question has a score. A part that
+    another set of the same finger dominates cannot be in the best sum. Thus the fingers' own fronts are enough.
     """
     choice = solution.choice
     if choice is None or not choice["fingers"]:

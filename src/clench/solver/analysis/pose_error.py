@@ -1,4 +1,4 @@
-"""What an error of the object's pose does to a grasp: to first order, and solved again at the corners of the error."""
+"""Report how an error of the object's pose changes a grasp: to first order, and re-solved at its corners."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class PoseErrorCorner:
     Args:
         error: shift along [m] and turn about [rad] the world's axes, shape (6,).
         status: of the solve there. change: of every joint [rad], shape (J,).
-        lost, gained: links that no longer touch, and those that touch only there.
+        lost, gained: links that touch only without the error, and links that touch only with it.
     """
 
     error: FloatArray
@@ -48,7 +48,7 @@ class PoseErrorReport:
     Args:
         translation, rotation: the object is off by up to this along [m] and about [rad] each of the world's axes.
         sensitivity: at the pose itself. touching: links that touch there.
-        predicted: largest change of every joint to first order [rad], shape (J,); infinite where it is not known.
+        predicted: largest change of every joint to first order [rad], shape (J,); infinite if unknown.
         corners: the 64 corners of the error, solved again.
     """
 
@@ -80,7 +80,7 @@ class PoseErrorReport:
 
     @property
     def statuses(self) -> Mapping[str, int]:
-        """How many corners end in each status."""
+        """Number of corners that end in each status."""
         found = [c.status for c in self.corners]
         return {status.value: found.count(status) for status in SolutionStatus if status in found}
 
@@ -109,13 +109,13 @@ def pose_error(
     *,
     solution: GraspSolution | None = None,
 ) -> PoseErrorReport:
-    """Return what an error of the object's pose does to a grasp (docs/method.md section 5, *Sensitivity*).
+    """Return how an error of the object's pose changes a grasp (docs/method.md section 5, *Sensitivity*).
 
     Args:
         hand, obj, command: as for `clench.solve`.
         translation: the object is off by up to this along each of the world's axes [m]; default 2 mm.
         rotation: and by up to this about each, through its origin [rad]; default 2 degrees.
-        solution: that of the three inputs, where it is there already.
+        solution: the solution of these three inputs, if it exists already.
 
     Raises:
         CommandError: an error that is not finite or negative, or a rotation above pi. ClenchError: as for `solve`.

@@ -1,4 +1,4 @@
-"""How good a solution's grasp is: steadiness, and the effort of holding (docs/method.md section 6)."""
+"""Rate a solution's grasp: epsilon quality, and the effort of holding (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class GraspQuality:
         epsilon: the Ferrari–Canny ball [N per N of normal force]; 0 without force closure.
         volume: of the L1 wrench space [N^6 per N^6].
         within_torques: the ball of wrenches resisted within the torque limits [N]; None when not asked for.
-        mass: the load is its weight in any direction [kg]. effort: what it takes to hold it.
+        mass: the load is its weight in any direction [kg]. effort: the forces and torques that hold it.
     """
 
     grasp: HeldSolution
@@ -99,11 +99,11 @@ def grasp_quality(
     """Return how steady a grasp is, and the smallest worst torque that holds a mass in any direction of gravity.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for.
+        solution: the solution. hand, obj: the hand and object that were solved for.
         mass: of the object [kg]; of a range (least, largest) the largest counts.
         contact_model: `point` (friction alone) or `soft` (also a torque about the normal).
-        friction: of all contacts [-]; of a range (least, largest) the least counts; None takes that of links and
-            object, `clench.core.defaults.FRICTION` (0.6) where neither is known.
+        friction: of all contacts [-]; a range (least, largest) counts with its least value. None takes the friction of
+            link and object, or `clench.core.defaults.FRICTION` (0.6) if neither is known.
         torsion: torque about the normal per normal force of soft fingers [m].
         center_of_mass: in the object's frame [m]; None is that of a uniform density.
         norm: `L1` (normal forces sum to 1 N) or `Linf` (each is at most 1 N; takes up to a second).

@@ -41,7 +41,7 @@ CREATE TABLE solves (
 CREATE INDEX solves_by_names ON solves (hand, object, status);
 CREATE INDEX solves_by_geometry ON solves (geometry_hash, seed);
 """
-#: What version 2 added: what came of executing a solve.
+#: Version 2 added the outcomes of executions.
 _OUTCOMES = """
 CREATE TABLE outcomes (
     id INTEGER PRIMARY KEY,
@@ -192,7 +192,7 @@ class Record:
         return [self._entry(row) for row in rows]
 
     def note_outcome(self, entry_id: int, *, held: bool) -> None:
-        """Note what came of executing a solve: the object was held, or dropped.
+        """Record the outcome of executing a solve: the object was held, or dropped.
 
         Raises:
             UnknownNameError: no such id. FileError: the file cannot be written.
@@ -203,7 +203,7 @@ class Record:
             cursor.execute("INSERT INTO outcomes (solve, time, held) VALUES (?, ?, ?)", (entry_id, time, int(held)))
 
     def outcomes(self) -> list[tuple[int, bool]]:
-        """Return what was noted, in order: id of the solve, and whether the object was held."""
+        """Return the recorded outcomes in order: id of the solve, and whether the object was held."""
         with self._clear_errors():
             if not self._connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'outcomes'").fetchone():
                 return []  # version 1, which cannot be carried over where it is read only
@@ -266,7 +266,7 @@ class Record:
                     cursor.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     def _check_tables(self) -> None:
-        """Refuse tables that only look like ours: views, triggers and computed columns run whatever their author likes.
+        """Refuse tables that only look like ours: views, triggers and computed columns run code of their author.
 
         Other tables in the file are left alone; nothing reads them.
         """

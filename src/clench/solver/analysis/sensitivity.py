@@ -1,4 +1,4 @@
-"""How the joint angles change when the object is not quite where it was thought to be (docs/method.md section 5)."""
+"""Compute how the joint angles change with a small error of the object's pose (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from clench.solver.solution import FingerStatus, GraspSolution
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """The change of every joint angle per change of the object's pose, with the hand where it is.
+    """The change of every joint angle per change of the object's pose; the hand keeps its pose.
 
     An entry is infinite where no such number exists; `reasons` says why. Joints that stopped at a limit, and joints
     that do not close, have 0.
@@ -37,7 +37,7 @@ class Sensitivity:
         translation: per shift of the object along the world's axes [rad/m], shape (J, 3).
         rotation: per turn of the object about axes through its origin that are parallel to the world's [rad/rad],
             shape (J, 3).
-        stopped_by: what stopped a joint that moved on its own: ``"limit"``, the object's or a link's name.
+        stopped_by: what stopped each independently moving joint: ``"limit"``, the object's name or a link's name.
         reasons: a sentence for every joint that has an infinite entry.
     """
 
@@ -56,7 +56,7 @@ class Sensitivity:
         return np.hstack([self.translation, self.rotation])
 
     def change(self, translation: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-        """Return the change of every joint to first order [rad], shape (J,); infinite where it is not known.
+        """Return the change of every joint to first order [rad], shape (J,); infinite if unknown.
 
         Args:
             translation: of the object in the world [m], shape (3,). rotation: rotation vector about its origin [rad],
@@ -86,12 +86,12 @@ class Sensitivity:
 def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensitivity:
     """Return how the joint angles of a solution change with the object's pose (docs/method.md section 5).
 
-    A joint that a touch stopped stops where the gap is used up, and a gap changes by n·(velocity of the link's point -
-    velocity of the object's point), whatever features touch. Joints before it, and fingers that closed earlier, are
-    where their own touches let them be. Obstacles move with the object.
+    A contact stops a joint when the gap is used up. For any pair of features, the gap changes by n·(velocity of the
+    link's point - velocity of the object's point). Joints before this joint, and fingers that closed earlier, follow
+    their own contacts. Obstacles move with the object.
 
     Args:
-        solution: closed in one round. hand, obj: those that it was computed for.
+        solution: closed in one round. hand, obj: the hand and object that were solved for.
 
     Raises:
         ClenchError: another hand or object.
@@ -130,7 +130,7 @@ def sensitivity(solution: GraspSolution, hand: Hand, obj: GraspObject) -> Sensit
 
 
 def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -> str:
-    """Return why what stopped the joints cannot be found again, or nothing."""
+    """Return why the contacts that stopped the joints cannot be recomputed, or nothing."""
     for finger in moved:
         result = solution.fingers[finger.name]
         if result.best is None:
@@ -143,10 +143,10 @@ def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -
 
 
 def _check_same(solution: GraspSolution, hand: Hand, packed: PackedObject, source: CollisionSource) -> None:
-    """Refuse another hand or object than those that were solved for.
+    """Refuse a hand or an object that differs from the solved one.
 
     Raises:
-        ClenchError: with what differs.
+        ClenchError: names the difference.
     """
     wanted, _, body = solution.geometry_hash.partition("+")
     if hash_hand(hand, source) != wanted:

@@ -35,7 +35,7 @@ from clench.solver.solution import GraspSolution
 
 from .holding import HeldSolution, hold
 
-#: Where gravity points in the world unless told otherwise.
+#: Default direction of gravity in the world.
 DOWN = (0.0, 0.0, -1.0)
 #: Force of the disturbances of something without weight [N].
 _LEAST_DISTURBANCE = 1e-3
@@ -49,11 +49,11 @@ class SqueezePlan:
         feasible: whether every mass is held at all; text: sentences that say so, or which limit binds.
         mass: the heaviest that is planned for [kg]. margin: disturbances are resisted up to this multiple [-].
         lightest: the lightest mass that is planned for [kg]. any_direction: gravity may point anywhere.
-        forces: on the object, one per contact, in the world [N], shape (C, 3); twists: torques about the inward
-            normals of soft fingers [Nm], shape (C,).
+        forces: on the object, one per contact, in the world [N], shape (C, 3). twists: torques about the inward normals
+            of soft fingers [Nm], shape (C,).
         torques: by degree of freedom [Nm].
-        offsets: what position servos are to be told beyond the touch, by joint, followers included [rad]; joints
-            without a known gain are left out.
+        offsets: target of each position servo beyond the touch, by joint, followers included [rad]. Joints without a
+            known gain are left out.
         tensions: of the hand's tendons [N], None without tendons.
         grasp: the contacts, friction, centre of mass and length scale that were used.
         found: the same in the frames of mechanics.
@@ -118,13 +118,13 @@ def plan_squeeze(
     Mass and friction may be ranges (least, largest): the plan holds all of them. A number is a range of one value.
 
     Args:
-        solution: the solution. hand, obj: what it was computed for.
+        solution: the solution. hand, obj: the hand and object that were solved for.
         mass: of the object [kg].
-        gravity: direction in the world; None: any direction, and the mass is held when the margin reaches 1 and no
-            disturbance is left out of it.
-        disturbances: rows (force [N], torque [Nm]) in the world about the centre of mass, shape (N, 6); None: the
+        gravity: direction in the world. None: any direction; the mass is held when the margin reaches 1 and the margin
+            covers every disturbance.
+        disturbances: rows (force [N], torque [Nm]) in the world about the centre of mass, shape (N, 6). None: the
             largest weight as a pull along ±x, ±y, ±z of the palm, and as a torque at the length scale about the same
-            axes (with `gravity=None`: the weight in any direction, which also adds to given disturbances).
+            axes. With `gravity=None` the weight acts in any direction and adds to given disturbances.
         margin: the largest that is asked for; beyond it, torques are made small instead [-].
         contact_model, friction, torsion, center_of_mass: see `grasp_quality`.
         reserve: part of the lowest friction that the plan counts on, where the mass can be held so [-].
@@ -157,7 +157,8 @@ def plan_squeeze(
         reserve=reserve,
         most_force=max(MOST_FORCE_PER_WEIGHT * masses[1] * GRAVITY, MOST_FORCE_OF_LIGHT),
     )
-    # The margin leaves out what no forces resist; without a direction of gravity that is the weight itself.
+    # The margin leaves out loads that no contact forces can balance. Without a direction of gravity, the weight is such
+    # a load.
     held_any_way = not any_direction or (found.margin >= 1.0 and not found.unresisted)
     feasible = found.plan is not None and held_any_way
     contacts, plan = grasp.held.contacts, found.plan
@@ -183,9 +184,9 @@ def plan_squeeze(
 
 
 def angle_offsets(hand: Hand, grasp: HeldSolution, torques: FloatArray) -> dict[str, float]:
-    """Return by how much position servos are to be told more than the touch, `tau / k_p`, by joint [rad].
+    """Return the target offset of position servos beyond the touch, `tau / k_p`, by joint [rad].
 
-    Joints of a servo that pulls a fixed tendon have their share of what the tendon is told: see `Joint.stiffness`.
+    A servo that pulls a fixed tendon gives each of its joints a share of the tendon's target: see `Joint.stiffness`.
 
     Args:
         hand: the hand. grasp: its contacts. torques: of the degrees of freedom [Nm], shape (D,).
@@ -209,7 +210,7 @@ def _disturbances(grasp: HeldSolution, mass: float, gravity: ArrayLike | None, g
         asked = np.hstack([rows[:, :3] @ R, rows[:, 3:] @ R / grasp.held.length])
         if gravity is not None:
             return asked
-        # Without a direction the weight is no load of its own: it adds to every disturbance, whatever its direction.
+        # Without a direction, the weight is no load of its own: it adds to every disturbance in each direction.
         either = np.vstack([np.zeros((1, 6)), asked])
         summed: FloatArray = (gravity_any_direction(nothing)[:, None] + either).reshape(-1, 6)
         return summed

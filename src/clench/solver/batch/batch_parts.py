@@ -1,4 +1,4 @@
-"""The parts of a batch on disk: what is solved stays when a run is ended, and the next run goes on from there."""
+"""Keep the parts of a batch on disk: after an interruption, the next run continues from the solved parts."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .grasp_batch import FINGER_STATUSES, PER_POSE, STATUSES, BatchContacts, Gra
 
 SCHEMA: Final = "clench.batch_parts/1"
 _OF_CONTACTS: Final = tuple(f"contact_{f.name}" for f in fields(BatchContacts))
-#: What of a hand plays no part in a solve.
+#: Attributes of a hand that do not affect a solve.
 _UNUSED: Final = frozenset({"path", "findings", "spec_xml", "assets"})
 
 
 class PartsNote(msgspec.Struct):
-    """Describe the parts in a folder: of which question, by its fingerprint, and how many poses each has at most."""
+    """Describe the parts in a folder: fingerprint of their question, and the largest number of poses of each."""
 
     schema: str
     question: str
@@ -42,8 +42,8 @@ class BatchParts:
     """Keep the parts of a batch in `FILE.parts`, a folder beside the file that the whole batch is written to.
 
     Args:
-        path: the file (.npz) to come. question: what is asked. chunk: poses of a part; a run that goes on keeps the
-            chunk of the one before.
+        path: the file (.npz) to come. question: the request. chunk: poses of a part; a continued run keeps the chunk of
+            the run before.
         asked: everything else that the answers depend on, arrays and plain values.
 
     Raises:
@@ -142,7 +142,7 @@ class BatchParts:
 
 
 def _is_whole(found: Mapping[str, NDArray[Any]], names: Mapping[str, Any], rows: FloatArray) -> bool:
-    """Return whether arrays are those of a part: all of them, of these poses, and with numbers that mean something."""
+    """Return whether arrays are a complete part: all names, the right poses, and meaningful numbers."""
     if found.keys() != {*PER_POSE, *_OF_CONTACTS} or not np.array_equal(found["hand_poses"], rows):
         return False
     poses, joints, fingers = len(rows), len(names["joint_names"]), len(names["finger_names"])
@@ -206,7 +206,7 @@ def question_fingerprint(question: Question, asked: tuple[Any, ...]) -> str:
     hand = [getattr(question.hand, f.name) for f in fields(question.hand) if f.name not in _UNUSED]
     criteria = calibration_of(question.command.criteria)
     command = replace(question.command, criteria=None, hand_pose=Pose.identity(), seed=None)
-    # Convex pieces are for simulation; where they are solved for, they are the shapes.
+    # Convex pieces are for simulation. If a solve uses them, they are the shapes.
     bodies = [(b.name, b.shapes, b.role, b.closed, b.friction) for b in question.obj.bodies]
     obj = (bodies, question.obj.pose, question.obj.collision_source)
     return fingerprint(__version__, hand, obj, command, criteria, question.preshapes, asked)

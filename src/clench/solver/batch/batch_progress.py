@@ -17,7 +17,7 @@ PATIENCE: Final = 1.0
 
 @contextmanager
 def shown(total: int, wanted: bool | None) -> Iterator[Callable[[int], None]]:
-    """Give a function that notes how many more poses are done, and draws a bar on standard error after a second.
+    """Give a function that notes the number of further solved poses, and draws a bar on standard error after a second.
 
     Args:
         total: number of poses. wanted: whether a bar may appear; None where standard error is a terminal.

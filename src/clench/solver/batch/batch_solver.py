@@ -58,7 +58,7 @@ class BatchSolver:
 
     @property
     def fingers(self) -> list[Finger]:
-        """The fingers asked for: first those that close, in the command's order."""
+        """The requested fingers: closing fingers first, in the command's order."""
         return [*self.moving, *self._idle]
 
     def solve(
@@ -67,8 +67,10 @@ class BatchSolver:
         """Return the answers.
 
         Args:
-            hand_rows: poses as the command means them, (N, 7). object_rows: of the object, (N, 7); None: where it is.
-            threads: how many are used. device: what closes the fingers, see `clench.solve_batch`.
+            hand_rows: poses as the command means them, (N, 7). object_rows: poses of the object, (N, 7). None: its
+                present pose.
+            threads: how many are used. threads: number of threads. device: device that closes the fingers, see
+                `clench.solve_batch`.
         """
         if object_rows is None:
             object_rows = np.repeat(self._start.T_world_object.wxyz_xyz[None], len(hand_rows), axis=0)
@@ -82,7 +84,7 @@ class BatchSolver:
     def solve_one(self, hand_pose: Pose, object_pose: Pose) -> GraspBatch:
         """Return the answer for one pose; its contacts are made when they are first read."""
         hand_rows, object_rows = np.array([hand_pose.wxyz_xyz]), np.array([object_pose.wxyz_xyz])
-        # What is read later does not follow what is done to the answer.
+        # A copy protects late reads from later changes to the answer.
         palms = self._palms(hand_rows).copy()
         solved = self._run(palms, object_rows, 1, False).solved
         columns = self._columns(solved, hand_rows, object_rows)
@@ -116,7 +118,7 @@ class BatchSolver:
         return np.array(poses).reshape(-1, 7)
 
     def _columns(self, solved: Solved, hand_rows: FloatArray, object_rows: FloatArray) -> dict[str, Any]:
-        """Name what the kernels computed, but for the contacts."""
+        """Name the columns that the kernels computed, except the contacts."""
         assert self.candidates is not None
         plan = self.candidates.plan
         chosen = np.where(np.array(plan.whole), -1, plan.items.low)[solved.chosen]
@@ -220,7 +222,7 @@ def _contacts_of(solved: Solved, palms: FloatArray) -> BatchContacts:
     )
 
     slots = np.arange(solved.number.shape[2])
-    # The hand's own links are no part of the object: no contacts, as in a solution.
+    # As in a solution, contacts with the hand's own links are left out.
     found = (slots < solved.contacts[:, :, None]) & (solved.number[..., TOUCH_BODY] >= 0)
     pose, finger, slot = np.nonzero(found)
     number, value = solved.number[pose, finger, slot], solved.value[pose, finger, slot]

@@ -1,4 +1,4 @@
-"""What a batch is solved on: the processor, or a CUDA device."""
+"""The devices that can solve a batch: the processor, or a CUDA device."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DEVICES: Final = (CPU, CUDA)
 
 
 def why_not(device: str) -> str | None:
-    """Return a sentence that says why a device cannot be used, or None where it can.
+    """Return a sentence that says why a device is not available, or None if it is.
 
     Raises:
         CommandError: there is no such kind of device.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Whole = NDArray[np.int64]
 
-#: What the codes of a batch mean, in order.
+#: Meanings of a batch's codes, in order.
 STATUSES: Final = tuple(SolutionStatus)
 FINGER_STATUSES: Final = tuple(FingerStatus)
 SCHEMA: Final = "clench.batch/1"
@@ -73,7 +73,7 @@ class BatchContacts:
         """Return a column by pose with as many places as the fullest pose has contacts, shape (N, most, ...).
 
         Args:
-            values: a column of this table, shape (C, ...). fill: stands where there is no contact.
+            values: a column of this table, shape (C, ...). fill: value where no contact exists.
         """
         counts = np.diff(self.first)
         filled = np.full((len(counts), int(counts.max(initial=0)), *values.shape[1:]), fill, dtype=values.dtype)
@@ -82,7 +82,7 @@ class BatchContacts:
 
     @classmethod
     def joined(cls, parts: Sequence[BatchContacts]) -> BatchContacts:
-        """Return the contacts of several batches as those of one."""
+        """Return the contacts of several batches as one table."""
         counts = np.concatenate([np.diff(part.first) for part in parts])
         names = [f.name for f in fields(cls) if f.name != "first"]
         columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
@@ -111,7 +111,7 @@ class GraspBatch(LateFields):
     """The answers of `clench.solve_batch` for N poses, as arrays; F fingers, J joints.
 
     Args:
-        question: what was asked. joint_names, finger_names, link_names, body_names: what the columns are.
+        question: the request. joint_names, finger_names, link_names, body_names: names of the columns.
         hand_poses, object_poses: as asked, rows [w, x, y, z, X, Y, Z], shape (N, 7).
         status_codes: indices into `STATUSES`, shape (N,); `status` has their names.
         certified: whether the certificate of docs/method.md section 5 holds, shape (N,).
@@ -195,7 +195,7 @@ class GraspBatch(LateFields):
         return solve(self.question.hand, self.question.obj, self.command(i))
 
     def save(self, path: str | Path) -> None:
-        """Write all arrays, and what was asked, to a NumPy file (.npz), atomically; the names are columns of text.
+        """Write all arrays and the request to a NumPy file (.npz), atomically; the names are columns of text.
 
         Raises:
             FileError: the file cannot be written.

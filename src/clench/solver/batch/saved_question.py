@@ -1,4 +1,4 @@
-"""What a batch was asked, kept beside its arrays, so that its grasps can be solved again as whole solutions."""
+"""Keep the request of a batch beside its arrays, so that its grasps can be solved again as whole solutions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from .grasp_batch import Question
 
-#: Solved again, the angles of a pose are those of the batch but for this much [rad].
+#: Largest difference between the angles of a batch and those of a repeated solve [rad].
 _SAME: Final = 1e-6
 _KEYS: Final = (
     *("schema", "command", "hand_model", "object_model", "object_scale", "object_collision_source", "preshape_joints"),
@@ -33,10 +33,10 @@ _TEXTS: Final = frozenset(_KEYS) - frozenset(_NUMBERS)
 
 
 def question_arrays(question: Question, chosen: np.ndarray[Any, Any]) -> dict[str, np.ndarray[Any, Any]]:
-    """Return what a batch was asked as arrays: the command as JSON, the models' names, the postures by pose.
+    """Return the request of a batch as arrays: the command as JSON, the models' names, the postures by pose.
 
     Args:
-        question: what was asked. chosen: numbers of its postures that clench chose, shape (N,).
+        question: the request. chosen: indices of the postures that clench chose, shape (N,).
     """
     from clench.models.command_file import command_to_dict
 
@@ -66,7 +66,8 @@ class SavedBatch:
         path: the file.
 
     Raises:
-        FileError: missing, no batch, arrays that do not fit each other, or saved without its command.
+        FileError: the file is missing, is no batch, has arrays that do not fit each other, or was saved without its
+            command.
     """
 
     def __init__(self, path: str | Path) -> None:

@@ -54,22 +54,24 @@ def solve_batch(
 
     Args:
         hand, obj: as for `clench.solve`.
-        hand_poses: poses, rows [w, x, y, z, X, Y, Z] of shape (N, 7), or matrices (N, 4, 4): `T_world_palm`, or that of
-            the command's `root_link`.
+        hand_poses: rows [w, x, y, z, X, Y, Z] of shape (N, 7), or matrices (N, 4, 4). They mean `T_world_palm`, or the
+            pose of the command's `root_link`.
         command: everything else that is asked for; its own `hand_pose` plays no part.
         object_poses: `T_world_object`, one per pose, in the same forms; by default the command's, or the object's own.
-        preshapes: angles by joint name [rad], shape (N,) each, over those of the command. A hand is planned anew for
-            every posture, which takes much longer than a solve: few different ones are quick, many are not.
+        preshapes: angles by joint name [rad], shape (N,) each; they override those of the command. Every different
+            posture needs a new plan, which takes much longer than a solve. A few different postures are quick; many are
+            slow.
         threads: how many are used; all cores by default. chunk: poses at a time, which bounds the memory besides the
             answers. progress: show a bar on standard error after a second; by default where that is a terminal.
-        device: what closes the fingers, "cpu" or "cuda"; where there is no CUDA device, a warning says so, and the
-            CPU does it. Answers of a device differ in their last bits.
+        device: "cpu" or "cuda" closes the fingers. Without a CUDA device, clench warns and uses the CPU. Answers of a
+            device differ in their last bits.
         out: NumPy file (.npz) to write, see `GraspBatch.save`. Every chunk is written when it is solved, to the folder
-            `OUT.parts`. The same call goes on where an ended one stopped, and the folder goes when the file is whole.
+            `OUT.parts`. The same call continues an interrupted one, and the folder is removed when the file is
+            complete.
 
     Raises:
         CommandError: malformed poses or numbers, an unknown device, or see `clench.solve`. FileError: `out` cannot be
-            written, or its parts are those of another batch; both are known before anything is solved.
+            written, or its parts are those of another batch. Both are checked before the first solve.
     """
     asked = _asked(hand, obj, command)
     rows = pose_rows(hand_poses, "hand_poses")
@@ -117,7 +119,8 @@ def solve_stream(
     """Solve a command at any number of poses, in constant memory: yield batches of up to `chunk` poses.
 
     Args:
-        hand_poses: what is iterated over: single poses, rows (7,) or matrices (4, 4). The rest as for `solve_batch`.
+        hand_poses: iterable of single poses, rows (7,) or matrices (4, 4). The other arguments are those of
+            `solve_batch`.
 
     Raises:
         CommandError: malformed poses or numbers, or see `clench.solve`.

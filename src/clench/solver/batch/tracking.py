@@ -20,22 +20,22 @@ from clench.solver.preshapes.posture_choice import first_choice
 from .batch_solver import BatchSolver
 from .grasp_batch import GraspBatch
 
-#: By how much another plane's weighted sum has to be better before a finger leaves the one it has [-].
+#: A finger leaves its plane only if another plane's weighted sum is better by this [-].
 MARGIN: Final = 0.05
 
 
 class Tracker:
     """Answer one command for poses that change from cycle to cycle.
 
-    Every answer is computed anew and promises what one of `clench.solve` does: nothing is carried over from the cycle
-    before but, without the full width, the plane that a finger is on. A finger stays there unless another plane's
-    weighted sum is better by `margin`, or it no longer touches there and does on another. With the full width there is
-    one set per finger and nothing to choose, and the answer has the bits of `clench.solve`.
+    Every answer is computed anew and guarantees the same as `clench.solve`. Without the full width, the tracker keeps
+    one thing from the last cycle: the plane of each finger. A finger keeps its plane unless another plane's weighted
+    sum is better by `margin`, or the finger touches only on another plane. With the full width there is one set per
+    finger and nothing to choose. The answer then has the bits of `clench.solve`.
 
     Args:
         hand, obj: as for `clench.solve`.
-        command: what is asked for, at the first pose, or the first pose; one open posture per finger and one order.
-            If it leaves the posture to clench, the best posture at the first pose is kept.
+        command: the request at the first pose, or the first pose; one open posture per finger and one order. If it
+            leaves the posture to clench, the tracker keeps the best posture of the first pose.
         margin: see above [-]; 0 chooses as `clench.solve` does.
 
     Raises:
@@ -70,7 +70,7 @@ class Tracker:
             hand_pose: as the command means it. object_pose: `T_world_object`.
 
         Raises:
-            CommandError: what is given is no pose.
+            CommandError: the argument is no pose.
         """
         for pose, key in ((hand_pose, "hand_pose"), (object_pose, "object_pose")):
             if pose is not None:

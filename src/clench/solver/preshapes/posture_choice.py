@@ -1,8 +1,8 @@
 """The posture that clench chooses: the hand closes from its preshapes at every pose (docs/preshapes.md).
 
-A status that is better goes first, then what is certified, then what is inside the limits of the calibration, then the
-weighted sum of the criteria. Motion counts from the open hand, that of posture joints too. Of equal closings, the one
-whose posture is nearest to the open hand is chosen.
+The order of precedence is: the better status, the certificate, the limits of the calibration, the weighted sum of the
+criteria. Motion counts from the open hand and includes posture joints. Among equal closings, the posture nearest to the
+open hand wins.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SAME: Final = 1e-9
 
 
 def posture_solver(hand: Hand, obj: GraspObject, command: GraspCommand) -> BatchSolver | PostureSolver:
-    """Return what solves a command at many poses: with one posture, or with the best one at every pose.
+    """Return a solver of a command at many poses: with one posture, or with the best posture at every pose.
 
     Raises:
         ClenchError: see `clench.solve`.
@@ -50,7 +50,7 @@ def posture_solver(hand: Hand, obj: GraspObject, command: GraspCommand) -> Batch
 
 
 def first_choice(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspCommand:
-    """Return a command with the posture that clench chooses at its pose; as it is, where it leaves no choice.
+    """Return a command with the posture that clench chooses at its pose, or the same command if it leaves no choice.
 
     Raises:
         ClenchError: see `clench.solve`.
@@ -63,7 +63,7 @@ def first_choice(hand: Hand, obj: GraspObject, command: GraspCommand) -> GraspCo
 
 
 def with_posture(solution: GraspSolution, said: Mapping[str, Any], seconds: float) -> GraspSolution:
-    """Return a solution whose `choice` says why the posture was chosen, and how long that took [s]."""
+    """Return a solution whose `choice` gives the reason for the posture, and the time of its choice [s]."""
     choice, timing = solution.choice, dict(solution.timing)
     timing["total"] = timing.get("total", 0.0) + seconds
     return solution.with_known(
@@ -106,7 +106,7 @@ class PostureSolver:
         return replace(best, question=self.names["question"], preshape_codes=order[:, 0].astype(np.int16))
 
     def choose_one(self) -> tuple[PostureOption, Mapping[str, Any]]:
-        """Return the best posture at the pose of the command, and what was compared as plain values."""
+        """Return the best posture at the pose of the command, and the comparison as plain values."""
         row, answers = np.array([self._command.hand_pose.wxyz_xyz]), dict[int, GraspBatch]()
 
         def run(k: int) -> None:

@@ -32,7 +32,7 @@ _TOUCHING: Final = 2
 
 
 class Scores(NamedTuple):
-    """Hold how K closings compare at N poses; P criteria that count.
+    """The comparison of K closings at N poses, for the choice among them; P criteria that count.
 
     Args:
         place: of the status, 0 for a grasp, shape (N, K). certified, inside: whether the certificate holds, and whether
@@ -52,8 +52,8 @@ class PostureScorer:
     """Score closings by a calibration.
 
     Args:
-        hand, obj: as solved. fingers: those that close. opened: posture from which all motion counts, (J,) [rad].
-        calibration: what counts.
+        hand, obj: as solved. fingers: the closing ones. opened: posture from which all motion counts, (J,) [rad].
+        calibration: weights and limits.
     """
 
     hand: Hand
@@ -112,7 +112,7 @@ class PostureScorer:
     def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Weight, limit in the closing direction [rad] and range [rad] of every finger's joints, (F, J) each.
 
-        A joint of another finger has no weight, and no limit that is near; neither has one without a range.
+        A joint of another finger, or without a range, has no weight and no near limit.
         """
         shape = (len(self.fingers), len(self.hand.joints))
         weight, end, span = np.zeros(shape), np.full(shape, np.inf), np.ones(shape)
@@ -138,7 +138,7 @@ class PostureScorer:
         return np.bincount(different, minlength=shape[0] * shape[1]).astype(np.float64).reshape(shape)
 
     def _inside(self, name: str, solution: GraspSolution) -> bool:
-        """Say whether all values of a criterion are inside its limit; one that is not known is not."""
+        """Say whether all values of a criterion are inside its limit; an unknown value is not."""
         if is_of_hand(find_criterion(name, self.calibration.name)):
             values = [(solution.choice or {}).get("final_hand_scores", {}).get(name)]
         else:

@@ -31,7 +31,7 @@ class PostureOption:
 
 
 def preshape_angles(hand: Hand, name: str) -> dict[str, float]:
-    """Return what a preshape sets [rad]: every posture joint, and open values of closing joints.
+    """Return the angles that a preshape sets [rad]: every posture joint, and open values of closing joints.
 
     Raises:
         UnknownNameError: the hand has no preshape of this name.
@@ -47,8 +47,8 @@ def preshape_angles(hand: Hand, name: str) -> dict[str, float]:
 def posture_options(hand: Hand, command: GraspCommand) -> tuple[PostureOption, ...]:
     """Return the postures among which clench chooses, the open hand first; empty where the command leaves no choice.
 
-    A command leaves the choice to clench if it names no posture joint and no preshape, and has no `yaw_grid` and
-    `opposition_grid`. The fingers that it asks for need posture joints, and two sides that can oppose each other.
+    A command leaves the choice to clench if it names no posture joint, no preshape, no `yaw_grid` and no
+    `opposition_grid`. Its fingers need posture joints, and two sides that can oppose each other.
 
     Raises:
         UnknownNameError, CommandError: see `check_command`.
@@ -74,7 +74,7 @@ def _options(hand: Hand, fingers: tuple[Finger, ...], given: Mapping[str, float]
 
 
 def _preshapes_of(hand: Hand, fingers: tuple[Finger, ...]) -> list[tuple[str, dict[str, float]]]:
-    """Return names and angles [rad] of all preshapes, for the joints of some fingers; none if no two sides oppose."""
+    """Return names and angles [rad] of all preshapes for joints of given fingers; none if no two sides oppose."""
     kept, key = _kept(hand), tuple(finger.name for finger in fingers)
     if key not in kept:
         two_sides = any(True for _ in opposing_sides(hand, key))
@@ -92,7 +92,7 @@ def _kept(hand: Hand) -> dict[tuple[str, ...], list[tuple[str, dict[str, float]]
 
 
 def distance_from_open(hand: Hand, option: PostureOption, first: PostureOption) -> float:
-    """Return the sum of how far joints are set apart by a posture and by the open one [rad]."""
+    """Return the sum of the joints' absolute differences between a posture and the open one [rad]."""
     names = dict.fromkeys([*option.angles, *first.angles])
     opened = {name: hand.joints[hand.joint_index(name)].open_value for name in names}
     return float(np.sum([abs(option.angles.get(n, opened[n]) - first.angles.get(n, opened[n])) for n in names]))

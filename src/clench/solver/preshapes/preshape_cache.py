@@ -32,7 +32,7 @@ ZONE: Final = 11
 #: Files that are kept, and the largest of them [bytes].
 MOST_FILES: Final = 64
 MOST_BYTES: Final = 1_000_000
-#: What of a hand plays no part in its preshapes.
+#: Attributes of a hand that do not affect its preshapes.
 _UNUSED: Final = frozenset({"path", "findings", "warnings", "spec_xml", "assets"})
 _OWN: Final = re.compile(r"[0-9a-f]{64}\.json")
 
@@ -63,7 +63,7 @@ def cache_key(hand: Hand, fingers: tuple[str, ...]) -> str:
 
 
 def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
-    """Return what is kept under a key; None where nothing is, or nothing that can be used.
+    """Return the entry of a key, or None if it is missing or unusable.
 
     Args:
         key: see `cache_key`. joints: names of the hand's joints.
@@ -86,7 +86,7 @@ def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
 def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
     """Write preshapes under a key, and remove the oldest files beyond `MOST_FILES`.
 
-    Where nothing can be written, nothing is kept.
+    If the cache cannot be written, nothing is kept.
     """
     if not _is_on():
         return

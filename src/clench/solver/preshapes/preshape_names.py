@@ -1,4 +1,4 @@
-"""Names of preshapes: what they look like, and how far apart the pads are where they oppose best."""
+"""Name preshapes by their kind and by the distance of the pads where they oppose best."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _WIDE: Final = 0.08
 def name_preshapes(shapes: Sequence[tuple[FloatArray, FloatArray, bool]]) -> list[str]:
     """Return a name of every preshape of a hand; the first is the open hand.
 
-    A name says the kind and the distance of the pads in millimetres where they oppose best: "pinch-20mm" below 40 mm,
-    "grip-60mm", "wide-90mm" from 80 mm on, and "curled-60mm" where the fingers are bent before they close. Preshapes
-    that would have the same name get a letter: "wide-90mm-b".
+    A name gives the kind and the distance of the pads in millimetres where they oppose best: "pinch-20mm" below 40 mm,
+    "grip-60mm", "wide-90mm" from 80 mm on. In "curled-60mm" the fingers are bent before they close. Preshapes with the
+    same name get a letter: "wide-90mm-b".
 
     Args:
         shapes: apertures [m] and qualities [-] of its zones, shape (Z,) each, and whether fingers are bent.

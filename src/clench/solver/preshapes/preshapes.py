@@ -1,7 +1,8 @@
-"""The opposition zones of a hand: where, and how far apart, pads come to face each other (docs/method.md section 9).
+"""Find the opposition zones of a hand: places and distances at which pads come to face each other (docs/method.md
+section 9).
 
 A preshape fixes the posture joints and bends the outer joints. The first closing joint of every finger then closes. A
-zone is what two opposing sides of the hand are like on the way: the middle between their pads, the axis from one to the
+zone describes two opposing sides of the hand on the way: the middle between their pads, the axis from one side to the
 other, the distance, and how well the pads face each other.
 """
 
@@ -36,14 +37,14 @@ WELL = 0.25
 #: Preshapes that are drawn, and shares of the first closing joint's range at which pads are looked at.
 _DRAWS = 700
 _SHARES = np.linspace(0.05, 0.95, 10)
-#: By how much the outer joints of a finger are bent before it closes, as shares of their ranges [-].
+#: Bend of a finger's outer joints before it closes, as shares of their ranges [-].
 _BENT = (0.0, 0.0, 0.15, 0.3, 0.45)
-#: Side-to-side joints of fingers stay within this share of their range around the open value, where there is a thumb.
+#: In a hand with a thumb, side-to-side finger joints stay within this share of their range around the open value.
 _SPREAD = 0.3
 #: The best preshapes of every bin of apertures are kept, if they differ by this in some joint [rad].
 _PER_APERTURE = 4
 _APART = 0.25
-#: So far from the hand there is nothing [m].
+#: The hand reaches nothing beyond this distance [m].
 _FAR = 100.0
 
 
@@ -52,10 +53,10 @@ class Preshape:
     """A preshape of a hand, and the zones on the way from there.
 
     Args:
-        name: "open", or what it looks like, see `name_preshapes`.
-        angles: what it sets, by joint name [rad]: every posture joint, and open values of closing joints.
-        center, axis: of its zones in the palm frame, shapes (Z, 3): the middle [m], and the unit vector from the one
-            side (thumb) to the other.
+        name: "open", or a description, see `name_preshapes`.
+        angles: by joint name [rad]: every posture joint, and open values of closing joints.
+        center: middles of its zones in the palm frame [m], shape (Z, 3). axis: unit vectors from one side (thumb) to
+            the other, shape (Z, 3).
         row: from the first to the last pad of the other side, across the axis [m], shape (Z, 3).
         aperture: distance of the pads [m], shape (Z,). quality: how well they oppose, -1 to 1, shape (Z,).
     """
@@ -96,7 +97,7 @@ def opposition_zones(hand: Hand, fingers: tuple[str, ...] | None = None) -> tupl
     processes read them from the cache folder (see `clench.solver.preshapes.preshape_cache`).
 
     Args:
-        hand: the hand. fingers: names of those that close; None is all of them.
+        hand: the hand. fingers: names of the closing fingers; None: all.
     """
     names = tuple(finger.name for finger in hand.fingers) if fingers is None else fingers
     kept = _kept(hand)
@@ -144,7 +145,7 @@ def posture_joints(hand: Hand, fingers: tuple[Finger, ...] | None = None) -> lis
 
 
 def _find_zones(hand: Hand, names: tuple[str, ...]) -> Iterator[Entry]:
-    """Yield the open hand and the best preshapes of every aperture; nothing where no two sides face each other."""
+    """Yield the open hand and the best preshapes of every aperture, or nothing if no two sides face each other."""
     pads, sides = finger_pads(hand), list(opposing_sides(hand, names))
     places = {pad.finger: k for k, pad in enumerate(pads)}
     sides = [(one, [f for f in other if f in places]) for one, other in sides if one in places]
@@ -253,7 +254,8 @@ def _zones(pads: _Pads, one: int, others: list[int]) -> tuple[FloatArray, ...]:
 
 
 def _chosen(hand: Hand, names: tuple[str, ...], candidates: list[tuple[FloatArray, ...]]) -> list[int]:
-    """Return the open hand and the best candidates of every aperture, without those that close without a certificate.
+    """Return the open hand and the best candidates of every aperture, without candidates whose closing has no
+    certificate.
 
     The best of every aperture come first, then the second best, and so on.
     """
@@ -286,7 +288,7 @@ def _apart(candidates: list[tuple[FloatArray, ...]], chosen: list[int], number: 
 
 
 def _closes(hand: Hand, names: tuple[str, ...], start: FloatArray) -> bool:
-    """Say whether the closing from a posture is certified where there is no object: some links interlock."""
+    """Say whether the closing from a posture is certified without an object: some links interlock."""
     command = GraspCommand(hand_pose=Pose.identity(), preshape=_angles(hand, start), fingers=names, planes=1)
     far_away = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, _FAR]])
     return bool(BatchSolver(hand, _nothing(), command).solve(far_away, None, 1).certified[0])
@@ -298,7 +300,7 @@ def _nothing() -> GraspObject:
 
 
 def _angles(hand: Hand, start: FloatArray) -> dict[str, float]:
-    """Return what a command has to say for a posture: the joints that differ from the open hand, without followers."""
+    """Return the angles that a command must name for a posture: joints off the open hand, without followers."""
     opened, followers = hand.open_angles(), {c.follower for c in hand.couplings}
     own: NDArray[np.intp] = np.array([j for finger in hand.fingers for j in finger.joints if j not in followers])
     return {hand.joints[j].name: float(start[j]) for j in own.tolist() if start[j] != opened[j]}

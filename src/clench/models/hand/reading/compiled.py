@@ -1,4 +1,4 @@
-"""Compile a model text with MuJoCo, prune what is not the hand, and refuse closed loops."""
+"""Compile a model text with MuJoCo, remove all bodies outside the hand, and refuse closed loops."""
 
 from __future__ import annotations
 
@@ -77,7 +77,8 @@ def compile_model(text: ModelText) -> CompiledModel:
     except (ValueError, RuntimeError) as error:
         if "volume" not in str(error) and "mjMINVAL" not in str(error):
             raise FileError(text.label, f"MuJoCo cannot compile it: {_first_lines(error)}") from None
-    # Flat or open meshes have no volume to take a mass from: their surface does as well. What has none is given some.
+    # Flat or open meshes have no volume to take a mass from: their surface does as well. A body without a mass is given
+    # some.
     spec.compiler.boundmass, spec.compiler.boundinertia = 1e-6, 1e-12
     for mesh in spec.meshes:
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
@@ -85,7 +86,7 @@ def compile_model(text: ModelText) -> CompiledModel:
 
 
 def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
-    """Return the model without the bodies that are not kept; their subtrees go with them."""
+    """Return the model without the other bodies; their subtrees go with them."""
     m = compiled.model
     gone = [
         b for b in range(1, m.nbody) if b not in kept and (int(m.body_parentid[b]) in kept or m.body_parentid[b] == 0)
@@ -95,7 +96,7 @@ def keep_bodies(compiled: CompiledModel, kept: set[int]) -> CompiledModel:
     spec = compiled.spec
     bodies = list(spec.bodies)
     removed = {bodies[b].name for b in range(1, m.nbody) if b not in kept}
-    # MuJoCo takes what is tied to a removed body along, but not what looks at it.
+    # MuJoCo also removes elements that are tied to a removed body, but not elements that look at it.
     for looking in [*spec.lights, *spec.cameras]:
         if looking.targetbody in removed:
             spec.delete(looking)
@@ -167,7 +168,7 @@ def _moves_below(model: Any, body: int, palm: int) -> bool:
 
 
 def _stated(spec: Any, text: ModelText) -> StatedJoints:
-    """Read what the joints' limits and axes are before MuJoCo compiles them; swap limits that are reversed."""
+    """Read the stated limits and axes of the joints before MuJoCo compiles them; swap reversed limits."""
     import mujoco
 
     reversed_limits: dict[str, tuple[float, float]] = {}

@@ -12,7 +12,7 @@ from clench.core.tolerances import LARGEST_LENGTH
 
 from .compiled import CompiledModel
 
-#: No joint turns farther, whatever its limits are placeholders for [rad].
+#: Largest angle of a joint, for limits that are placeholders [rad].
 LARGEST_ANGLE = 1e6
 _UNIT = 1e-6
 

@@ -38,7 +38,7 @@ class Skeleton:
         joints: revolute joints, in link order.
         link_of_body: last link of every kept MuJoCo body.
         joint_of_model: index of a joint by MuJoCo's joint number.
-        findings: what looks wrong.
+        findings: problems and notes.
     """
 
     frames: tuple[Frame, ...]
@@ -158,7 +158,7 @@ def _joint(
 
 
 def _efforts(model: Any) -> dict[int, float]:
-    """Return effort limits [Nm] by MuJoCo joint: the smallest of what joint and actuator allow."""
+    """Return effort limits [Nm] by MuJoCo joint: the smaller limit of joint and actuator."""
     import mujoco
 
     efforts: dict[int, float] = {}
@@ -203,9 +203,9 @@ def actuator_forces(model: Any, a: int) -> tuple[float, float]:
 def _servo(model: Any, joint: int) -> tuple[float | None, float]:
     """Return the gain that a position servo has at a joint [Nm/rad], and that gain beside the servo's own [-].
 
-    The servo is that of the joint or of its fixed tendon; without one the gain is None. A tendon's servo counts as
-    `k_p sum(c_i²)`: when every joint of the tendon is told `tau_i / stiffness` more than it
-    has, with `tau_i = c_i F`, the tendon is told `F / k_p` more and pulls with the force F.
+    The servo is that of the joint or of its fixed tendon; without one the gain is None. A tendon's servo counts as `k_p
+    sum(c_i²)`. Suppose every joint of the tendon gets a target offset `tau_i / stiffness` with `tau_i = c_i F`. Then
+    the tendon's target grows by `F / k_p`, and it pulls with the force F.
     """
     import mujoco
 

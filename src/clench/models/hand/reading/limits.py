@@ -1,4 +1,4 @@
-"""Read the joints' limits and axes as the model states them, and say what is doubtful about them."""
+"""Read the joints' limits and axes as the model states them, and report doubtful ones."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def doubtful_joints(
     """Return a finding for each kind of limit, axis or effort that is missing or looks wrong.
 
     Args:
-        compiled: the model. joints: MuJoCo's numbers of those that are kept. efforts: limits [Nm], by number.
+        compiled: the model. joints: MuJoCo's indices of the kept ones. efforts: limits [Nm], by number.
         given: names of those whose limits the hand file gives.
     """
     m = compiled.model

@@ -109,10 +109,10 @@ def collides(model: Any, geom: int) -> bool:
 
 
 def bodies_without_collision(compiled: CompiledModel, bodies: list[int], palm: int) -> set[int]:
-    """Return bodies to collide with their drawn geometry: those of moving groups where nothing collides.
+    """Return bodies that collide with their visual geometry: bodies of moving groups without collision geometry.
 
-    A group is what moves as one piece: bodies fixed to each other. One with some collision geometry is
-    left as its author made it. What lies before the palm is left alone too.
+    A group is a set of bodies fixed to each other. A group with some collision geometry is left as its author made it.
+    Bodies before the palm are left alone too.
     """
     m = compiled.model
     groups: dict[int, list[int]] = {}

@@ -100,7 +100,7 @@ def _unreadable_stl(data: bytes) -> bool:
 def _converted(data: bytes, suffix: str) -> tuple[bytes, str]:
     """Convert a mesh file of the other kinds to STL or, when large, OBJ; scene transforms are applied.
 
-    MuJoCo keeps vertices in single precision, as STL does, and merges those that coincide.
+    MuJoCo keeps vertices in single precision, as STL does, and merges coincident ones.
     """
     import io
 

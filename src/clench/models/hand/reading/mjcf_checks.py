@@ -59,7 +59,7 @@ def _parts(element: ET.Element) -> float:
 
 
 def _count(element: ET.Element, key: str) -> float:
-    """Return the product of the whole numbers of an attribute; 1 where it has none, which MuJoCo will refuse."""
+    """Return the product of the whole numbers of an attribute; 1 for an empty one, which MuJoCo will refuse."""
     try:
         return math.prod(max(float(word), 1.0) for word in element.get(key, "1").split())
     except ValueError:

@@ -64,7 +64,7 @@ def find_model(model: str | Path) -> tuple[Path, bool]:
     """Return the model's file, and whether it is a built-in one.
 
     Raises:
-        UnknownNameError: neither a name nor a path. FileError: no such file, or another kind of file.
+        UnknownNameError: the text is neither a name nor a path. FileError: no such file, or another kind of file.
         HandError: a name whose files cannot be had, see `find_named`.
     """
     path = expanded(model)
@@ -155,7 +155,7 @@ def _store_file(element: ET.Element, attribute: str, parent: Path, folders: dict
 
 
 def _name_bodies(root: ET.Element) -> None:
-    """Name what has no name, so that links and joints are found again in the compiled model."""
+    """Name nameless elements, so that links and joints are found again in the compiled model."""
     bodies = [b for world in root.iter("worldbody") for b in world.iter("body")]
     taken = {b.get("name") for b in bodies} | {j.get("name") for b in bodies for j in b.findall("joint")}
     for number, body in enumerate(bodies, start=1):

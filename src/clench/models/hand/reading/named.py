@@ -23,7 +23,7 @@ _LOADING: Final = frozenset(
 
 
 def find_named(model: str) -> Path | None:
-    """Return the file of a hand by name, fetched into the package's cache when it is not there yet; None: no such name.
+    """Return the file of a named hand, fetched into the package's cache if necessary; None for an unknown name.
 
     Args:
         model: ``"shadow_hand"`` or ``"shadow_hand/right_hand"`` (Menagerie: robot and entry), or
@@ -66,7 +66,7 @@ def _suggested(names: list[str]) -> list[str]:
 
 
 def how_to_get_more() -> str:
-    """Return what to install for hands by name; empty where both packages are there."""
+    """Return the packages to install for hands by name; empty if both are installed."""
     return "" if _installed(MENAGERIE) and _installed(DESCRIPTIONS) else f"; more hands by name need {_INSTALL}"
 
 
@@ -107,7 +107,7 @@ def _in_descriptions(name: str, side: str) -> Path:
 
 
 def _fetched_description(name: str) -> ModuleType:
-    """Import the module of a description, which clones what it describes; what it prints is no answer of ours."""
+    """Import the module of a description, which clones its repository; its output is dropped."""
     try:
         with contextlib.redirect_stdout(sys.stderr):
             return importlib.import_module(f"{DESCRIPTIONS}.{name}")

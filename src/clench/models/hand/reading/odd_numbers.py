@@ -32,7 +32,7 @@ _NAMES = frozenset(
         *("meshclass", "bodyinparent", "instance", "key", "value_text", "content_type", "dclass", "parent", "type"),
     )
 )
-#: Limits may be left open: infinite ones, and placeholders of any size, are reported where they matter.
+#: Open limits are allowed here: infinite limits, and placeholders of any size, are reported where they matter.
 _OPEN = frozenset(("effort", "velocity", "ctrlrange", "forcerange", "actfrcrange", "actuatorfrcrange", "actrange"))
 
 

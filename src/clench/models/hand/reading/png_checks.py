@@ -20,7 +20,7 @@ _AT_ONCE: Final = 1 << 20
 
 
 def checked_png(data: bytes) -> bytes:
-    """Return a PNG file without what is not needed to show it.
+    """Return a PNG file with only the parts that are needed to show it.
 
     Raises:
         ValueError: no PNG, too many pixels, or packed data that are more than its pixels.

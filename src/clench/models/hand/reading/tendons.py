@@ -23,7 +23,7 @@ class TendonMap:
         t_min, t_max: least and largest tension of every tendon [N].
 
     Raises:
-        HandError: rows that do not fit the joints, numbers that are not finite, tensions without room.
+        HandError: rows do not fit the joints, numbers are not finite, or tensions have no range.
     """
 
     joints: tuple[str, ...]

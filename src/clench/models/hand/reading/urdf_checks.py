@@ -1,4 +1,4 @@
-"""Refuse what is wrong with a URDF tree, with the link or joint that it is about."""
+"""Refuse errors of a URDF tree, and name the link or joint."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def check_urdf(root: ET.Element, path: Path) -> None:
     """Look at names, joints, axes, origins, mimic joints and shapes of a URDF tree.
 
     Raises:
-        FileError: something is missing, there twice or no number. UnknownNameError: a joint mimics what does not exist.
+        FileError: something is missing, there twice or no number. UnknownNameError: a joint mimics an unknown joint.
     """
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
         raise FileError(path, "is a xacro template; expected plain URDF (expand it with the xacro program first).")
@@ -159,7 +159,7 @@ def _check_shape(geometry: ET.Element | None, where: str, path: Path) -> None:
 
 
 def _numbers(text: str) -> list[float]:
-    """Return the numbers of a text; none when one of its words is no finite number."""
+    """Return the numbers of a text, or nothing if a word is no finite number."""
     try:
         numbers = [float(word) for word in text.split()]
     except ValueError:

@@ -1,1 +1,1 @@
-"""Understanding: what the fingers, the palm, the roles and the couplings of a hand are."""
+"""Understand a hand: its fingers, palm, roles and couplings."""

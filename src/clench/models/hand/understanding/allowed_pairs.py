@@ -17,7 +17,7 @@ from clench.models.hand.reading.compiled import CompiledModel
 from clench.models.hand.reading.kinematics import Skeleton
 from clench.models.hand.reading.link_geometry import collides
 
-#: So many pairs of a finding are named.
+#: Number of pairs that a finding names at most.
 _NAMED = 3
 
 

@@ -1,7 +1,8 @@
 """Decide which way every finger closes: from its joints' limits, the other fingers, and where the fingertips meet.
 
 A finger has one sense, about the axis of its most distal joint. Every joint that follows no other has one vote, from
-its limits. Where votes are even, the side on which the other fingers close decides, or where the fingertips meet.
+its limits. If votes are even, the side on which the other fingers close decides, or else the place where the fingertips
+meet.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .jaws import open_apart
 
 #: Limits are equally far when their distances differ by less than this share of the range [-].
 _EQUALLY_FAR = 0.05
-#: How far the fingers are curled to see on which side they meet [rad].
+#: Curl of the fingers at which their meeting side is tested [rad].
 _CURL = np.deg2rad(60.0)
 #: Sides whose mean tip distances differ by less than this share cannot be told apart [-].
 _UNDECIDED = 0.02
@@ -45,14 +46,14 @@ class Vote:
 
 @dataclass
 class FingerPlan:
-    """Collect what is decided about one finger.
+    """The decisions about one finger.
 
     Args:
         finger: which. closing: joint indices, palm side first. signs: of each closing axis against the most
             distal one. straight: angle of each closing joint at which the finger is straight [rad].
         given: directions of the hand file, by joint. votes: by joint that leads.
         sense: +1 or -1 about the most distal axis, None while undecided; `sense_reason` says why.
-        shut_when_straight: the finger is closed where it is straight, so that it opens at its limits.
+        shut_when_straight: the finger is closed when straight, and opens at its limits.
     """
 
     finger: Finger
@@ -76,7 +77,7 @@ class FingerPlan:
 
 
 def note_limits(plan: FingerPlan, n: int, joint: Joint, override: JointOverride) -> None:
-    """Write down what the hand file or the limits say about the n-th closing joint of a finger."""
+    """Record the statement of the hand file or the limits about the n-th closing joint of a finger."""
     j = plan.closing[n]
     if override.direction is not None:
         plan.given[j] = override.direction
@@ -92,7 +93,7 @@ def note_limits(plan: FingerPlan, n: int, joint: Joint, override: JointOverride)
 
 
 def decide_senses(hand: Hand, plans: list[FingerPlan]) -> list[Finding]:
-    """Give every finger its sense and return what is uncertain about it.
+    """Give every finger its sense and return the uncertain points.
 
     Args:
         hand: with roles; its joints open at straight. plans: with votes.
@@ -127,7 +128,7 @@ def _count(plan: FingerPlan) -> None:
 
 
 def _turn_round(hand: Hand, plans: list[FingerPlan]) -> list[Finding]:
-    """Turn senses round where limits lead all fingertips apart: these fingers are closed where they are straight."""
+    """Reverse senses if limits lead all fingertips apart: these fingers are closed when straight."""
     moving = [plan for plan in plans if plan.closing]
     leading = [plan for plan in moving if plan.votes]
     if not leading or any(plan.given or (plan.sense is None and _leads(hand, plan)) for plan in moving):
@@ -243,7 +244,7 @@ def _advised(hand: Hand, joints: Sequence[int], text: str, severity: Severity) -
 def _tip_spread(hand: Hand, plans: list[FingerPlan], senses: Mapping[int, int]) -> float:
     """Return the mean distance between fingertips [m] when all fingers curl, for given senses.
 
-    Limits that contradict each other tell nothing, so those of undecided fingers do not hold here.
+    Limits that contradict each other carry no information, so limits of undecided fingers do not apply here.
     """
     q = np.array([j.open_value for j in hand.joints])
     for plan in plans:

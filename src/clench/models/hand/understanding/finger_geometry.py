@@ -71,7 +71,7 @@ def bends(line: FingerLine, closing: list[int], axis: FloatArray) -> list[float 
         line: the finger. closing: positions of its closing joints in the chain, palm side first.
         axis: unit, shape (3,); positive bends turn about it.
 
-    None where a piece is too short to tell, and for a first joint that no piece of the finger precedes.
+    None if a piece is too short to tell, or for a first joint that no piece of the finger precedes.
     """
     points = np.vstack([line.anchors[closing], line.tip])
     flat = points - np.outer(points @ axis, axis)

@@ -21,8 +21,8 @@ def short_names(joint_names: list[list[str]], link_names: list[list[str]]) -> li
     Args:
         joint_names: own joints of every finger, palm side first. link_names: its links.
 
-    A finger is named by a word that is in all its joint names and in no other finger's; else by what is left of
-    their common beginning; else by a known word that most of its links share.
+    A finger is named by a word that is in all its joint names and in no other finger's. Without such a word, the rest
+    of their common beginning names it, or else a known word that most of its links share.
     """
     beginnings = _beginnings(joint_names)
     common = [_common_words(names) for names in joint_names]
@@ -41,7 +41,7 @@ def place_names(places: list[float], thumb: int | None, taken: list[str]) -> lis
     """Fill in names by place: counted from the thumb's side, or by number.
 
     Args:
-        places: of every finger's base along the row of fingers, from the thumb's side [m]; not used without a thumb.
+        places: of every finger's base along the row of fingers, from the thumb's side [m]; unused without a thumb.
         thumb: index of the thumb, or None. taken: names found so far, empty where unknown.
     """
     names = list(taken)
@@ -70,7 +70,7 @@ def _common_words(names: list[str]) -> set[str]:
 
 
 def _beginnings(joint_names: list[list[str]]) -> list[str]:
-    """Return the common beginning of every finger's joints, without what other fingers begin with too."""
+    """Return the common beginning of every finger's joints, without the part that other fingers share."""
     own = [_shared_beginning(names) for names in joint_names]
     result: list[str] = []
     for i, mine in enumerate(own):
@@ -83,7 +83,7 @@ def _beginnings(joint_names: list[list[str]]) -> list[str]:
 
 
 def _shared_beginning(names: list[str]) -> str:
-    """Return what all names begin with, never half of a number; nothing when there is only one."""
+    """Return the common beginning of all names, never half of a number; nothing for a single name."""
     prefix = _common_prefix(names) if len(names) > 1 else ""
     if any(name[len(prefix) :][:1].isdigit() for name in names):
         prefix = prefix.rstrip("0123456789")

@@ -1,4 +1,4 @@
-"""Split what hangs on the palm into fingers: serial chains of revolute joints from the palm to the tip."""
+"""Split the subtree of the palm into fingers: serial chains of revolute joints from the palm to the tip."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SAME_REACH = 1e-4
 
 
 def own_chains(hand: Hand) -> list[tuple[int, ...]]:
-    """Return the own joints of every finger, palm side first; a joint that several fingers share is nobody's.
+    """Return the own joints of every finger, palm side first; a joint that several fingers share belongs to none.
 
     Args:
         hand: links, joints and palm are used.
@@ -36,10 +36,10 @@ def own_chains(hand: Hand) -> list[tuple[int, ...]]:
 
 
 def find_fingers(hand: Hand, overrides: HandFile) -> tuple[tuple[Finger, ...], list[Finding]]:
-    """Return the fingers, named where joints and links tell, thumbs by name only; and what was found.
+    """Return the fingers, named by their joints and links (thumbs by name only), and the findings.
 
     Raises:
-        UnknownNameError, FileError: the hand file names what does not exist.
+        UnknownNameError, FileError: the hand file names an unknown joint or link.
         HandError: no chain of joints moves any geometry.
     """
     found = own_chains(hand)
@@ -117,7 +117,7 @@ def row_places(bases: FloatArray, thumb: int | None, thumb_tip: FloatArray) -> l
 
 
 def name_fingers(hand: Hand, thumb: int | None, places: list[float], overrides: HandFile) -> tuple[Finger, ...]:
-    """Return the fingers with the names that were missing, the thumb, and what the hand file says.
+    """Return the fingers with the missing names, the thumb, and the hand file's entries.
 
     Args:
         hand: with fingers. thumb: its index. places: along the row of fingers, from the thumb's side [m].
@@ -182,7 +182,7 @@ def _finger(hand: Hand, name: str, chain: tuple[int, ...]) -> Finger:
 
 
 def _tip_link(hand: Hand, chain: tuple[int, ...], links: list[int]) -> int:
-    """Return the most distal of a finger's links: past the most joints, and of those the one that reaches farthest.
+    """Return a finger's most distal link: past the most joints and, among equals, with the farthest reach.
 
     The order of links in the file tells nothing: a pad on a proximal link may come after all that moves beyond it.
     """

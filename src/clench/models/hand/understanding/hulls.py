@@ -12,11 +12,11 @@ from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource
 
-#: Distances may be too small by this [m], and hulls no farther off are those of convex meshes ...
+#: Distances may be too small by this [m], and hulls that are no farther off belong to convex meshes ...
 HULL_TOLERANCE: Final = 1e-4
 #: ... or by this share of them [-].
 _SHARE: Final = 0.05
-#: Points at which one hull is looked at, at most, and at once.
+#: Number of sample points of one hull, at most, and per call.
 _LOOKS: Final = 2000
 _AT_ONCE: Final = 64
 #: From this distance on the mesh itself is recommended [m].
@@ -48,8 +48,8 @@ def check_hulls(hand: Hand) -> list[Finding]:
 def hull_distances(hand: Hand) -> dict[str, float]:
     """Return the largest distance from a link's hulls to the meshes that they replace [m], by name of the link.
 
-    Distances are bounded: what is returned was seen, and may be too small by `HULL_TOLERANCE` or 5 % of it.
-    Links whose hulls are no farther off than the tolerance are left out.
+    Distances are lower bounds: each was measured, and may be too small by `HULL_TOLERANCE` or 5 % of it. Links whose
+    hulls are no farther off than the tolerance are left out.
     """
     known: dict[int, float] = {}
     found: dict[str, float] = {}
@@ -68,7 +68,7 @@ def hull_distances(hand: Hand) -> dict[str, float]:
 def largest_distance(hull: TriangleMesh, mesh: TriangleMesh) -> float:
     """Return the largest distance from the surface of a hull to the mesh that it is the hull of [m].
 
-    The distance from a point to a mesh changes by no more than the point moves, so that one look bounds it all over a
+    The distance from a point to a mesh changes by no more than the point moves. Thus one sample bounds it over a whole
     triangle. Triangles are halved until no bound is far above a distance that was seen, or until `_LOOKS` were taken.
     """
     from clench.kernels.geometry.bvh import build_tree

@@ -59,7 +59,7 @@ def _tips(
 
 
 def _opposed(motions: FloatArray) -> bool:
-    """Return whether motions of tips, shape (N, 3), cancel each other, as those of jaws do."""
+    """Return whether motions of tips, shape (N, 3), cancel each other, as motions of jaws do."""
     sizes = np.linalg.norm(motions, axis=1)
     return bool(sizes.min() > 0.0 and np.linalg.norm((motions / sizes[:, None]).mean(axis=0)) < _COMMON)
 

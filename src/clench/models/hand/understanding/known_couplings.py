@@ -15,8 +15,8 @@ class KnownCoupling:
     """State a published coupling: both joints close together.
 
     Args:
-        hand: what it is called. leader, follower: patterns that whole joint names match, but for what stands before;
-            `{}` in the follower's is the leader's group.
+        hand: its name. leader, follower: patterns of whole joint names, apart from prefixes; `{}` in the follower's is
+            the leader's group.
         ratio: of their closing angles [-]. offset: [rad]. breakaway: the follower goes on when the leader is stopped.
         distal: the follower is the finger's last joint. source: who publishes it.
     """
@@ -35,7 +35,7 @@ _BARRETT: Final = "https://support.barrett.com/wiki/Hand/280/KinematicsJointRang
 _SVH: Final = "schunk_svh_description, the maker's ROS package"
 
 KNOWN_COUPLINGS: Final = (
-    # Motor to joint 125:1 and, over the base by a cable, 93.75:1: the distal joint turns by 125/93.75 - 1 of the other.
+    # Motor to joint 125:1 and, by a cable over the base, 93.75:1: the distal joint turns by 125/93.75 - 1 of the other.
     KnownCoupling(
         "BarrettHand BH8-280", r"(finger_?\d_)med(?:_joint)?", "{}dist(?:_joint)?", 1 / 3, _BARRETT, breakaway=True
     ),
@@ -47,7 +47,7 @@ KNOWN_COUPLINGS: Final = (
         "the maker's MuJoCo simulator, github.com/psyonicinc/ability-hand-api",
         offset=0.72349796,
     ),
-    # One tendon pulls both; equal shares, as in MuJoCo Menagerie's model.
+    # One tendon pulls both, in equal shares as in MuJoCo Menagerie's model.
     KnownCoupling(
         "Shadow Dexterous Hand",
         r"((?:FF|MF|RF|LF)J)2",

@@ -12,9 +12,9 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 
 from .finger_geometry import finger_line, tip_motion
 
-#: Angles of every posture joint that are tried: its limits and what is between.
+#: Number of tried angles per posture joint: its limits and angles between them.
 _POSTURES = 3
-#: How far the fingers are closed when they are looked at, as shares of their ranges [-].
+#: Closing of the fingers at which they are tested, as shares of their ranges [-].
 _CLOSED = (0.0, 0.2, 0.4, 0.6, 0.8)
 #: Tips close towards each other when both move along the line between them by more than this share [-].
 _TOWARDS = 0.2
@@ -23,7 +23,7 @@ _STILL = 1e-6
 
 
 def check_thumbs(hand: Hand) -> list[Finding]:
-    """Return a finding for every thumb that no finger meets, whatever its posture (docs/method.md section 1)."""
+    """Return a finding for every thumb that no finger can meet in any posture (docs/method.md section 1)."""
     others = [finger for finger in hand.fingers if not finger.is_thumb]
     reached = [_tips(hand, finger) for finger in others]
     found = []

@@ -1,4 +1,4 @@
-"""Tell links whose shapes always overlap, as those of a knuckle do, from links that overlap in some postures alone."""
+"""Separate links that always overlap, like those of a knuckle, from links that overlap only in some postures."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Pairs = frozenset[tuple[int, int]]
 
 #: Shares of the way to its limits by which each joint is turned alone [-].
 _ALONE = (-1.0, -0.5, -0.1, 0.1, 0.5, 1.0)
-#: Postures in which all joints between two links are turned at once.
+#: Postures in which all joints between two links turn simultaneously.
 _DRAWS = 16
 
 
 class Overlaps(NamedTuple):
-    """Pairs of link indices that overlap when the hand is open, without those that the model excludes.
+    """Pairs of link indices that overlap in the open hand, without pairs that the model excludes.
 
     Args:
-        always: those that overlap in every posture that was looked at.
-        when_open: those of a finger's own links, or a finger and the palm, that are free in other postures.
+        always: pairs that overlap in every sampled posture.
+        when_open: pairs of one finger's links, or of a finger and the palm, that are free in other postures.
     """
 
     always: Pairs
@@ -41,7 +41,7 @@ def find_overlaps(hand: Hand, source: CollisionSource) -> Overlaps:
     """Find the pairs of links that overlap when the hand is open, and look for a posture in which they are free.
 
     Args:
-        hand: adjacent pairs and those that the model excludes are left out. source: which shapes the links have.
+        source: shapes of the links. source: which shapes the links have.
     """
     start = hand.open_angles()
     poses = hand.link_poses(start)

@@ -1,4 +1,4 @@
-"""Decide what every joint does: role, closing direction, open value, with reasons (docs/method.md section 1)."""
+"""Decide the role, closing direction and open value of every joint, with reasons (docs/method.md section 1)."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _below_palm(hand: Hand) -> set[int]:
 
 
 def _plan(hand: Hand, finger: Finger, overrides: HandFile, joints: list[Joint]) -> FingerPlan:
-    """Find a finger's closing joints, where it is straight, and what the limits say about its sense."""
+    """Find a finger's closing joints, its straight posture, and the sense that its limits suggest."""
     plan = FingerPlan(finger)
     followers = {c.follower for c in hand.couplings}
     line = finger_line(hand, finger, np.array([j.reference for j in hand.joints]))
@@ -163,7 +163,7 @@ def _role_reason(angle: float, most_distal: bool, given: JointRole | None) -> st
 def _straight(joint: Joint, sign: int, bend: float | None, *, first: bool) -> tuple[float, str]:
     """Return the angle at which a finger is straight at a joint [rad], and how that is known.
 
-    What precedes the first closing joint may be a metacarpal or a bracket of any shape: alone it decides nothing.
+    A piece before the first closing joint may be a metacarpal or a bracket of any shape: alone it decides nothing.
     """
     if bend is None:
         return 0.0, "the model's zero (nothing in the finger tells)"
