@@ -57,7 +57,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     there = GraspCommand(hand_pose=clench.Pose([0.0, 0.0, 0.1]), planes=1)
     planned = SimpleNamespace(command=there, preshape="open", hand_pose=there.hand_pose, epsilon=0.1)
     monkeypatch.setitem(vars(clench), "plan_grasps", lambda *_, **__: [planned])
-    monkeypatch.setitem(vars(clench), "complete", lambda solution, *_, **__: solution)
+    monkeypatch.setitem(vars(clench.execution), "complete", lambda solution, *_, **__: solution)
     monkeypatch.setattr(sizes, "warn_of_size", lambda *_: None)
     # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
     monkeypatch.setattr(warming, "announce", lambda: None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from clench.closing.collision.packed_object import ROUND_POLYHEDRA, SWEEP_DEVIAT
 from clench.core.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
-from clench.models.shapes import CollisionSource
+from clench.models.shapes import CollisionSource, ShapeKind
 
 from .finger_plan import FingerPlan, closing_joints, last_closing_joint
 
@@ -127,11 +127,17 @@ def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
     return -family.T_palm_family[:3, 1], family.pivot_in_palm(joint.pivot)
 
 
-@kept_by_identity(_KEPT_HANDS)
 def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:
     """Return how far the surfaces that are swept may lie inside the true ones [m]: 0 but for cylinders, ellipsoids."""
-    shapes = [s for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())]
-    return sum(
-        max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)
-        for sizes in ([(s.kind, s.size) for s in shapes], packed.round_sizes)
-    )
+    return _hand_deviation(hand, source) + _deviation(packed.round_sizes)
+
+
+@kept_by_identity(_KEPT_HANDS)
+def _hand_deviation(hand: Hand, source: CollisionSource) -> float:
+    """Return what the links of a hand add to `swept_deviation` [m]."""
+    return _deviation([(s.kind, s.size) for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())])
+
+
+def _deviation(sizes: Iterable[tuple[ShapeKind, Sequence[float]]]) -> float:
+    """Return how far the polyhedra for round shapes may lie inside them [m]."""
+    return max((SWEEP_DEVIATION * max(size) for kind, size in sizes if kind in ROUND_POLYHEDRA), default=0.0)

@@ -38,15 +38,6 @@ def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
     return poses
 
 
-def placed_postures(hand: Hand, postures: FloatArray) -> FloatArray:
-    """Do as `placed_links` for many postures, shape (N, J) [rad]; returns (N, L, 3, 4)."""
-    from clench.kernels.geometry.link_frames import place_postures
-
-    poses = np.empty((len(postures), len(hand.links), 3, 4))
-    place_postures(hand_frames(hand), postures, poses)
-    return poses
-
-
 @kept_by_identity(_KEPT_HANDS)
 def hand_frames(hand: Hand) -> FrameArrays:
     """Return the kinematics of a hand without any entry; made once per hand."""

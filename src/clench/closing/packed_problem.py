@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 #: Segments per plane that an arena holds before it has to grow.
 CAPACITY: Final = 512
-#: Packed problems that an object keeps, the latest used.
+#: Packed problems that an object keeps, the latest made.
 KEPT_PROBLEMS: Final = 64
 #: Arenas that no thread uses, by the sizes of their arrays, latest used last.
 _ARENAS: Final[OrderedDict[tuple[int, ...], list[Arena]]] = OrderedDict()

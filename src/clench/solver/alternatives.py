@@ -147,12 +147,15 @@ class Alternatives:
     close: Callable[[], Groups]
 
     def __post_init__(self) -> None:
-        # Concurrent readers get the same choice, because the criteria keep their results in the setting.
-        self._scored = once(self._score)
+        """Make the choice once, also for threads that read at the same time: criteria keep values in the context."""
+        close, calibration, setting = self.close, self.calibration, self.setting
 
-    def _score(self) -> tuple[Groups, HandChoice]:
-        groups = self.close()
-        return groups, choose(groups, self.calibration, self.setting)
+        # Nothing here refers to this object, so that it is freed as soon as nobody uses it.
+        def score() -> tuple[Groups, HandChoice]:
+            groups = close()
+            return groups, choose(groups, calibration, setting)
+
+        self._scored = once(score)
 
     @property
     def choice(self) -> HandChoice:

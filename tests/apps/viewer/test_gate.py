@@ -102,3 +102,11 @@ def test_a_port_in_use_is_one_sentence() -> None:
 def test_a_port_that_is_none_is_one_sentence() -> None:
     with pytest.raises(CommandError, match="--port 99999"):
         Gate("127.0.0.1", 99999, None)
+
+
+@pytest.mark.parametrize(
+    "lines", ["GET / HTTP/1.1\r\nHost: [", "GET / HTTP/1.1\r\nOrigin: http://[", "GET //[?token=1 HTTP/1.1"]
+)
+def test_an_address_that_is_none_is_no_request(lines: str) -> None:
+    assert read_head(f"{lines}\r\n\r\n".encode()) is None
+    assert read_head(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n") is not None

@@ -51,3 +51,20 @@ def test_work_that_waits_for_news_leaves_off_as_soon_as_there_are_some() -> None
     assert worker.wait(5.0)
     worker.close()
     assert seen == [(1, True), (2, False)]
+
+
+def test_work_that_raises_is_followed_by_the_next(capsys) -> None:
+    done = []
+
+    def work(item: int) -> None:
+        if item == 1:
+            raise ZeroDivisionError
+        done.append(item)
+
+    newest = NewestWins(work)
+    for item in (1, 2):
+        newest.ask(item)
+        assert newest.wait(10.0)
+    newest.close()
+    assert done == [2]
+    assert "ZeroDivisionError" in capsys.readouterr().err

@@ -55,7 +55,13 @@ def read_head(data: bytes) -> Head | None:
     names = [name.strip().lower() for name, _, _ in pairs]
     if any(names.count(name) > 1 for name in ("host", "origin", "cookie")):
         return None
-    return Head(words[1], {name: value.strip() for name, (_, _, value) in zip(names, pairs, strict=True)})
+    headers = {name: value.strip() for name, (_, _, value) in zip(names, pairs, strict=True)}
+    try:
+        for address in (words[1], f"//{headers.get('host', '')}", headers.get("origin", "")):
+            urlsplit(address)
+    except ValueError:
+        return None
+    return Head(words[1], headers)
 
 
 def refusal(head: Head, token: str | None, cookie: str) -> str:

@@ -88,6 +88,5 @@ class GraspPanel:
         self._hand.value, self._object.value = state.hand, state.object
         self._order.value = str(state.command.order)
         self._source.value = str(state.command.collision_source or hand.default_source)
-        if state.friction is not None:
-            self._friction.value = state.friction
+        self._friction.value = state.friction or FRICTION
         self._mass.value = state.mass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -13,7 +14,8 @@ class NewestWins(Generic[Item]):
     """Work in a thread on what was asked last; what was asked in between is dropped.
 
     Args:
-        work: is called with one item after another, never twice at a time; it must not raise. name: of the thread.
+        work: is called with one item after another, never twice at a time. What it raises is printed.
+        name: of the thread.
     """
 
     def __init__(self, work: Callable[[Item], None], name: str = "clench-viewer") -> None:
@@ -57,7 +59,11 @@ class NewestWins(Generic[Item]):
                     return
                 item = self._waiting.pop()
                 self._busy = True
-            self._work(item)
-            with self._changed:
-                self._busy = False
-                self._changed.notify_all()
+            try:
+                self._work(item)
+            except Exception:  # the next item may well succeed
+                traceback.print_exc()
+            finally:
+                with self._changed:
+                    self._busy = False
+                    self._changed.notify_all()

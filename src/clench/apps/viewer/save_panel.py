@@ -107,11 +107,13 @@ class SavePanel:
         self._play.player.pause()
         shown = min(track.duration, _LONGEST)
         pictures = []
-        for k in range(int(shown * _RATE) + 1):
-            self._said.content = f"Taking picture {k + 1} of {int(shown * _RATE) + 1} …"
-            self._show(track.at(k / _RATE))
-            pictures.append(self._taken(client, _VIDEO))
-        self._back()
+        try:
+            for k in range(int(shown * _RATE) + 1):
+                self._said.content = f"Taking picture {k + 1} of {int(shown * _RATE) + 1} …"
+                self._show(track.at(k / _RATE))
+                pictures.append(self._taken(client, _VIDEO))
+        finally:
+            self._back()
         first, *others = [picture.quantize(128) for picture in pictures]
         content = io.BytesIO()
         first.save(content, "GIF", save_all=True, append_images=others, duration=round(1e3 / _RATE), loop=0)

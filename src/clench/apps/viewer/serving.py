@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import secrets
+import socket
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -74,7 +75,9 @@ def serve(
         page = ViewerPage(server, session, grasps, dark)
         session.begin(page)
         gate.open((inner, server.get_port()))
-        name = f"[{host}]" if ":" in host else host
+        # An address that listens on all networks is none that others can open.
+        shown = socket.gethostname() if host in ("0.0.0.0", "::") else host
+        name = f"[{shown}]" if ":" in shown else shown
         path = f"/?token={token}" if token else ""
         yield OpenPage(f"http://{name}:{gate.port}{path}", server, page)
     finally:

@@ -93,4 +93,7 @@ def find_blocked(
             )
     for i in range(items.entry.shape[0]):
         if blocked[items.entry[i]]:
+            # The link stays: this may run again for the same answers.
+            link = answer.overlap[i]
             clear_answer(answer, i)
+            answer.overlap[i] = max(link, answer.overlap[i])

@@ -67,14 +67,6 @@ def place_links(frames: FrameArrays, q: Floats, poses: Floats) -> None:
     put_links(frames, q, np.empty((frames.parent.shape[0] + 2, 3, 4)), poses)
 
 
-@entry_kernel(allocates=True)
-def place_postures(frames: FrameArrays, postures: Floats, poses: Floats) -> None:
-    """Do as `place_links` for many postures, (N, J) [rad], to (N, L, 3, 4)."""
-    scratch = np.empty((frames.parent.shape[0] + 2, 3, 4))
-    for n in range(postures.shape[0]):
-        put_links(frames, postures[n], scratch, poses[n])
-
-
 @kernel
 def put_links(frames: FrameArrays, q: Floats, scratch: Floats, poses: Floats) -> None:
     """Do as `place_links` with scratch space, (L + 2, 3, 4)."""
