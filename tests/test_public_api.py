@@ -50,7 +50,7 @@ def test_unknown_name_lists_what_exists() -> None:
     with pytest.raises(AttributeError, match=r"'clench.formats' has no attribute 'urdf'; it has: GraspFormat"):
         _ = clench.formats.urdf
     with pytest.raises(AttributeError, match="it is called 'HardwareHand' now"):
-        _ = clench.HardwareHand
+        _ = clench.DrivenHand
 
 
 def test_solve_is_a_function_whatever_was_imported_before() -> None:

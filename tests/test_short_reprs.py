@@ -56,7 +56,8 @@ def instances(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 def test_every_public_object_prints_in_one_to_five_lines(instances: dict[str, Any]) -> None:
-    expected = {name for name in clench.__all__ if is_made(getattr(clench, name))}
+    spaces = [clench, *(getattr(clench, name) for name in clench._NAMESPACES)]
+    expected = {name for space in spaces for name in space.__all__ if is_made(getattr(space, name))}
     assert expected == set(instances)
     for name, each in instances.items():
         text = repr(each)

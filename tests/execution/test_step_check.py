@@ -11,6 +11,7 @@ from test_drives import FAR
 
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.core.pose import Pose
+from clench.execution.executing import execute
 from clench.execution.next_steps import Phase, plan_next_steps
 from clench.execution.report import ExecutionReport
 from clench.execution.simulation.mujoco_scene import PREFIX, build_scene
@@ -111,11 +112,11 @@ def test_a_squeeze_is_checked_but_for_fingers_that_the_object_holds(hand: Hand) 
 def test_it_is_refused_unless_forced(hand: Hand, monkeypatch: pytest.MonkeyPatch) -> None:
     moved: list[bool] = []
 
-    def execute(*_: object) -> ExecutionReport:
+    def pretend(*_: object) -> ExecutionReport:
         moved.append(True)
         return ExecutionReport("simulated", success=True, reason="done")
 
-    monkeypatch.setattr(SimulatedHand, "execute", execute)
+    monkeypatch.setattr(SimulatedHand, "execute", pretend)
     simulated = SimulatedHand(hand, FAR)
     report = execute(stepping(hand, ACROSS), simulated)
     assert not report.success

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.geometry import core_distance as closest
+import clench.kernels.geometry.core_distance as closest
 from clench.kernels.geometry.core_distance import separation
 from kernels.kernel_entries import entry
 

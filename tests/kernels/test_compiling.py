@@ -11,7 +11,7 @@ import numba
 import pytest
 
 from benchmarks.peers.kernels import stepped_closing
-from clench.kernels.closing.close_item import close_item
+from clench.kernels.closing import close_item
 from clench.kernels.runtime import compiling, warming
 
 KERNELS = Path(compiling.__file__).parents[1]

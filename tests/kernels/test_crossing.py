@@ -5,8 +5,8 @@ import pytest
 from kernel_entries import entry
 from scipy.spatial.transform import Rotation
 
+import clench.kernels.geometry.core_distance as closest
 from clench.core.pose import Pose
-from clench.kernels.geometry import core_distance as closest
 from clench.kernels.geometry import crossing
 from clench.kernels.geometry.crossing import DEEP
 from clench.models.shapes import Shape, ShapeKind
