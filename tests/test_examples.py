@@ -32,7 +32,12 @@ def test_the_first_one_runs_by_itself(tmp_path: Path) -> None:
     assert "Traceback" not in run.stderr
 
 
-@pytest.mark.parametrize("path", EXAMPLES[1:], ids=[path.stem for path in EXAMPLES[1:]])
+#: Half a minute or more each.
+LONG = {"14_pictures"}
+CASES = [pytest.param(p, id=p.stem, marks=[pytest.mark.long] * (p.stem in LONG)) for p in EXAMPLES[1:]]
+
+
+@pytest.mark.parametrize("path", CASES)
 def test_example_runs(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

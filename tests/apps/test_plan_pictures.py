@@ -69,6 +69,7 @@ def panels(monkeypatch: pytest.MonkeyPatch, plan: GraspPlan, hand: Hand, ball: G
     return captions
 
 
+@pytest.mark.long
 def test_a_plan_has_three_pictures_that_are_the_same_twice(plan, hand, ball, tmp_path) -> None:
     (tmp_path / "again").mkdir()
     files = draw_plan(plan, hand, ball, tmp_path)

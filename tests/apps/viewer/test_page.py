@@ -95,6 +95,7 @@ def test_an_error_in_a_solve_is_said_and_the_page_goes_on(tab: Tab) -> None:
     assert "no such joint" not in tab.card()
 
 
+@pytest.mark.long
 def test_two_tabs_show_the_same_and_one_may_be_closed(tab: Tab, browser: Any) -> None:
     other = browser.new_page(viewport=SIZE)
     other.goto(tab.open.url)
@@ -123,6 +124,7 @@ def test_play_moves_the_hand_and_reset_brings_it_back(tab: Tab) -> None:
     np.testing.assert_allclose(tab.open.page.nodes.object_gizmo.position, object_at(tab))
 
 
+@pytest.mark.long
 def test_saved_files_are_what_the_page_shows(tab: Tab, tmp_path: Path) -> None:
     from PIL import Image
 
