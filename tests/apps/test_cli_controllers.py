@@ -306,6 +306,7 @@ class Servos:
         pass
 
 
+@pytest.mark.usefixtures("hangups_heard")
 @pytest.mark.parametrize("swallow", [False, True])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_stops_the_hand_and_what_was_sent_is_kept(
@@ -317,8 +318,6 @@ def test_a_signal_stops_the_hand_and_what_was_sent_is_kept(
     swallow: bool,
 ) -> None:
     """Also when the code that happens to run takes the interrupt for an error of its own, and goes on."""
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN and number == signal.SIGHUP:
-        pytest.skip("hangups are ignored here, as under nohup")
     hand = clench.Hand.load("robonaut2")
     servos = Servos([joint.name for joint in hand.joints], number)
     monkeypatch.setattr(actuators, "_driver", lambda *_: servos)

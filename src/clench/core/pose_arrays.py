@@ -19,6 +19,11 @@ _EXPECTED: Final = "expected poses, an array (N, 7) of rows [w, x, y, z, X, Y, Z
 _UNIT: Final = 4e-16
 
 
+def pose_of_row(row: FloatArray) -> Pose:
+    """Return the pose of a row [w, x, y, z, X, Y, Z], shape (7,)."""
+    return Pose(row[4:], row[:4])
+
+
 def pose_rows(poses: Sequence[Pose] | ArrayLike, key: str) -> FloatArray:
     """Return poses as rows of unit quaternion `wxyz` and position [m], shape (N, 7), bit-identical to `Pose`.
 

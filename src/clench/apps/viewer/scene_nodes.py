@@ -8,6 +8,7 @@ import numpy as np
 
 from clench.apps.figures import style
 from clench.core.pose import FloatArray, Pose, quaternions_from_rotations
+from clench.models import appearance
 from clench.models.appearance import OBJECT_COLOR, OBSTACLE_COLOR, link_colors
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
@@ -30,7 +31,7 @@ _GIZMO: Final = 1.2
 
 def rgb(color: str) -> tuple[int, int, int]:
     """Return a colour ``"#rrggbb"`` as three numbers up to 255."""
-    r, g, b = (int(color[i : i + 2], 16) for i in (1, 3, 5))
+    r, g, b = (round(255 * part) for part in appearance.rgb(color))
     return r, g, b
 
 

@@ -14,6 +14,7 @@ from clench.closing.kernel_run import Answers, solve_packed
 from clench.closing.motion import asked_fingers, palm_pose
 from clench.core.deferring import once
 from clench.core.pose import FloatArray, Pose
+from clench.core.pose_arrays import pose_of_row
 from clench.models.command import GraspCommand
 from clench.scoring.calibration import calibration_of
 from clench.solver.alternatives import candidates_of
@@ -97,7 +98,7 @@ class BatchSolver:
         assert candidates is not None
 
         def choose(n: int, answers: Answers) -> tuple[list[int], bool]:
-            problem = self._start.at(_pose(palms[n]), _pose(object_rows[n]))
+            problem = self._start.at(pose_of_row(palms[n]), pose_of_row(object_rows[n]))
             return PoseSolver(problem, self._calibration, candidates).choose(answers)
 
         return solve_packed(
@@ -113,7 +114,7 @@ class BatchSolver:
         command, problem = self._question.command, self._start
         if command.root_link is None:
             return hand_rows
-        placed = (replace(command, hand_pose=_pose(row)) for row in hand_rows)
+        placed = (replace(command, hand_pose=pose_of_row(row)) for row in hand_rows)
         poses = [palm_pose(problem.hand, each, problem.start).wxyz_xyz for each in placed]
         return np.array(poses).reshape(-1, 7)
 
@@ -152,7 +153,7 @@ class BatchSolver:
         asked = self._question
 
         def run(rows: tuple[FloatArray, FloatArray]) -> GraspSolution:
-            hand_pose, object_pose = map(_pose, rows)
+            hand_pose, object_pose = map(pose_of_row, rows)
             return solve_posture(
                 asked.hand, asked.obj, replace(asked.command, hand_pose=hand_pose, object_pose=object_pose)
             )
@@ -256,10 +257,6 @@ def turned(R: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return vectors (N, 3) turned by matrices (N, 3, 3), each with the same bits however many there are."""
     x, y, z = (vectors[:, None, k] for k in range(3))
     return R[:, :, 0] * x + R[:, :, 1] * y + R[:, :, 2] * z
-
-
-def _pose(row: FloatArray) -> Pose:
-    return Pose(row[4:], row[:4])
 
 
 def _plane(plane: int | None) -> int:

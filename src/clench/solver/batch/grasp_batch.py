@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from clench.core.deferring import LateFields
 from clench.core.errors import CommandError
 from clench.core.files.json_files import write_atomically
-from clench.core.pose import FloatArray, Pose
+from clench.core.pose import FloatArray
+from clench.core.pose_arrays import pose_of_row
 from clench.core.short_repr import described, short_repr
 from clench.solver.solution import FingerStatus, GraspSolution, SolutionStatus
 
@@ -175,8 +176,8 @@ class GraspBatch(LateFields):
         asked = self.question
         return replace(
             asked.command,
-            hand_pose=_pose(self.hand_poses[i]),
-            object_pose=_pose(self.object_poses[i]),
+            hand_pose=pose_of_row(self.hand_poses[i]),
+            object_pose=pose_of_row(self.object_poses[i]),
             preshape=self._preshape(i),
         )
 
@@ -237,7 +238,3 @@ class GraspBatch(LateFields):
             contacts=BatchContacts(first=first, **columns),
             **taken,
         )
-
-
-def _pose(row: FloatArray) -> Pose:
-    return Pose(row[4:], row[:4])

@@ -11,7 +11,7 @@ import numpy as np
 from clench.core.errors import CommandError, FileError
 from clench.core.files.array_files import read_arrays
 from clench.core.files.json_files import parse_json
-from clench.core.pose import Pose
+from clench.core.pose_arrays import pose_of_row
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -126,8 +126,8 @@ class SavedBatch:
             try:
                 postures = dict(zip(arrays["preshape_joints"].tolist(), arrays["preshape_angles"], strict=True))
                 asked = document | {
-                    "hand_pose": _pose(arrays["hand_poses"][i]).to_dict(),
-                    "object_pose": _pose(arrays["object_poses"][i]).to_dict(),
+                    "hand_pose": pose_of_row(arrays["hand_poses"][i]).to_dict(),
+                    "object_pose": pose_of_row(arrays["object_poses"][i]).to_dict(),
                     "preshape": _preshape(document, {name: float(each[i]) for name, each in postures.items()}),
                 }
                 solution = solve(hand, obj, command_from_dict(asked, f"{self.path}: pose {i}"))
@@ -148,7 +148,3 @@ class SavedBatch:
 def _preshape(document: dict[str, Any], angles: dict[str, float]) -> Any:
     given = document.get("preshape") or {}
     return given | angles if isinstance(given, dict) else given
-
-
-def _pose(row: np.ndarray[Any, Any]) -> Pose:
-    return Pose(row[4:], wxyz=row[:4])

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from clench.closing.motion import open_posture
 from clench.closing.threads import core_count, share_out
 from clench.core.deferring import DeferredMapping
-from clench.core.pose import FloatArray, Pose
+from clench.core.pose import FloatArray
+from clench.core.pose_arrays import pose_of_row
 from clench.models.command import GraspCommand
 from clench.scoring.calibration import calibration_of
 from clench.scoring.explaining import say_what_decided
@@ -129,7 +130,7 @@ class PostureSolver:
         def solve(n: int, k: int) -> GraspSolution:
             row, there = answers.hand_poses[k * poses + n], answers.object_poses[k * poses + n]
             asked = replace(self._command, preshape=self.options[k].angles)
-            return solve_posture(self._hand, self._obj, asked.at(_pose(row), _pose(there)))
+            return solve_posture(self._hand, self._obj, asked.at(pose_of_row(row), pose_of_row(there)))
 
         scores = self._scorer.score(answers, count, solve)
         steps = np.floor(scores.total / _SAME + 0.5)
@@ -181,7 +182,3 @@ class PostureSolver:
             )
         gains = {n: self._calibration.worth(n, a[n]) - self._calibration.worth(n, b[n]) for n in a if n in b}
         return f"{ours} leads {theirs} by {lead:.3g}; {say_what_decided(gains, a, b)}"
-
-
-def _pose(row: FloatArray) -> Pose:
-    return Pose(row[4:], row[:4])
