@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clench.kernels.geometry.bodies import Elements, pack_bodies
-from clench.kernels.toi import core_motion, pair_queue
+from clench.kernels.toi import body_sweep, core_motion, pair_queue
 from clench.kernels.toi import separating_planes as parting
-from clench.kernels.toi import toi_bodies as body_sweep
 from clench.kernels.toi import toi_work as sweeping
 from clench.kernels.toi.separating import OVERLAP
 from clench.kernels.toi.toi_pairs import sweep_pair
@@ -89,7 +88,7 @@ def test_a_body_meets_what_the_first_of_its_elements_meets(one, other):
         moving = pack_bodies([patch(rng, one, int(rng.integers(1, 16)))])
         resting = pack_bodies([patch(rng, other, int(rng.integers(1, 24)))])
         chain, best = drawn_chain(seed, rng), float(rng.uniform(0.5, 2.0))
-        work = make_sweep_work(0, 0)
+        work = make_sweep_work(8, 0)
         away, beside = rng.normal(size=(2, 3))
         work.moving[:] = pose(rng, 0.15 * away / np.linalg.norm(away))
         # What rests is near the way of what moves, so that it is met more often than not.
@@ -114,7 +113,7 @@ def test_what_passes_beside_does_so_wherever_it_turns(seed):
     """Extents along y of elements, and of the boxes around all of them, from a body's corners."""
     rng = np.random.default_rng(seed)
     bodies = [pack_bodies([patch(rng, KINDS[rng.integers(4)], 12)]) for _ in range(2)]
-    work = make_sweep_work(0, 0)
+    work = make_sweep_work(8, 0)
     work.moving[:], work.resting[:] = pose(rng, np.zeros(3)), pose(rng, [0.0, rng.uniform(-0.1, 0.1), 0.0])
     spans = []
     for body, T in zip(bodies, (work.moving, work.resting), strict=True):
@@ -133,7 +132,7 @@ def test_what_passes_beside_does_so_wherever_it_turns(seed):
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.floats(0.0, 4.0), min_size=1, max_size=60))
 def test_a_queue_gives_the_earliest_first(keys):
-    work, size = make_sweep_work(0, 0), 0
+    work, size = make_sweep_work(8, 0), 0
     for k, key in enumerate(keys):
         row = 300
         work.keys[row], work.since[row], work.stack[row] = key, -key, (k, 2 * k, k % 2)
@@ -167,7 +166,7 @@ def test_what_touches_at_the_start_does_not_hide_what_overlaps(rate, joints):
         moving = pack_bodies(
             [Elements((feet[:, None] + tent).reshape(-1, 3), np.arange(36).reshape(12, 3), np.zeros(12))]
         )
-        work = make_sweep_work(0, 0)
+        work = make_sweep_work(8, 0)
         work.moving[:] = work.resting[:] = np.eye(4)[:3]
         assert sweep_body(moving, 0, resting, 0, chain, joints, TOUCH, 1.0, work) == OVERLAP
         assert sweep_body(moving, 0, resting, 0, chain, joints, TOUCH, 0.0, work) == OVERLAP
@@ -181,7 +180,7 @@ def crowded():
         corners = np.array(part["corners"])
         elements = np.arange(3 * len(corners)).reshape(-1, 3)
         bodies.append(pack_bodies([Elements(corners.reshape(-1, 3), elements, np.array(part["radius"]))]))
-    work, chain = make_sweep_work(0, 0), np.array(given["chain"])
+    work, chain = make_sweep_work(8, 0), np.array(given["chain"])
     work.moving[:], work.resting[:] = given["T_moving"], given["T_resting"]
     return sweep_body(bodies[0], 0, bodies[1], 0, chain, len(chain), given["touch"], given["best"], work)
 

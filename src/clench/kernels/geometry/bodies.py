@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from clench.core.memory import in_parts
 
 from .bvh import MeshTree, build_tree
+from .hulls import HullArrays, pack_hulls
 from .obb import SLAB, node_slabs
 
 Floats = NDArray[np.float64]
@@ -37,6 +38,7 @@ class BodyArrays(NamedTuple):
         first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
         right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
         box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
+        hulls: convex hulls around the parts of each body; a body may have none.
     """
 
     vertices: Floats
@@ -52,36 +54,45 @@ class BodyArrays(NamedTuple):
     right: Ints
     root: Ints
     box: Floats
+    hulls: HullArrays
 
 
 class Elements(NamedTuple):
-    """List the elements of one body: `vertices` (V, 3) [m], `elements` (T, 3), `radius` (T,) [m]."""
+    """List the elements of one body.
+
+    Args:
+        vertices: [m], (V, 3). elements: vertex indices, (T, 3). radius: of each element [m], (T,).
+        parts: first element of every part that has a convex hull of its own; `(0,)`: the body is one part.
+    """
 
     vertices: Floats
     elements: Ints
     radius: Floats
+    parts: tuple[int, ...] = (0,)
 
 
 def join_elements(parts: Sequence[Elements]) -> Elements:
     """Return the elements of several parts as those of one body, in order."""
     shift = np.cumsum([0, *(len(p.vertices) for p in parts)])
+    begin = np.cumsum([0, *(len(p.elements) for p in parts)])
     return Elements(
         np.concatenate([np.empty((0, 3)), *(p.vertices for p in parts)]),
         np.concatenate([np.empty((0, 3), np.int32), *(p.elements + k for p, k in zip(parts, shift, strict=False))]),
         np.concatenate([np.empty(0), *(p.radius for p in parts)]),
+        tuple(int(k) + first for p, k in zip(parts, begin, strict=False) for first in p.parts) or (0,),
     )
 
 
 def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
     """Build the trees of bodies and put them into one set of arrays; the order of the bodies is kept."""
-    parts, vertices, elements, nodes = [_nothing(0)], 0, 0, 0
+    packed, vertices, elements, nodes = [_nothing(0)], 0, 0, 0
     for body in bodies:
         part = _nothing(1)
         if len(body.elements):
             tree = build_tree(body.vertices, body.elements)
             part = _body(tree, body.radius[tree.original])
         inner = part.count == 0
-        parts.append(
+        packed.append(
             part._replace(
                 elements=part.elements + vertices,
                 first=part.first + elements,
@@ -92,7 +103,15 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         vertices += len(part.vertices)
         elements += len(part.elements)
         nodes += len(part.node)
-    return BodyArrays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    joined: Any = [np.concatenate(column) for column in list(zip(*packed, strict=True))[:-1]]
+    return BodyArrays(*joined, pack_hulls([_parts(body) for body in bodies]))
+
+
+def _parts(body: Elements) -> list[tuple[Floats, float]]:
+    """Return points and radius of every part of a body that has elements."""
+    ends = (*body.parts[1:], len(body.elements))
+    spans = [slice(first, end) for first, end in zip(body.parts, ends, strict=True) if end > first]
+    return [(body.vertices[body.elements[s].ravel()], float(body.radius[s].max())) for s in spans]
 
 
 def pack_triangles(tree: MeshTree) -> BodyArrays:
@@ -122,6 +141,7 @@ def _nothing(bodies: int) -> BodyArrays:
         right=whole,
         root=np.full(bodies, -1, np.int32),
         box=np.tile(box, (bodies, 1)),
+        hulls=pack_hulls([()] * bodies),
     )
 
 
@@ -153,6 +173,7 @@ def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
         right=tree.right,
         root=np.zeros(1, dtype=np.int32),
         box=np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])[None],
+        hulls=pack_hulls([()]),
     )
 
 

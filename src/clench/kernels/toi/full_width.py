@@ -32,6 +32,7 @@ from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import copy_pose
 
+from .near_elements import list_touching
 from .separating import side
 from .spatial_motion import turned_about
 from .toi_work import SweepWork, bodies_overlap, make_sweep_work, put_core
@@ -159,7 +160,8 @@ def overlap_truly(
     Args:
         sweep: has their poses.
     """
-    if not bodies_overlap(links, m, resting, r, allowed, flush, sweep):
+    listed = list_touching(links, m, resting, r, 2.0 * PRESSED, sweep)
+    if listed == 0 or not bodies_overlap(links, m, resting, r, allowed, flush, listed, sweep):
         return False
     i, k = sweep.pair[0], sweep.pair[1]
     ka, kb = links.corners[i], resting.corners[k]
@@ -173,7 +175,7 @@ def overlap_truly(
         step = PRESSED if way % 2 == 0 else -PRESSED
         x, y, z = sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3]
         sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3] = plus((x, y, z), scaled(n, step))
-        apart = not bodies_overlap(links, m, resting, r, allowed, flush, sweep)
+        apart = not bodies_overlap(links, m, resting, r, allowed, flush, listed, sweep)
         sweep.moving[0, 3], sweep.moving[1, 3], sweep.moving[2, 3] = x, y, z
         if apart:
             return False

@@ -17,7 +17,7 @@ from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_pose, put_point
 
-from .toi_bodies import sweep_body
+from .body_sweep import sweep_body
 from .toi_work import SweepWork, make_sweep_work
 
 

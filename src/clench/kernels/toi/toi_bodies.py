@@ -15,7 +15,7 @@ from .separating_planes import keep_plane, lay_plane, lies_within, passes_beside
 from .spatial_motion import is_spatial
 from .toi_bounds import ball_entry, measure_of, walk_ball, walk_core
 from .toi_pairs import sweep_pair
-from .toi_work import QUEUE, SweepWork, is_looser, push_roots, put_ball, put_item, split_pair
+from .toi_work import QUEUE, SweepWork, is_looser, push_first, put_ball, put_item, split_pair
 
 #: How coarsely the sweep of a node is settled, as a fraction of how thick it is, and of how wide [-].
 COARSE, WIDE = 0.1, 0.02
@@ -151,7 +151,7 @@ def measure(s: float, chain: Floats, count: int) -> float:
 
 
 @kernel
-def sweep_body(
+def sweep_elements(
     moving: BodyArrays,
     m: int,
     resting: BodyArrays,
@@ -160,6 +160,7 @@ def sweep_body(
     count: int,
     touch: float,
     best: float,
+    listed: int,
     work: SweepWork,
 ) -> float:
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
@@ -171,11 +172,12 @@ def sweep_body(
 
     Args:
         chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
+        listed: see `push_first`.
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
     stack, keys, laid, met, beyond, apart = work.stack, work.keys, False, False, NONE, 0.0
     limit = measure(best, chain, count)
-    queue, height = 0, push_roots(moving, m, resting, r, stack[QUEUE:]) + QUEUE
+    queue, height = 0, push_first(moving, m, resting, r, listed, work.listed, stack[QUEUE:]) + QUEUE
     height = keep_earliest(moving, resting, QUEUE, height, chain, count, touch, 0.0, 0.0, limit, NONE, work)
     while queue > 0 or height > QUEUE:
         if height > QUEUE:

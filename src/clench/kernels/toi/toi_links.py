@@ -15,9 +15,9 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.advance import fill_chain, place_joints
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
 
+from .body_sweep import sweep_body
 from .full_width import ExactArrays, keep_pair, last_mover, place_axes, pose_movers
 from .separating_planes import lanes_apart
-from .toi_bodies import sweep_body
 from .toi_work import SweepWork
 
 

@@ -41,6 +41,10 @@ class SweepWork(NamedTuple):
         box: that around a node of either body, see `put_box`, (5, 3).
         plane: normal and offset of a separating plane, relative to the first pivot, then in the resting body's frame,
             (8,).
+        begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
+            (J, 7) and for parallel ones (J + 1, 3).
+        hull: scratch space of `hull_sweep`, (29, 5). near: node and element that the hull came near to last, (2,).
+        listed: resting elements that a short sweep can meet, (32,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
@@ -61,6 +65,12 @@ class SweepWork(NamedTuple):
     since: Floats
     box: Floats
     plane: Floats
+    begun: Floats
+    turned: Floats
+    level: Floats
+    hull: Floats
+    near: Ints
+    listed: Ints
     pair: Ints
     winner: Ints
     skipped: Ints
@@ -86,6 +96,12 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty(PAIRS),
         np.empty((5, 3)),
         np.empty(8),
+        np.empty((3, 4)),
+        np.empty((joints, SPATIAL)),
+        np.empty((joints + 1, 3)),
+        np.empty((29, 5)),
+        np.zeros(2, dtype=np.int64),
+        np.zeros(32, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(1, dtype=np.int64),
@@ -152,6 +168,22 @@ def push_roots(moving: BodyArrays, m: int, resting: BodyArrays, r: int, stack: I
         return 0
     stack[0, 0], stack[0, 1] = item_of(moving, moving.root[m]), item_of(resting, resting.root[r])
     return 1
+
+
+@kernel
+def push_first(
+    moving: BodyArrays, m: int, resting: BodyArrays, r: int, listed: int, elements: Ints, stack: Ints
+) -> int:
+    """Put the first pairs on the empty stack: two bodies, or one and the listed elements; return its height.
+
+    Args:
+        listed: so many of `elements` are the only ones of the resting body that can be met; -1: any can.
+    """
+    if listed < 0:
+        return push_roots(moving, m, resting, r, stack)
+    for k in range(listed):
+        stack[k, 0], stack[k, 1] = item_of(moving, moving.root[m]), -1 - elements[k]
+    return listed
 
 
 @kernel
@@ -242,7 +274,7 @@ def element_gap(moving: BodyArrays, a: int, resting: BodyArrays, b: int, work: S
 
 @kernel
 def bodies_overlap(
-    moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, work: SweepWork
+    moving: BodyArrays, m: int, resting: BodyArrays, r: int, allowed: float, flush: bool, listed: int, work: SweepWork
 ) -> bool:
     """Say whether two bodies cross each other's surface; see `body_gap`. Round ones may overlap by `allowed`.
 
@@ -250,10 +282,10 @@ def bodies_overlap(
 
     Args:
         flush: sharp faces that only touch do not count. Faces alone do not tell bodies whose edges coincide from such
-            that lie in each other: only where depth is measured as well.
+            that lie in each other: only where depth is measured as well. listed: see `push_first`.
     """
     stack, nx, ny, nz = work.stack, 0.0, 0.0, 0.0
-    waiting = push_roots(moving, m, resting, r, stack)
+    waiting = push_first(moving, m, resting, r, listed, work.listed, stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]

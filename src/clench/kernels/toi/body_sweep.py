@@ -1,0 +1,139 @@
+"""First contact of a moving body with a resting one: far away by hulls, near by elements (docs/method.md section 5)."""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.geometry.vectors import Vector
+from clench.kernels.runtime.compiling import kernel
+from clench.kernels.sections.plane_pose import copy_pose
+
+from .hull_sweep import NEAR, clear_travel
+from .near_elements import list_near
+from .spatial_motion import axis_of, is_spatial, turned_about, way_of
+from .toi_bodies import NONE, keep_earliest, measure, sweep_elements
+from .toi_work import SweepWork, item_of, push_roots
+
+#: The elements sweep so far at first from where hulls are near, as a multiple of `NEAR`; each time farther by `LONGER`.
+FIRST, LONGER = 8.0, 16.0
+#: No travel.
+UNSURE = -3.0
+
+
+@kernel
+def sweep_body(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    best: float,
+    work: SweepWork,
+) -> float:
+    """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
+
+    Hulls take the place of elements, which a body of one element would gain nothing from.
+
+    Args:
+        chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
+        work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
+    """
+    if moving.root[m] >= 0 and item_of(moving, moving.root[m]) < 0:
+        return sweep_elements(moving, m, resting, r, chain, count, touch, best, -1, work)
+    if never_meet(moving, m, resting, r, chain, count, touch, best, work):
+        return best
+    copy_pose(work.moving, work.begun)
+    found = sweep_stepwise(moving, m, resting, r, chain, count, touch, best, work)
+    copy_pose(work.begun, work.moving)
+    if found == UNSURE:
+        return sweep_elements(moving, m, resting, r, chain, count, touch, best, -1, work)
+    return found
+
+
+@kernel
+def sweep_stepwise(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    best: float,
+    work: SweepWork,
+) -> float:
+    """Return what `sweep_body` returns, or `UNSURE` where elements seem to overlap on the way.
+
+    Args:
+        work: `begun` has the pose of the moving body. `moving` is overwritten.
+    """
+    onward, done, length = work.turned if is_spatial(chain) else work.level, 0.0, FIRST * NEAR
+    while True:
+        put_onward(chain, count, done, work, onward)
+        clear = clear_travel(moving, m, resting, r, onward, count, touch, best - done, work)
+        if clear == math.inf:
+            return best
+        if clear > 0.0:
+            done += clear
+            put_onward(chain, count, done, work, onward)
+        span = min(length, best - done)
+        listed = list_near(moving, m, resting, r, onward, count, touch, span, work)
+        if listed < 0:
+            span = best - done
+        found = sweep_elements(moving, m, resting, r, onward, count, touch, span, listed, work)
+        if found < 0.0:
+            return found if done == 0.0 else UNSURE
+        if found < span:
+            return min(done + found, best)
+        done, length = done + span, LONGER * length
+        if done >= best:
+            return best
+
+
+@kernel
+def never_meet(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    best: float,
+    work: SweepWork,
+) -> bool:
+    """Say whether the balls around two bodies, or their extents along a common axis, tell that they never meet."""
+    height, limit = push_roots(moving, m, resting, r, work.stack), measure(best, chain, count)
+    return keep_earliest(moving, resting, 0, height, chain, count, touch, 0.0, 0.0, limit, NONE, work) == 0
+
+
+@kernel
+def put_onward(chain: Floats, count: int, s: float, work: SweepWork, out: Floats) -> None:
+    """Write the chain as it is when it has moved by `s`, and the pose of what it moves to `work.moving`."""
+    T, moving = work.begun, work.moving
+    for c in range(4):
+        p = (T[0, c], T[1, c], T[2, c])
+        moving[0, c], moving[1, c], moving[2, c] = turned_by(p, chain, count, s)
+    for i in range(count):
+        out[i, 0] = chain[i, 0]
+        if is_spatial(chain):
+            out[i, 1], out[i, 2], out[i, 3] = turned_by(axis_of(chain, i), chain, i, s)
+            out[i, 4], out[i, 5], out[i, 6] = turned_by(way_of(chain, i), chain, i + 1, s)
+        else:
+            out[i, 1], _, out[i, 2] = turned_by((chain[i, 1], 0.0, chain[i, 2]), chain, i + 1, s)
+
+
+@kernel
+def turned_by(p: Vector, chain: Floats, rows: int, s: float) -> Vector:
+    """Return a vector as the first rows of a chain turn it."""
+    if is_spatial(chain):
+        for k in range(rows):
+            i = rows - 1 - k
+            p = turned_about(p, axis_of(chain, i), chain[i, 0] * s)
+        return p
+    c, d = math.cos(chain[rows - 1, 0] * s), math.sin(chain[rows - 1, 0] * s)
+    return c * p[0] - d * p[2], p[1], d * p[0] + c * p[2]

@@ -1,0 +1,322 @@
+"""How far a moving body is certainly clear of a resting one, by the hulls of its parts (docs/method.md section 5).
+
+A window of travel is tried, see `hull_window`. Parts of the resting body that no plane keeps off the hull are split.
+Where that does not help, the window becomes shorter. The result is a lower bound only: what happens from there on, the
+sweep of all elements tells.
+"""
+
+from __future__ import annotations
+
+import math
+
+from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.geometry.gjk import lowest_of, separating_direction
+from clench.kernels.geometry.hulls import HullArrays
+from clench.kernels.geometry.obb import slab_top
+from clench.kernels.geometry.vectors import Vector
+from clench.kernels.runtime.compiling import kernel
+from clench.kernels.sections.plane_pose import copy_pose
+
+from .hull_motion import HullMotion, height, hull_motion, put_pose
+from .hull_window import (
+    BOX_END,
+    CORNERS,
+    END,
+    LAST,
+    NOW,
+    SIMPLEX,
+    begin_window,
+    forget_planes,
+    keeps_off_box,
+    keeps_off_hull,
+    least_height,
+    push_children,
+    put_box_corners,
+    put_element,
+    remember_plane,
+    renew_planes,
+    square_from_box,
+)
+from .toi_work import SweepWork
+
+#: Windows at most.
+WINDOWS = 40
+#: A window is tried that is longer than the one before by this factor [-].
+LONGER = 2.0
+#: A hull whose gap is below this fraction of the way of its points per unit of travel is near: the bound ends [-].
+NEAR = 2e-5
+#: The end of a shorter window is tried so often.
+TRIALS = 6
+#: A shorter window is meant to leave this share of the gap [-].
+LEFT = 0.04
+#: A node whose gap is above this share of its ball's radius shortens the window; others are split [-].
+FAR = 1.0
+#: No plane is looked for between a hull and a node that is nearer than this share of the radius of the node's ball, or
+#: of the gap that ended the window before [-].
+SOME = 1.0
+#: How near to the best direction the directions between a hull and a node, and a hull and an element, are [-].
+ROUGH, FINE = 0.3, 0.02
+
+
+@kernel
+def clear_travel(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    best: float,
+    sweep: SweepWork,
+) -> float:
+    """Return a travel up to which body `m` is farther than `touch` from body `r`; infinite if it is until `best`.
+
+    Args: see `sweep_body`.
+    """
+    hulls, until, near = moving.hulls.body, best, False
+    if moving.root[m] < 0 or resting.root[r] < 0:
+        return math.inf
+    if hulls[m] == hulls[m + 1]:
+        return 0.0
+    for hull in range(hulls[m], hulls[m + 1]):
+        found = clear_hull(moving, hull, resting, r, chain, count, touch, until, sweep)
+        if found < math.inf:
+            until, near = found, True
+        if near and until <= 0.0:
+            return 0.0
+    return until if near else math.inf
+
+
+@kernel
+def clear_hull(
+    moving: BodyArrays,
+    hull: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    best: float,
+    sweep: SweepWork,
+) -> float:
+    """Return for one hull of the moving body what `clear_travel` returns."""
+    motion, window = hull_motion(moving, hull, chain, count, sweep), sweep.hull
+    forget_planes(window)
+    put_pose(chain, count, 0.0, sweep, window[NOW:END])
+    for c in range(3):
+        window[LAST, c] = window[NOW + c, 3] - resting.box[r, c]
+    window[LAST, 3] = 0.0
+    sweep.near[0] = -1
+    s, end = 0.0, best
+    for _ in range(WINDOWS):
+        end = clear_window(moving, motion, resting, r, chain, count, touch, s, end, sweep)
+        if end < s:
+            return s
+        if end >= best:
+            return math.inf
+        s, end = end, min(best, end + LONGER * (end - s))
+        copy_pose(window[END:SIMPLEX], window[NOW:END])
+    return s
+
+
+@kernel
+def clear_window(
+    moving: BodyArrays,
+    motion: HullMotion,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    s: float,
+    end: float,
+    sweep: SweepWork,
+) -> float:
+    """Return the end of a window from `s` in which a hull stays clear of a body, at most `end`; below `s` if near.
+
+    `END` has the pose there.
+    """
+    begin_window(moving, motion, chain, count, s, end, sweep)
+    parts = resting.hulls
+    for part in range(parts.body[r], parts.body[r + 1]):
+        if end >= s:
+            w = parts.radius[part] + touch
+            end = keep_off(moving.hulls, motion, parts, part, 0, w, chain, count, s, end, sweep)
+    if parts.body[r] < parts.body[r + 1]:
+        return end
+    return clear_of_tree(moving, motion, resting, r, chain, count, touch, s, end, sweep)
+
+
+@kernel
+def clear_of_tree(
+    moving: BodyArrays,
+    motion: HullMotion,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    s: float,
+    end: float,
+    sweep: SweepWork,
+) -> float:
+    """Return what `clear_window` returns for a body without hulls.
+
+    The element that ended the window before is looked at first.
+    """
+    window, stack, hulls, known = sweep.hull, sweep.stack, moving.hulls, sweep.near[0]
+    if known >= 0:
+        end = keep_off_element(hulls, motion, resting, known, touch, chain, count, s, end, sweep)
+    stack[0, 0], waiting = resting.root[r], 1
+    while waiting > 0 and end >= s:
+        waiting -= 1
+        n = stack[waiting, 0]
+        ball, away = resting.node[n, 3], square_from_box(resting.node[n], window)
+        reach = ball + motion.radius + touch + motion.speed * (end - s)
+        if away > reach * reach or keeps_off_box(resting.slab[n], touch, window):
+            continue
+        if known < 0 and away > (SOME * ball) ** 2:
+            split, end = keep_off_node(hulls, motion, resting, n, touch, chain, count, s, end, sweep)
+            if not split:
+                continue
+        if resting.count[n] == 0:
+            waiting = push_children(resting, n, window, stack, waiting)
+            continue
+        for e in range(resting.first[n], resting.first[n] + resting.count[n]):
+            if end >= s:
+                end = keep_off_element(hulls, motion, resting, e, touch, chain, count, s, end, sweep)
+    return end
+
+
+@kernel
+def keep_off_node(
+    hulls: HullArrays,
+    motion: HullMotion,
+    resting: BodyArrays,
+    n: int,
+    touch: float,
+    chain: Floats,
+    count: int,
+    s: float,
+    end: float,
+    sweep: SweepWork,
+) -> tuple[bool, float]:
+    """Look for a plane that keeps a hull off a node; return whether the node is to be split, and the window's end."""
+    window, slab = sweep.hull, resting.slab[n]
+    now, least = window[NOW:END], SOME * window[LAST, 3] + motion.radius
+    put_box_corners(slab, window)
+    box, simplex, direction = window[CORNERS:BOX_END], window[SIMPLEX:CORNERS], window[LAST]
+    if not separating_direction(hulls, motion.hull, now, hulls, -1, box, ROUGH, least, simplex, direction):
+        return True, end
+    v = (direction[0], direction[1], direction[2])
+    start, top = height(hulls, motion, now, v), slab_top(slab, v[0], v[1], v[2]) + touch
+    if start <= top:
+        return True, end
+    low = least_height(hulls, motion, v, start, end - s, window)
+    if low > top:
+        remember_plane(v, start, low, window)
+        return False, end
+    if start - top < FAR * resting.node[n, 3]:
+        return True, end
+    end = shorten(hulls, motion, v, start, top, chain, count, s, end, sweep)
+    renew_planes(hulls, motion, end - s, window)
+    return False, end
+
+
+@kernel
+def keep_off_element(
+    hulls: HullArrays,
+    motion: HullMotion,
+    resting: BodyArrays,
+    e: int,
+    touch: float,
+    chain: Floats,
+    count: int,
+    s: float,
+    end: float,
+    sweep: SweepWork,
+) -> float:
+    """Return what `keep_off` returns for an element; one that ends the window is kept in `sweep.near`."""
+    w, corners = resting.radius[e] + touch, put_element(resting, e, sweep.hull)
+    found = keep_off(hulls, motion, hulls, -1, corners, w, chain, count, s, end, sweep)
+    if found < end:
+        sweep.near[0] = e
+    return float(found)
+
+
+@kernel
+def keep_off(
+    hulls: HullArrays,
+    motion: HullMotion,
+    others: HullArrays,
+    other: int,
+    corners: int,
+    w: float,
+    chain: Floats,
+    count: int,
+    s: float,
+    end: float,
+    sweep: SweepWork,
+) -> float:
+    """Return the end of a window in which a hull stays off another one, at most `end`; below `s` if it is near.
+
+    Args:
+        hulls, motion: the hull. others, other: the other one, or -1 for the first `corners` of the window's corners.
+        w: by which the other one is grown [m]. The rest as in `clear_window`.
+    """
+    window, points = sweep.hull, sweep.hull[CORNERS : CORNERS + corners]
+    if keeps_off_hull(others, other, points, w, window):
+        return end
+    now, simplex, direction = window[NOW:END], window[SIMPLEX:CORNERS], window[LAST]
+    if not separating_direction(hulls, motion.hull, now, others, other, points, FINE, 0.0, simplex, direction):
+        return -1.0
+    n = (direction[0], direction[1], direction[2])
+    low, _ = lowest_of(others, other, points, -n[0], -n[1], -n[2])
+    start, top = height(hulls, motion, now, n), w - low
+    if start - top <= NEAR * motion.speed:
+        return -1.0
+    low = least_height(hulls, motion, n, start, end - s, window)
+    remember_plane(n, start, low, window)
+    if low <= top:
+        window[LAST, 3] = start - top
+        end = shorten(hulls, motion, n, start, top, chain, count, s, end, sweep)
+        renew_planes(hulls, motion, end - s, window)
+    return end
+
+
+@kernel
+def shorten(
+    hulls: HullArrays,
+    motion: HullMotion,
+    n: Vector,
+    start: float,
+    top: float,
+    chain: Floats,
+    count: int,
+    s: float,
+    end: float,
+    sweep: SweepWork,
+) -> float:
+    """Return an earlier end of a window: until then a hull is above `top` along a direction.
+
+    `END` gets the pose there.
+
+    Args:
+        n: the direction, from what rests to the hull. start: height of the hull along it at `s`.
+        top: height of what rests [m].
+    """
+    window, gap, length = sweep.hull, start - top, end - s
+    least = gap / motion.speed
+    left = least_height(hulls, motion, n, start, length, window) - top
+    for _ in range(TRIALS):
+        length = max(length * (1.0 - LEFT) * gap / (gap - left), least)
+        put_pose(chain, count, s + length, sweep, window[END:SIMPLEX])
+        if length <= least:
+            return s + length
+        left = least_height(hulls, motion, n, start, length, window) - top
+        if left > 0.0:
+            return s + length
+    put_pose(chain, count, s + least, sweep, window[END:SIMPLEX])
+    return s + least

@@ -1,0 +1,176 @@
+"""The elements of a resting body that the hulls of a moving one come near to on a short way (section 5)."""
+
+from __future__ import annotations
+
+from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.geometry.gjk import lowest_of, separating_direction
+from clench.kernels.geometry.hulls import HullArrays
+from clench.kernels.runtime.compiling import kernel
+from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
+
+from .hull_motion import HullMotion, height, hull_motion, put_pose
+from .hull_sweep import FINE
+from .hull_window import (
+    BOX_END,
+    CORNERS,
+    END,
+    LAST,
+    NOW,
+    SIMPLEX,
+    begin_window,
+    forget_planes,
+    keeps_off_box,
+    keeps_off_hull,
+    least_height,
+    push_children,
+    put_element,
+    put_hull_box,
+    remember_plane,
+    square_from_box,
+)
+from .toi_work import SweepWork
+
+
+@kernel
+def list_near(
+    moving: BodyArrays,
+    m: int,
+    resting: BodyArrays,
+    r: int,
+    chain: Floats,
+    count: int,
+    touch: float,
+    end: float,
+    sweep: SweepWork,
+) -> int:
+    """List the elements of body `r` that body `m` may come within `touch` of before `end` in `sweep.listed`.
+
+    Returns:
+        how many there are, or -1 where there are too many.
+    """
+    found, window = 0, sweep.hull
+    for hull in range(moving.hulls.body[m], moving.hulls.body[m + 1]):
+        motion = hull_motion(moving, hull, chain, count, sweep)
+        forget_planes(window)
+        put_pose(chain, count, 0.0, sweep, window[NOW:END])
+        begin_window(moving, motion, chain, count, 0.0, end, sweep)
+        found = list_near_hull(moving.hulls, motion, resting, r, touch, end, found, sweep)
+        if found < 0:
+            return -1
+    return found
+
+
+@kernel
+def list_touching(moving: BodyArrays, m: int, resting: BodyArrays, r: int, near: float, sweep: SweepWork) -> int:
+    """List the elements of body `r` that body `m` may be nearer to than `near` at rest; see `list_near`.
+
+    Args:
+        sweep: has the poses `moving` and `resting` in one frame.
+    """
+    found, hulls, window = 0, moving.hulls, sweep.hull
+    if moving.root[m] < 0 or resting.root[r] < 0:
+        return 0
+    if hulls.body[m] == hulls.body[m + 1]:
+        return -1
+    compose_inverse(sweep.resting, sweep.moving, window[NOW:END])
+    copy_pose(window[NOW:END], window[END:SIMPLEX])
+    for c in range(3):
+        window[LAST, c] = window[NOW + c, 3] - resting.box[r, c]
+    for hull in range(hulls.body[m], hulls.body[m + 1]):
+        motion = HullMotion(hull, hulls.radius[hull], 0.0, 0.0, 0.0, 0.0, 0.0)
+        forget_planes(window)
+        if not is_off_hulls(hulls, motion, resting, r, near, window):
+            put_hull_box(hulls.box[hull], window)
+            found = list_near_hull(hulls, motion, resting, r, near, 0.0, found, sweep)
+            if found < 0:
+                return -1
+    return found
+
+
+@kernel
+def is_off_hulls(
+    hulls: HullArrays, motion: HullMotion, resting: BodyArrays, r: int, near: float, window: Floats
+) -> bool:
+    """Say whether planes keep a hull off all hulls of a body; not if that has none."""
+    parts, none = resting.hulls, window[CORNERS:BOX_END]
+    for part in range(parts.body[r], parts.body[r + 1]):
+        w = parts.radius[part] + near
+        if not is_kept_off(hulls, motion, parts, part, none, w, 0.0, window):
+            return False
+    return bool(parts.body[r] < parts.body[r + 1])
+
+
+@kernel
+def list_near_hull(
+    hulls: HullArrays,
+    motion: HullMotion,
+    resting: BodyArrays,
+    r: int,
+    touch: float,
+    end: float,
+    found: int,
+    sweep: SweepWork,
+) -> int:
+    """List what one hull comes near to in a window that has begun; see `list_near`."""
+    window, stack = sweep.hull, sweep.stack
+    stack[0, 0], waiting = resting.root[r], 1
+    while waiting > 0:
+        waiting -= 1
+        n = stack[waiting, 0]
+        reach = resting.node[n, 3] + motion.radius + touch + motion.speed * end
+        if square_from_box(resting.node[n], window) > reach * reach:
+            continue
+        if keeps_off_box(resting.slab[n], touch, window):
+            continue
+        if resting.count[n] == 0:
+            waiting = push_children(resting, n, window, stack, waiting)
+            continue
+        for e in range(resting.first[n], resting.first[n] + resting.count[n]):
+            w, count = resting.radius[e] + touch, put_element(resting, e, window)
+            corners = window[CORNERS : CORNERS + count]
+            if not is_kept_off(hulls, motion, hulls, -1, corners, w, end, window):
+                found = add_once(e, found, sweep)
+                if found < 0:
+                    return -1
+    return found
+
+
+@kernel
+def is_kept_off(
+    hulls: HullArrays,
+    motion: HullMotion,
+    others: HullArrays,
+    other: int,
+    corners: Floats,
+    w: float,
+    length: float,
+    window: Floats,
+) -> bool:
+    """Say whether a plane keeps a hull off another one, see `lowest_of`, grown by `w`, in a whole window."""
+    now = window[NOW:END]
+    if keeps_off_hull(others, other, corners, w, window):
+        return True
+    simplex, direction = window[SIMPLEX:CORNERS], window[LAST]
+    if not separating_direction(hulls, motion.hull, now, others, other, corners, FINE, 0.0, simplex, direction):
+        return False
+    n = (direction[0], direction[1], direction[2])
+    start = height(hulls, motion, now, n)
+    low = least_height(hulls, motion, n, start, length, window)
+    top, _ = lowest_of(others, other, corners, -n[0], -n[1], -n[2])
+    if low <= w - top:
+        return False
+    remember_plane(n, start, low, window)
+    return True
+
+
+@kernel
+def add_once(e: int, found: int, sweep: SweepWork) -> int:
+    """Add an element to the list, unless it is there; return the length of the list, -1 if it is full."""
+    for k in range(found):
+        if sweep.listed[k] == e:
+            return found
+    if found == sweep.listed.shape[0]:
+        return -1
+    sweep.listed[found] = e
+    return found + 1
