@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 

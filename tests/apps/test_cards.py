@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.apps.figures import stage as stages
-from clench.core.errors import CommandError
-from clench.core.opengl import OpenGLError
+from clench.apps.figures.drawing import stage as stages
+from clench.core.exceptions import CommandError
+from clench.core.rendering.opengl import OpenGLError
 from clench.models import recent_scenes
 from clench.models.objects.obstacles import table
 from clench.planner.grasp_plan import GraspPlan

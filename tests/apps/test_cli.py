@@ -14,12 +14,12 @@ import pytest
 
 import clench
 from clench.apps.cli import commands
-from clench.apps.cli.demo import MUG_POSE
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.closing.collision import sizes
 from clench.core.defaults import MASS
-from clench.core.errors import CommandError
-from clench.execution.report import ExecutionReport, JointReached
+from clench.core.exceptions import CommandError
+from clench.execution.execution_report import ExecutionReport, JointReached
 from clench.kernels.runtime import warming
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.shapes import CollisionSource

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 import clench
-from clench.apps.cli import actuators
-from clench.apps.cli.exchange import Format
+from clench.apps.cli.commands.export_import import Format
+from clench.apps.cli.inputs import actuators
 from clench.apps.cli.main import main
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.execution.drivers.ros2 import RosInterface
@@ -54,7 +54,7 @@ def solution(tmp_path: Path) -> GraspSolution:
 
 
 def test_choices_are_the_values_of_the_enumerations() -> None:
-    from clench.apps.cli.actuators import Interface
+    from clench.apps.cli.inputs.actuators import Interface
 
     assert set(Interface.__args__) == set(RosInterface)
     assert set(Format.__args__) == set(GraspFormat)

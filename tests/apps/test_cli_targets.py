@@ -60,7 +60,7 @@ def test_a_bad_target_is_told_before_anything_is_done(call, sentence, tmp_path, 
     monkeypatch.setattr(clench.Hand, "load", lambda *args, **kwargs: pytest.fail("the hand was loaded first"))
     monkeypatch.setattr(clench.GraspSolution, "load", lambda *args: pytest.fail("the solution was loaded first"))
     monkeypatch.setattr(
-        "clench.apps.cli.export_sources.read_grasps", lambda *args: pytest.fail("the solutions were read first")
+        "clench.apps.cli.inputs.export_sources.read_grasps", lambda *args: pytest.fail("the solutions were read first")
     )
     monkeypatch.setattr(
         "clench.solver.analysis.examples.read_examples", lambda *args: pytest.fail("the examples were read first")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from clench.apps.cli.commands import COMMANDS
+from clench.apps.cli.command_table import COMMANDS
 from clench.apps.cli.main import main
 
 #: Completes the last word as bash does when TAB is pressed.

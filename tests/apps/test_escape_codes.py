@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 import clench
-from clench.apps.cli import printing
 from clench.apps.cli.main import main
-from clench.core.visible_text import visible
-from clench.execution.report import ExecutionReport
+from clench.apps.cli.output import printing
+from clench.core.showing.visible_text import visible
+from clench.execution.execution_report import ExecutionReport
 from fuzz.originals import MJCF, link_stl
 from handmade import make_solution
 

@@ -11,11 +11,11 @@ import pytest
 
 import clench
 from clench.apps.figures import draw_solution
-from clench.apps.figures.curl_plane import plane_title
-from clench.apps.figures.finger_scenes import FingerScenes
-from clench.apps.figures.plane_scene import PlaneScene, bounds
-from clench.apps.figures.set_grid import MOST_SETS, _selected, _short, _verdict
-from clench.core.errors import FileError
+from clench.apps.figures.planes.curl_plane import plane_title
+from clench.apps.figures.planes.finger_scenes import FingerScenes
+from clench.apps.figures.planes.plane_scene import PlaneScene, bounds
+from clench.apps.figures.planes.set_grid import MOST_SETS, _selected, _short, _verdict
+from clench.core.exceptions import FileError
 from clench.models.command import GraspCommand
 from clench.models.objects.obstacles import table
 from clench.solver.solution import FingerStatus, GraspSolution

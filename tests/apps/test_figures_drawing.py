@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.apps.figures.loops import join_segments, outline_loops
+from clench.apps.figures.planes.loops import join_segments, outline_loops
 from clench.closing.outlines import cut_shape
 from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.apps.figures import film
-from clench.apps.figures.dots import covered, dotted
-from clench.core.errors import FileError
+from clench.apps.figures.drawing.dots import covered, dotted
+from clench.apps.figures.sheets import film
+from clench.core.exceptions import FileError
 from clench.solver.solution import GraspSolution
 
 ORANGE = np.array([0xD5, 0x5E, 0x00])

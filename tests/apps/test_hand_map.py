@@ -10,8 +10,8 @@ import pytest
 import clench
 from chain_hands import HandBuilder, along_x, mount, one_link, three_links
 from clench.apps.cli.main import main
-from clench.apps.figures import style
-from clench.apps.figures.hand_map import _map_finger, draw_hand_map
+from clench.apps.figures.drawing import style
+from clench.apps.figures.maps.hand_map import _map_finger, draw_hand_map
 from clench.models.hand.hand import JointRole
 
 

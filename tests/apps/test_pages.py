@@ -17,7 +17,7 @@ import clench
 from clench.apps.cli.main import main
 from clench.apps.pages.packed_scene import Motion, packed_motion, packed_solid
 from clench.apps.pages.page import hand_page_html, page_html
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.models.appearance import Solid, SolidKind
 from clench.models.mesh import TriangleMesh
 from clench.solver.solution import GraspSolution

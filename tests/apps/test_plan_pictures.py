@@ -12,14 +12,15 @@ import pytest
 import clench
 from chain_hands import one_link
 from clench.apps.cli.main import main
-from clench.apps.figures import draw_plan, grasp_sheet
-from clench.apps.figures.camera import fitted_camera
-from clench.apps.figures.contact_map import _heat, _normals, _photographs, _sides, _Touches, draw_contacts
-from clench.apps.figures.grasp_sheet import MOST_GRASPS, draw_grasps
-from clench.apps.figures.stage import Stage, solution_poses, solution_solids
-from clench.apps.figures.viewpoints import focus_of, viewpoints
-from clench.apps.figures.zone_map import _best, _ends, draw_zones
-from clench.core.errors import FileError
+from clench.apps.figures import draw_plan
+from clench.apps.figures.drawing.camera import fitted_camera
+from clench.apps.figures.drawing.stage import Stage, solution_poses, solution_solids
+from clench.apps.figures.drawing.viewpoints import focus_of, viewpoints
+from clench.apps.figures.maps.contact_map import _heat, _normals, _photographs, _sides, _Touches, draw_contacts
+from clench.apps.figures.maps.zone_map import _best, _ends, draw_zones
+from clench.apps.figures.sheets import grasp_sheet
+from clench.apps.figures.sheets.grasp_sheet import MOST_GRASPS, draw_grasps
+from clench.core.exceptions import FileError
 from clench.models.appearance import SolidKind, carried_by_palm
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -10,7 +10,7 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.apps.figures import hand_map
+from clench.apps.figures.maps import hand_map
 from clench.solver.preshapes.preshapes import opposition_zones
 
 HELD = {"position": [-0.05, -0.1, 0.06], "wxyz": [0.5, 0.5, 0.5, 0.5]}

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import clench
+from clench.apps.cli.inputs.scene_options import with_scene
 from clench.apps.cli.main import main
-from clench.apps.cli.scene_options import with_scene
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 from clench.execution.executing import check_geometry
 from clench.models.objects.grasp_object import BodyRole
 

@@ -15,12 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import clench
-from clench.apps.figures import stage as stages
-from clench.apps.figures.camera import Camera, Picture, halved, look_along
-from clench.apps.figures.contact_labels import _places, photograph
-from clench.apps.figures.stage import Stage
-from clench.apps.figures.viewpoints import focus_of, viewpoints
-from clench.core.opengl import OpenGLError, open_context
+from clench.apps.figures.drawing import stage as stages
+from clench.apps.figures.drawing.camera import Camera, Picture, halved, look_along
+from clench.apps.figures.drawing.contact_labels import _places, photograph
+from clench.apps.figures.drawing.stage import Stage
+from clench.apps.figures.drawing.viewpoints import focus_of, viewpoints
+from clench.core.rendering.opengl import OpenGLError, open_context
 from clench.models.appearance import Solid, SolidKind
 from clench.models.mesh import TriangleMesh
 
@@ -197,7 +197,7 @@ def test_viewpoints_differ_and_are_the_same_each_time() -> None:
 
 def test_without_opengl_the_picture_is_plain_and_a_sentence_says_so(tmp_path: Path) -> None:
     code = (
-        "import clench; from clench.apps.figures.hand_map import draw_hand_map; from pathlib import Path;"
+        "import clench; from clench.apps.figures.maps.hand_map import draw_hand_map; from pathlib import Path;"
         "draw_hand_map(clench.Hand.load('patent15'), Path('hand.png'))"
     )
     environment = {**os.environ, "MUJOCO_GL": "off"}
@@ -212,7 +212,7 @@ def test_without_opengl_the_picture_is_plain_and_a_sentence_says_so(tmp_path: Pa
 def test_both_libraries_draw_without_being_asked_for(library: str) -> None:
     """A library that is missing leaves no trace: the next one draws."""
     code = (
-        "import sys, clench.core.opengl as gl; gl._WITHOUT_SCREEN = ('nothing', sys.argv[1]); "
+        "import sys, clench.core.rendering.opengl as gl; gl._WITHOUT_SCREEN = ('nothing', sys.argv[1]); "
         "gl.open_context(10, 10).free(); print(gl._found[0].__module__)"
     )
     environment = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")}

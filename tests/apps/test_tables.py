@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 import clench
-from clench.apps.cli import choice_tables, printing
-from clench.models.hand.report import describe_hand
+from clench.apps.cli.output import choice_tables, printing
+from clench.models.hand.hand_report import describe_hand
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,7 +29,7 @@ def shown() -> list[Table]:
     patch = pytest.MonkeyPatch()
 
     def noted(title: str, *columns: str) -> Table:
-        from clench.apps.cli.tables import table_with
+        from clench.apps.cli.output.tables import table_with
 
         tables.append(table_with(title, *columns))
         return tables[-1]

@@ -6,7 +6,7 @@ import pytest
 
 import clench
 from clench.apps.figures.weight_sweep import draw_sweep, sweep_weight
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 
 COMMAND = clench.GraspCommand(
     hand_pose=clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5]),

@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files import array_files
 from clench.core.files.array_files import read_arrays
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from clench.core.deferring import DeferredMapping, DeferredSequence, once
+from clench.core.caching.deferring import DeferredMapping, DeferredSequence, once
 
 MADE = {"code": "limit", "angles": [0.1, 0.2]}
 

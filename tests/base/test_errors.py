@@ -1,6 +1,6 @@
 """Messages are one line that can be printed."""
 
-from clench.core.errors import ClenchError, FileError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, UnknownNameError
 
 
 def test_a_message_is_one_line():

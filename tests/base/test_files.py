@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.file_bytes import read_file, read_text
 
 

@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.json_files import check_folder, check_writable, write_atomically
 
 

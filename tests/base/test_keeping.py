@@ -7,7 +7,7 @@ import weakref
 import numpy as np
 import pytest
 
-from clench.core.keeping import KeptBySize, kept_by_identity, kept_while_alive
+from clench.core.caching.keeping import KeptBySize, kept_by_identity, kept_while_alive
 
 
 def test_found_once_per_object() -> None:

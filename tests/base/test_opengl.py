@@ -9,7 +9,7 @@ import sys
 import pytest
 
 _LOAD = "from clench import Hand; print(len(Hand.load('robonaut2').fingers))"
-_FILM = "import clench.apps.cli.actuators as a; from pathlib import Path; a.make_film(Path('a.gif'), None)"
+_FILM = "import clench.apps.cli.inputs.actuators as a; from pathlib import Path; a.make_film(Path('a.gif'), None)"
 
 
 def run(code: str, drawn_by: str, *, folder: object = None) -> subprocess.CompletedProcess[str]:
@@ -26,7 +26,8 @@ def test_a_hand_loads_whatever_is_to_draw(drawn_by: str) -> None:
 
 
 def test_the_variable_is_left_as_it_was() -> None:
-    said = "import os; from clench.core.opengl import import_mujoco; import_mujoco(); print(os.environ['MUJOCO_GL'])"
+    said = "import os; from clench.core.rendering.opengl import import_mujoco as load; load(); "
+    said += "print(os.environ['MUJOCO_GL'])"
     assert run(said, "bogus").stdout == "bogus\n"
 
 
@@ -51,7 +52,7 @@ def test_a_command_that_draws_nothing_does_its_work(tmp_path: object) -> None:
 
 def test_drawing_leaves_the_environment_as_it_was() -> None:
     said = (
-        "import os; before = dict(os.environ); import clench.core.opengl as gl\n"
+        "import os; before = dict(os.environ); import clench.core.rendering.opengl as gl\n"
         "try: gl.open_context(8, 8).free()\n"
         "except gl.OpenGLError: pass\n"
         "print(dict(os.environ) == before)"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose, rotation_about
 
 HALF, TURN = math.pi / 2.0, 2.0 * math.pi

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.array_files import read_array
 from clench.core.files.file_limits import DOCUMENT_DEPTH
 from clench.core.files.json_files import non_finite_path, read_json

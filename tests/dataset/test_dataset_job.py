@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from clench.apps.cli import exchange, generate
+from clench.apps.cli.commands import export_import as exchange
+from clench.apps.cli.commands import generate
 from clench.apps.cli.main import main
-from clench.core.errors import CommandError, UnknownNameError
-from clench.dataset.exporting import DatasetFormat
-from clench.dataset.job import DatasetJob, job_from, read_job
-from clench.dataset.shards import Shard
-from clench.dataset.units import Unit
+from clench.core.exceptions import CommandError, UnknownNameError
+from clench.dataset.access.exporting import DatasetFormat
+from clench.dataset.jobs.job import DatasetJob, job_from, read_job
+from clench.dataset.jobs.shards import Shard
+from clench.dataset.jobs.units import Unit
 from clench.execution.formats.exchange import GraspFormat
 from clench.planner.options import GraspKind
 

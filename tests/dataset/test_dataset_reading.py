@@ -14,14 +14,14 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.core.errors import ClenchError, CommandError, UnknownNameError
-from clench.dataset.columns import COLUMNS, arrow_schema
-from clench.dataset.exporting import export
-from clench.dataset.generating import generate
-from clench.dataset.job import DatasetJob
-from clench.dataset.merging import GROUP
-from clench.dataset.reading import GraspDataset
-from clench.dataset.reading import open as open_dataset
+from clench.core.exceptions import ClenchError, CommandError, UnknownNameError
+from clench.dataset.access.exporting import export
+from clench.dataset.access.reading import GraspDataset
+from clench.dataset.access.reading import open as open_dataset
+from clench.dataset.jobs.job import DatasetJob
+from clench.dataset.running.generating import generate
+from clench.dataset.storage.columns import COLUMNS, arrow_schema
+from clench.dataset.storage.merging import GROUP
 from made_rows import JOINTS, make_result
 
 ROWS = 2 * 2 * 2500

@@ -17,18 +17,18 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.core.errors import ClenchError
-from clench.dataset.columns import COLUMNS, SCHEMA
-from clench.dataset.exporting import export
-from clench.dataset.generating import GenerateReport, generate
-from clench.dataset.job import DatasetJob
-from clench.dataset.reading import GraspDataset
-from clench.dataset.reading import open as open_dataset
-from clench.dataset.rows import row_of
-from clench.dataset.sources import license_beside, load_hand, load_object
-from clench.dataset.unit_run import UnitResult
-from clench.dataset.units import Unit
-from clench.dataset.workers import run_units
+from clench.core.exceptions import ClenchError
+from clench.dataset.access.exporting import export
+from clench.dataset.access.reading import GraspDataset
+from clench.dataset.access.reading import open as open_dataset
+from clench.dataset.jobs.job import DatasetJob
+from clench.dataset.jobs.sources import license_beside, load_hand, load_object
+from clench.dataset.jobs.units import Unit
+from clench.dataset.running.generating import GenerateReport, generate
+from clench.dataset.running.unit_run import UnitResult
+from clench.dataset.running.workers import run_units
+from clench.dataset.storage.columns import COLUMNS, SCHEMA
+from clench.dataset.storage.rows import row_of
 from clench.execution.simulation.hold import Hold
 from clench.planner.rejections import Rejection
 
@@ -244,7 +244,7 @@ def test_ctrl_c_leaves_whole_parts_and_says_how_to_go_on(
         yield from islice(run_units(job, units, workers, memory), 1)
         os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("clench.dataset.generating.run_units", interrupted)
+    monkeypatch.setattr("clench.dataset.running.generating.run_units", interrupted)
     out = tmp_path / "out"
     call = [*CALL, "--workers", "0", "--out", str(out)]
     monkeypatch.setattr(sys, "argv", ["clench", *call])

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import pytest
 
-from clench.core.errors import ClenchError
-from clench.dataset.folder import DatasetFolder
-from clench.dataset.generating import GenerateReport, generate
-from clench.dataset.job import DatasetJob
-from clench.dataset.merging import merge
-from clench.dataset.reading import open as open_dataset
-from clench.dataset.shards import Shard
+from clench.core.exceptions import ClenchError
+from clench.dataset.access.reading import open as open_dataset
+from clench.dataset.jobs.job import DatasetJob
+from clench.dataset.jobs.shards import Shard
+from clench.dataset.running.generating import GenerateReport, generate
+from clench.dataset.storage.folder import DatasetFolder
+from clench.dataset.storage.merging import merge
 from made_rows import make_result, slowly
 
 JOB = DatasetJob(hands=("robonaut2", "patent15"), objects=("mug", "ball"), scales=(1.0, 1.5), count=50, unit=7)

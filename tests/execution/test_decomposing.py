@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.execution.simulation import decomposing
 from clench.execution.simulation.convex_pieces import SETTINGS
 from clench.models.mesh import TriangleMesh

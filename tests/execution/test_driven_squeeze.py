@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.execution.executing import execute
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.hardware.driver import DriverError, DriverLimits
 from clench.execution.hardware.hardware_hand import HardwareHand
-from clench.execution.report import ExecutionReport
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
 

@@ -9,9 +9,9 @@ import pytest
 from fake_driver import FakeDriver
 
 from clench.execution.executing import execute
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.hardware.driver import DriverError, DriverLimits
 from clench.execution.hardware.hardware_hand import HardwareHand
-from clench.execution.report import ExecutionReport
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
 

@@ -14,8 +14,8 @@ from fake_driver import FakeDriver
 from clench.closing.collision.path_check import find_path_overlap
 from clench.core.pose import Pose
 from clench.execution.executing import execute
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.hardware.hardware_hand import HardwareHand
-from clench.execution.report import ExecutionReport
 from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clench.apps.cli.actuators import ActuatorOptions, make_actuator
-from clench.core.errors import CommandError
+from clench.apps.cli.inputs.actuators import ActuatorOptions, make_actuator
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.execution.executing import execute
 from clench.execution.simulation.hold import Hold

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.apps.cli.actuators import make_film, make_hold
-from clench.core.errors import ClenchError, CommandError, FileError
+from clench.apps.cli.inputs.actuators import make_film, make_hold
+from clench.core.exceptions import ClenchError, CommandError, FileError
 from clench.execution.executing import execute
 from clench.execution.simulation.filming import FRAME, Film
 from clench.execution.simulation.hold import Hold
@@ -121,7 +121,7 @@ def test_without_a_screen_and_without_a_way_to_do_without(
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("MUJOCO_GL", "glfw")
-    monkeypatch.setattr("clench.core.opengl._found", [])
+    monkeypatch.setattr("clench.core.rendering.opengl._found", [])
     with pytest.raises(
         ClenchError, match=r"OpenGL cannot draw here \(there is no screen\)\. .* install Mesa's libegl1"
     ):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.exceptions import CommandError, FileError, UnknownNameError
 from clench.execution.hardware.joint_map import JointMap, MappedJoint, joint_map_from_dict
 from clench.models.hand.hand import Hand
 

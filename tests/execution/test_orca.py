@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from virtual_clock import VirtualClock
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.execution.executing import execute
 from clench.execution.hardware.driver import DriverError, JointPath
 from clench.execution.hardware.hardware_hand import HardwareHand

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 from clench.execution.executing import execute
-from clench.execution.report import ExecutionReport
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.simulation.hold import Hold
 from clench.execution.simulation.mujoco_scene import build_scene, lowest
 from clench.execution.simulation.pulling import hold_and_pull, joint_torques

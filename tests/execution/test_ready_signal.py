@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.execution.drivers import ros2
 from clench.execution.executing import execute
 from clench.execution.hardware.ready_signal import ReadySignal

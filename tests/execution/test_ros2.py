@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from virtual_clock import VirtualClock
 
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.execution.drivers import ros2
 from clench.execution.drivers.ros2 import Ros2Driver, topic_name
 from clench.execution.hardware.driver import JointPath

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.execution.drivers import action_link, ros2
 from clench.execution.drivers.action_link import ABORTED, ActionLink
 from clench.execution.drivers.ros2 import RosInterface, installed_interface

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.core.errors import CommandError, HandError, ObjectError
+from clench.core.exceptions import CommandError, HandError, ObjectError
 from clench.core.pose import Pose
 from clench.execution.executing import execute
-from clench.execution.report import ExecutionReport
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.simulation import convex_pieces as convex_pieces_module
 from clench.execution.simulation.convex_pieces import convex_pieces
 from clench.execution.simulation.mujoco_scene import body_pose, build_scene

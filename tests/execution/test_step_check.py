@@ -12,8 +12,8 @@ from test_drives import FAR
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.core.pose import Pose
 from clench.execution.executing import execute
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.next_steps import Phase, plan_next_steps
-from clench.execution.report import ExecutionReport
 from clench.execution.simulation.mujoco_scene import PREFIX, build_scene
 from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.step_check import squeeze_overlap, step_overlap

@@ -11,9 +11,9 @@ import pytest
 from test_drives import POSITIONS, changed
 from test_pulling import FIRM, on_a_table
 
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.execution.executing import execute
-from clench.execution.report import ExecutionReport
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

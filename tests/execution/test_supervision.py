@@ -23,7 +23,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from recording_driver import MOVING, RecordingDriver
 from virtual_clock import VirtualClock
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.hardware import supervision
 from clench.execution.hardware.driver import DriverError
 from clench.execution.hardware.hardware_hand import HardwareHand
@@ -36,7 +37,6 @@ from clench.execution.hardware.supervision import (
     Supervision,
     supervision_of,
 )
-from clench.execution.report import ExecutionReport
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.hand.reading.tendons import TendonMap

@@ -7,7 +7,7 @@ from block_hands import block_hand
 from clench.closing.collision.approach import BACK_OFF, MAX_TILT, approach_poses
 from clench.closing.collision.depths import first_touch, hand_depths, travel_to_touch
 from clench.closing.collision.packed_object import pack_object
-from clench.core.errors import CommandError, ObjectError, UnknownNameError
+from clench.core.exceptions import CommandError, ObjectError, UnknownNameError
 from clench.core.pose import Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.exceptions import CommandError, FileError, UnknownNameError
 from clench.scoring.calibration import (
     Calibration,
     calibration_of,

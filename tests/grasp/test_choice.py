@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from clench.scoring import criterion_registry
 from clench.scoring.calibration import Calibration
 from clench.scoring.choice import choose
-from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_types import ScoringContext
 from clench.scoring.explaining import explain_choice
 
 SETTING = ScoringContext(HAND, np.zeros(2))

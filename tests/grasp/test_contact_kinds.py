@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chain_hands import HandBuilder, along_x, mount
-from clench.mechanics.contact_kinds import KINDS, GraspKind, contact_kinds
+from clench.mechanics.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
 from clench.models.hand.hand import Hand, Link
 
 

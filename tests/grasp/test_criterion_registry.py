@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from candidate_cases import HAND, candidate
 
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.scoring import criterion_registry
-from clench.scoring.criteria import ScoringContext
 from clench.scoring.criterion_registry import (
     check_numbers,
     criterion_names,
@@ -17,6 +16,7 @@ from clench.scoring.criterion_registry import (
     register_criterion,
     score_sets,
 )
+from clench.scoring.criterion_types import ScoringContext
 
 SETTING = ScoringContext(HAND, np.array([0.1, 0.0]))
 

@@ -7,8 +7,8 @@ import pytest
 from candidate_cases import HAND, candidate, touch
 
 from clench.models.hand.hand import DEFAULT_SPEED
-from clench.scoring.criteria import ScoringContext
 from clench.scoring.criterion_registry import criterion_names, find_criterion
+from clench.scoring.criterion_types import ScoringContext
 
 START = np.array([0.1, 0.0])
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.scoring.fitting import Examples, fit_weights, likeliest, told_right
 
 

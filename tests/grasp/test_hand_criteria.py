@@ -12,17 +12,17 @@ from chain_hands import HandBuilder, along_x, mount
 from clench.closing.candidates import combined_posture
 from clench.core.defaults import FRICTION
 from clench.core.pose import Pose
-from clench.mechanics.contacts import make_contacts, pair_friction
-from clench.mechanics.epsilon_quality import epsilon, epsilon_bound
-from clench.mechanics.held import held_by_contacts
+from clench.mechanics.epsilon.epsilon_quality import epsilon, epsilon_bound
+from clench.mechanics.grasp.contacts import make_contacts, pair_friction
+from clench.mechanics.grasp.held import held_by_contacts
 from clench.models.hand.reading.tendons import TendonMap
 from clench.models.objects.grasp_object import BodyRole
 from clench.models.objects.mass import mass_properties
 from clench.scoring import criterion_registry
 from clench.scoring.calibration import Calibration
 from clench.scoring.choice import choose
-from clench.scoring.criteria import ScoringContext
 from clench.scoring.criterion_registry import find_criterion
+from clench.scoring.criterion_types import ScoringContext
 from clench.solver.alternatives import finger_sets
 from clench.solver.problem import make_problem, make_setting
 

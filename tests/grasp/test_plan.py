@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from small_chain import CLOSING, LENGTH, POSTURE, chain
 
 from clench.closing.finger_plan import plan_finger
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.core.pose import rotation_about
 from clench.models.hand.hand import Coupling
 from clench.models.shapes import CollisionSource

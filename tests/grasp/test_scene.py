@@ -10,7 +10,7 @@ from block_hands import block_hand
 
 import clench
 from clench.closing.collision.packed_object import OBJECT_CACHE, ROUND_KINDS, hash_hand, pack_object, packed_size
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import clench
-from clench.apps.cli.demo import MUG_POSE
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.core.pose import Pose
 from clench.kernels.closing import contact_reading as touches
 from clench.kernels.closing import solve_poses

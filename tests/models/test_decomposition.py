@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_hand import small_hand
 
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import ClenchError, CommandError
+from clench.core.exceptions import ClenchError, CommandError
 from clench.core.pose import Pose
 from clench.solver.batch import batch_progress
 from clench.solver.batch.batch_solver import BatchSolver

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.models.command import GraspCommand
 from clench.solver.batch.batch_parts import parts_folder
 from clench.solver.batch.batch_solver import BatchSolver

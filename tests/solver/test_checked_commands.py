@@ -7,7 +7,7 @@ import pytest
 
 import clench
 from clench import ClosingOrder, GraspCommand, Pose
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 from clench.solver import checked_command as module
 from clench.solver.checked_command import checked
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from clench.apps.cli.main import main
-from clench.core.errors import FileError, UnknownNameError
+from clench.core.exceptions import FileError, UnknownNameError
 from clench.scoring.calibration import Calibration, load_calibration
 from clench.solver.analysis import record as record_module
 from clench.solver.analysis.examples import SCHEMA, read_examples, recorded_outcomes, solve_scores

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.mechanics.contact_kinds import KINDS, contact_kinds
+from clench.mechanics.grasp.contact_kinds import KINDS, contact_kinds
 from clench.models.objects.obstacles import obstacle
 from clench.solver.analysis.grasp_kinds import PALM_NEAR
 

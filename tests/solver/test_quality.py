@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
-from clench.mechanics.loads import GRAVITY
+from clench.mechanics.grasp.loads import GRAVITY
 
 
 @pytest.fixture(scope="module")

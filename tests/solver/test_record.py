@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.core.errors import ClenchError, FileError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, UnknownNameError
 from clench.solver.analysis.record import SCHEMA_VERSION, Record
 from clench.solver.solution import GraspSolution, SolutionStatus
 from handmade import make_solution

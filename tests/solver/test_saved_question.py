@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.solver.batch.saved_question import SavedBatch
 
 

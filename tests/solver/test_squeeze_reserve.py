@@ -9,10 +9,10 @@ import pytest
 
 import clench
 from clench.core.defaults import FRICTION, FRICTION_RESERVE, LOSS_RESERVE, MASS, MOST_FORCE_PER_WEIGHT
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.execution.simulation.hold import Hold
-from clench.mechanics.held import HeldObject
-from clench.mechanics.loads import GRAVITY
+from clench.mechanics.grasp.held import HeldObject
+from clench.mechanics.grasp.loads import GRAVITY
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.analysis.squeezing import SqueezePlan, plan_squeeze

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 
 HAND = clench.Hand.load("patent15")

@@ -9,13 +9,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .exporting import export
-    from .generating import generate
-    from .job import DatasetJob
-    from .merging import merge
+    from .access.exporting import export
+    from .access.reading import GraspDataset, open
+    from .jobs.job import DatasetJob
+    from .jobs.shards import Shard
     from .ray_driver import generate_on_ray
-    from .reading import GraspDataset, open
-    from .shards import Shard
+    from .running.generating import generate
+    from .storage.merging import merge
 
 _HOMES = {
     "DatasetJob": "job",

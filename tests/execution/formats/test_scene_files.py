@@ -12,7 +12,7 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.pose import FloatArray
 from clench.execution.formats.scene_files import grasp_line, posed_scene
 from clench.execution.formats.scene_glb import Y_UP

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from clench.core.pose import FloatArray
-from clench.mechanics.contacts import ContactSet, make_contacts
-from clench.mechanics.held import HeldObject, held_by_contacts
+from clench.mechanics.grasp.contacts import ContactSet, make_contacts
+from clench.mechanics.grasp.held import HeldObject, held_by_contacts
 
 
 def directions(rng: np.random.Generator, count: int) -> FloatArray:

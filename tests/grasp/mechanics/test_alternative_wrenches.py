@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from clench.mechanics.alternative_wrenches import AlternativeWrenches
-from clench.mechanics.wrench_space import epsilon_l1, weak_directions
+from clench.mechanics.epsilon.alternative_wrenches import AlternativeWrenches
+from clench.mechanics.epsilon.wrench_space import epsilon_l1, weak_directions
 
 
 def random_wrenches(seed, fingers=3, sets=3, contacts=2):

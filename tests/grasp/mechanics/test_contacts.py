@@ -9,10 +9,10 @@ import pytest
 
 import clench
 from clench.core.defaults import FRICTION
-from clench.core.errors import CommandError
-from clench.mechanics.contacts import contact_frames, make_contacts, pair_friction
-from clench.mechanics.epsilon_quality import cone_faces
-from clench.mechanics.grasp_map import grasp_map
+from clench.core.exceptions import CommandError
+from clench.mechanics.epsilon.epsilon_quality import cone_faces
+from clench.mechanics.grasp.contacts import contact_frames, make_contacts, pair_friction
+from clench.mechanics.grasp.grasp_map import grasp_map
 
 from .held_cases import directions, random_contacts
 

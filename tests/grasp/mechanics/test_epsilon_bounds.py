@@ -13,10 +13,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.mechanics import batch_bounds
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.epsilon_quality import epsilon, epsilon_bound
-from clench.mechanics.held import HeldObject, held_by_contacts
+from clench.mechanics.epsilon import batch_bounds
+from clench.mechanics.epsilon.epsilon_quality import epsilon, epsilon_bound
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.held import HeldObject, held_by_contacts
 
 #: Positions [m], outward normals, and friction of the contacts of one grasp.
 Contacts = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from clench.core.errors import CommandError
-from clench.mechanics.actuation import actuation, least_effort
-from clench.mechanics.binding import why_not
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.held import HeldObject, held_by_contacts
-from clench.mechanics.loads import (
+from clench.core.exceptions import CommandError
+from clench.mechanics.forces.actuation import actuation, least_effort
+from clench.mechanics.forces.binding import why_not
+from clench.mechanics.forces.squeeze import squeeze_forces
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.held import HeldObject, held_by_contacts
+from clench.mechanics.grasp.loads import (
     GRAVITY,
     check_loads,
     gravity_any_direction,
@@ -24,8 +25,7 @@ from clench.mechanics.loads import (
     task_wrench,
     weight,
 )
-from clench.mechanics.squeeze import squeeze_forces
-from clench.mechanics.tendon_tensions import TendonDrive
+from clench.mechanics.grasp.tendon_tensions import TendonDrive
 
 from .held_cases import around_the_equator, directions, random_held, with_joints
 

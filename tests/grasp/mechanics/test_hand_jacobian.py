@@ -8,8 +8,8 @@ import pytest
 import clench
 from chain_hands import HandBuilder, along_x, three_links
 from clench.core.pose import invert
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.jacobian import degrees_of_freedom, hand_jacobian
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.jacobian import degrees_of_freedom, hand_jacobian
 
 from .held_cases import directions
 

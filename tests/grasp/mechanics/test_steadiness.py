@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import CommandError
-from clench.mechanics.actuation import least_effort
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.epsilon_quality import epsilon, epsilon_bound, epsilon_within_torques
-from clench.mechanics.held import held_by_contacts
+from clench.core.exceptions import CommandError
+from clench.mechanics.epsilon.epsilon_quality import epsilon, epsilon_bound, epsilon_within_torques
+from clench.mechanics.forces.actuation import least_effort
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.held import held_by_contacts
 
 from .held_cases import around_the_equator, random_held
 

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chain_hands import HandBuilder, along_x, three_links
-from clench.core.errors import CommandError
-from clench.mechanics.jacobian import degrees_of_freedom
-from clench.mechanics.tendon_tensions import TendonDrive, tendon_drive
+from clench.core.exceptions import CommandError
+from clench.mechanics.grasp.jacobian import degrees_of_freedom
+from clench.mechanics.grasp.tendon_tensions import TendonDrive, tendon_drive
 from clench.models.hand.reading.tendons import TendonMap
 
 R_ANTAGONISTIC = np.array([[0.01, -0.01, 0.0, 0.0], [0.0, 0.0, 0.008, -0.008]])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from clench.core.pose import FloatArray, rotation_about
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.grasp_map import edge_wrenches
-from clench.mechanics.wrench_space import epsilon_l1, epsilon_linf, volume_l1
+from clench.mechanics.epsilon.wrench_space import epsilon_l1, epsilon_linf, volume_l1
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.grasp_map import edge_wrenches
 
 from .held_cases import directions, random_contacts
 

@@ -8,7 +8,7 @@ from hand_models import finger, hand, three_fingers, urdf_hand, written
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.models.hand.hand import Hand
 from clench.models.hand.understanding.coupling import Relation, flatten
 

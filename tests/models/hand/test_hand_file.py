@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_models import three_fingers, written
 
-from clench.core.errors import ClenchError, FileError, HandError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, HandError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.hand.hand_file import read_hand_file
 from clench.models.shapes import CollisionSource

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hand_models import finger, hand, three_fingers, urdf_hand, written
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.models.hand.findings import Finding, FindingCode, Severity, in_hand_file
 from clench.models.hand.hand import Hand
 

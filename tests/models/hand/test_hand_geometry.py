@@ -9,7 +9,7 @@ import pytest
 from hand_models import finger, hand, three_fingers, urdf_hand, written
 
 from clench.models.hand.hand import Hand
-from clench.models.hand.report import describe_hand
+from clench.models.hand.hand_report import describe_hand
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, ShapeKind
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hand_models import finger, hand, three_fingers, urdf_hand, written
 
-from clench.core.errors import ClenchError, FileError, HandError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, HandError, UnknownNameError
 from clench.models.hand.hand import Hand
 
 

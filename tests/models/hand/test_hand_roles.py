@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_models import finger, hand, three_fingers, written
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.models.hand.hand import Hand, Joint
 from clench.models.hand.understanding.finger_names import place_names, short_names
 

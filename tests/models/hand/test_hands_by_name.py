@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hand_models import three_fingers, urdf_hand
 
-from clench.core.errors import FileError, HandError, UnknownNameError
+from clench.core.exceptions import FileError, HandError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.hand.reading import named
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_hand_kinematics import assert_same_kinematics
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.models.hand.hand import Hand
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import FileError, HandError, UnknownNameError
+from clench.core.exceptions import FileError, HandError, UnknownNameError
 from clench.models.hand.reading.tendons import TendonMap
 
 PULLEY = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hand_models import three_fingers, urdf_hand, urdf_joint, urdf_link, written
 
-from clench.core.errors import ClenchError, FileError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, UnknownNameError
 from clench.models.hand.hand import Hand
 
 U = urdf_hand()

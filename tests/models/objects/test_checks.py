@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
-from clench.models.objects.checks import check_mesh, unit_warnings
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.objects.mesh_checks import check_mesh, unit_warnings
 from clench.models.objects.topology import edge_defects, winding_number
 from clench.models.shapes import Shape, ShapeKind
 from clench.models.tessellation import tessellate

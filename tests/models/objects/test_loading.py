@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clench.core.errors import FileError, ObjectError, UnknownNameError
+from clench.core.exceptions import FileError, ObjectError, UnknownNameError
 from clench.core.pose import Pose
 from clench.models.objects.grasp_object import BodyRole, GraspObject, MeshPart
 from clench.models.objects.mesh_file import read_mesh
