@@ -13,8 +13,10 @@ from types import SimpleNamespace
 import pytest
 
 import clench
-from clench.apps.cli import commands
+from clench.apps.cli.command_table import COMMANDS
 from clench.apps.cli.commands.demo import MUG_POSE
+from clench.apps.cli.inputs import choices
+from clench.apps.cli.inputs.command_files import loadable
 from clench.apps.cli.main import main
 from clench.closing.collision import sizes
 from clench.core.defaults import MASS
@@ -94,11 +96,11 @@ def test_help_loads_nothing_heavy_and_names_every_command() -> None:
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.splitlines()[-1] == "[]"
-    for name in commands.COMMANDS:
+    for name in COMMANDS:
         assert f"\n  {name} " in run.stdout
 
 
-@pytest.mark.parametrize("name", commands.COMMANDS)
+@pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([name, "--help"]) == 0
     out = capsys.readouterr().out
@@ -108,9 +110,9 @@ def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_choices_are_the_values_of_the_enumerations() -> None:
-    assert set(commands.Source.__args__) == set(CollisionSource)
-    assert set(commands.Order.__args__) == set(ClosingOrder)
-    assert set(commands.Status.__args__) == set(SolutionStatus)
+    assert set(choices.Source.__args__) == set(CollisionSource)
+    assert set(choices.Order.__args__) == set(ClosingOrder)
+    assert set(choices.Status.__args__) == set(SolutionStatus)
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -391,8 +393,8 @@ def test_models_that_are_files_are_recorded_with_their_whole_path(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("hand.xml").write_text("")
-    assert commands.loadable("hand.xml") == str(tmp_path / "hand.xml")
-    assert commands.loadable("mug") == "mug"
+    assert loadable("hand.xml") == str(tmp_path / "hand.xml")
+    assert loadable("mug") == "mug"
 
 
 @pytest.fixture
