@@ -20,16 +20,16 @@ PACKAGES = ("kernels", "grasp")
 BRIEF = (
     "kernels",
     "mutation/few_planar.py",
-    "grasp/test_boxes.py",
-    "grasp/test_containment.py",
-    "grasp/test_depths.py",
+    "closing/test_link_bodies.py",
+    "closing/test_containment.py",
+    "closing/test_depths.py",
     "benchmarks/test_bench_peers.py",
 )
 WHOLE = (
-    *("solver/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),
-    *("kernels/test_pressing.py", "solver/test_close_by.py", "solver/test_orders.py"),
+    *("solver/batch/test_batch_of_small_hands.py", "closing/test_kernel_run.py", "mutation/few_width.py"),
+    *("kernels/toi/test_full_width.py", "solver/test_close_by.py", "solver/test_orders.py"),
 )
-STEP_TESTS = ("grasp", "solver", "kernels/test_warming.py")
+STEP_TESTS = ("grasp", "solver", "kernels/runtime/test_warming.py")
 
 
 def run_tests(files: Sequence[str], options: Sequence[str], data: Path) -> None:
@@ -89,7 +89,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         data = (asked.keep or Path(folder)).absolute() / "coverage"
         data.parent.mkdir(parents=True, exist_ok=True)
-        interpreted = ["-p", "interpreted", "--ignore=tests/kernels/test_warming.py", "--at-most"]
+        interpreted = ["-p", "interpreted", "--ignore=tests/kernels/runtime/test_warming.py", "--at-most"]
         run_tests(BRIEF, [*interpreted, str(asked.at_most)], data)
         run_tests(WHOLE, [*interpreted, str(10.0 * asked.at_most)], data)
         run_tests(STEP_TESTS, [], data)

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_drives import FAR
 
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.core.pose import Pose
@@ -20,6 +19,7 @@ from clench.execution.step_check import squeeze_overlap, step_overlap
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution
+from execution.simulation.test_simulated_actuators import FAR
 from handmade import make_contact, make_solution
 
 #: A thumb that is driven in is deeper than this at some way-point [m].
