@@ -13,24 +13,24 @@ from clench.apps.figures import film
 from clench.apps.figures.drawing.dots import covered, dotted
 from clench.core.exceptions import FileError
 from clench.solver.solution import GraspSolution
+from mug_grasp import MugGrasp
 
 ORANGE = np.array([0xD5, 0x5E, 0x00])
-POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 
 
 @pytest.fixture(scope="module")
-def hand() -> clench.Hand:
-    return clench.Hand.load("robonaut2")
+def hand(mug_grasp: MugGrasp) -> clench.Hand:
+    return mug_grasp.hand
 
 
 @pytest.fixture(scope="module")
-def mug() -> clench.GraspObject:
-    return clench.GraspObject.load("mug")
+def mug(mug_grasp: MugGrasp) -> clench.GraspObject:
+    return mug_grasp.mug
 
 
 @pytest.fixture(scope="module")
-def solution(hand: clench.Hand, mug: clench.GraspObject) -> GraspSolution:
-    return clench.solve(hand, mug, clench.GraspCommand(hand_pose=POSE, preshape="open", planes=1))
+def solution(mug_grasp: MugGrasp) -> GraspSolution:
+    return mug_grasp.solution
 
 
 def orange(image: np.ndarray) -> int:

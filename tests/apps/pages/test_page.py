@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import clench
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.apps.pages.packed_scene import Motion, packed_motion, packed_solid
 from clench.apps.pages.page import hand_page_html, page_html
@@ -21,25 +22,24 @@ from clench.core.exceptions import CommandError, FileError
 from clench.models.appearance import Solid, SolidKind
 from clench.models.mesh import TriangleMesh
 from clench.solver.solution import GraspSolution
+from mug_grasp import MugGrasp
 
-MUG_POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
 EVIL = "</script><script>document.title='broken'</script><img src=x onerror=alert(1)>&\u2028$title"
 
 
 @pytest.fixture(scope="module")
-def hand() -> clench.Hand:
-    return clench.Hand.load("robonaut2")
+def hand(mug_grasp: MugGrasp) -> clench.Hand:
+    return mug_grasp.hand
 
 
 @pytest.fixture(scope="module")
-def mug() -> clench.GraspObject:
-    return clench.GraspObject.load("mug")
+def mug(mug_grasp: MugGrasp) -> clench.GraspObject:
+    return mug_grasp.mug
 
 
 @pytest.fixture(scope="module")
-def solution(hand: clench.Hand, mug: clench.GraspObject) -> GraspSolution:
-    command = clench.GraspCommand(hand_pose=MUG_POSE, preshape="open", planes=1)
-    return clench.complete(clench.solve(hand, mug, command), hand, mug)
+def solution(mug_grasp: MugGrasp) -> GraspSolution:
+    return clench.complete(mug_grasp.solution, mug_grasp.hand, mug_grasp.mug)
 
 
 @pytest.fixture(scope="module")

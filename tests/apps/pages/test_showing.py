@@ -23,24 +23,22 @@ from clench.models import recent_scenes
 from clench.models.objects.obstacles import table
 from clench.planner.grasp_plan import GraspPlan
 from clench.solver.solution import GraspSolution
-
-POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
-COMMAND = clench.GraspCommand(hand_pose=POSE, preshape="open", planes=1)
+from mug_grasp import MugGrasp
 
 
 @pytest.fixture(scope="module")
-def hand() -> clench.Hand:
-    return clench.Hand.load("robonaut2")
+def hand(mug_grasp: MugGrasp) -> clench.Hand:
+    return mug_grasp.hand
 
 
 @pytest.fixture(scope="module")
-def mug() -> clench.GraspObject:
-    return clench.GraspObject.load("mug")
+def mug(mug_grasp: MugGrasp) -> clench.GraspObject:
+    return mug_grasp.mug
 
 
 @pytest.fixture(scope="module")
-def solution(hand: clench.Hand, mug: clench.GraspObject) -> GraspSolution:
-    return clench.solve(hand, mug, COMMAND)
+def solution(mug_grasp: MugGrasp) -> GraspSolution:
+    return mug_grasp.solution
 
 
 @pytest.fixture(scope="module")
@@ -100,9 +98,13 @@ def test_without_opengl_there_is_a_picture_and_no_warning(
 
 
 def test_a_table_is_known_after_a_solve_and_a_saved_solution_loads_its_models(
-    hand: clench.Hand, mug: clench.GraspObject, solution: GraspSolution, monkeypatch: pytest.MonkeyPatch
+    hand: clench.Hand,
+    mug: clench.GraspObject,
+    solution: GraspSolution,
+    monkeypatch: pytest.MonkeyPatch,
+    mug_grasp: MugGrasp,
 ) -> None:
-    beside = clench.solve(hand, mug.with_body(table(-0.01)), COMMAND)
+    beside = clench.solve(hand, mug.with_body(table(-0.01)), mug_grasp.command)
     assert len(pictures(str(beside._repr_html_()))) == 1
     monkeypatch.setattr(recent_scenes, "_scenes", type(recent_scenes._scenes)())
     assert len(pictures(str(solution._repr_html_()))) == 1
