@@ -1,4 +1,4 @@
-"""Measure which branches of kernels and grasp steps the tests take: ``cd tests && python -m branch_coverage``.
+"""Measure which branches of kernels and steps the tests take: ``cd tests && python -m branch_coverage``.
 
 Kernels are seen only while they run as Python (see `interpreted`), which is slow: for them a part of the tests runs,
 and tests that take longer than `--at-most` seconds of processor time are ended. The tests of the steps run with kernels
@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("kernels", "grasp")
+PACKAGES = ("kernels", "closing", "mechanics", "scoring")
 #: What holds the kernels in short tests, what does so in longer ones; and the steps.
 BRIEF = (
     "kernels",
@@ -29,7 +29,7 @@ WHOLE = (
     *("solver/batch/test_batch_of_small_hands.py", "closing/test_kernel_run.py", "mutation/few_width.py"),
     *("kernels/toi/test_full_width.py", "solver/test_close_by.py", "solver/test_orders.py"),
 )
-STEP_TESTS = ("grasp", "solver", "kernels/runtime/test_warming.py")
+STEP_TESTS = ("closing", "mechanics", "scoring", "solver", "kernels/runtime/test_warming.py")
 
 
 def run_tests(files: Sequence[str], options: Sequence[str], data: Path) -> None:

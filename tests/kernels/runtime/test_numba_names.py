@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from clench.kernels.closing.verdict import judge_pose
+from clench.kernels.closing.solve_poses import solve_poses
 from clench.kernels.runtime.kernel_cache import index_of
 
 ROOT = Path(__file__).parents[3]
@@ -101,7 +101,7 @@ def test_every_undocumented_attribute_is_listed_and_used() -> None:
 
 
 def test_a_kernel_has_what_its_cache_is_known_by() -> None:
-    index = index_of(judge_pose)
+    index = index_of(solve_poses)
     assert callable(index._load_index)
     assert isinstance(index._source_stamp, bytes)
 
