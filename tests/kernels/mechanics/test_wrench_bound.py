@@ -70,8 +70,10 @@ def test_nothing_is_promised_where_nothing_is_resisted():
     G, edges, faces, reach = around_a_ball(3, 0.5)
     caps, most = np.ones((1, 12)), np.ones(1)
     # One finger cannot balance; two of them exert no torque about the line between them without torsion.
-    assert resisted_ball(G[:, :4], edges[:1], faces[:1], reach[:1], caps[:, :4], most, 3) == 0.0
-    flat = G[:, [0, 1, 2, 3] * 3]
+    # Copies, as the kernel would be compiled anew for views.
+    one, few = np.ascontiguousarray(G[:, :4]), np.ascontiguousarray(caps[:, :4])
+    assert resisted_ball(one, edges[:1], faces[:1], reach[:1], few, most, 3) == 0.0
+    flat = np.ascontiguousarray(G[:, [0, 1, 2, 3] * 3])
     assert resisted_ball(flat, edges, faces, reach, caps, most, 3) == 0.0
     # Without caps there is no largest wrench.
     assert resisted_ball(G, edges, faces, reach, caps[:0], most[:0], 3) == np.inf

@@ -44,8 +44,8 @@ RUNTIME = sorted((ROOT / "src" / "clench" / "kernels" / "runtime").glob("*.py"))
 
 def undocumented_imports(path: Path) -> set[str]:
     """Return the names that a file imports from where the manual describes nothing."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found, text = set[str](), path.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(text)) if re.search("numba|llvmlite", text) else ():
         if isinstance(node, ast.ImportFrom) and re.match(r"llvmlite\b|numba\.(?!extending$|cuda$)", node.module or ""):
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Import):

@@ -189,8 +189,8 @@ def crowded():
 def test_what_does_not_fit_the_queue_is_met_as_well():
     """With room for two pairs in the queue, interpreted, as the room of compiled kernels is fixed."""
     code = (
-        "from clench.kernels.toi import toi_bodies; from kernels import test_body_sweep; "
-        "toi_bodies.QUEUE = 2; print(test_body_sweep.crowded())"
+        "from clench.kernels.toi import toi_bodies; from kernels.toi import test_toi_bodies; "
+        "toi_bodies.QUEUE = 2; print(test_toi_bodies.crowded())"
     )
     tests = str(Path(__file__).parents[2])
     path = os.pathsep.join([tests, *filter(None, [os.environ.get("PYTHONPATH")])])
