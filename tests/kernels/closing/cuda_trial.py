@@ -1,4 +1,4 @@
-"""Close fingers in the CUDA simulator and on the CPU; print whether the answers are the same. See `test_cuda_closing`."""
+"""Close fingers in the CUDA simulator and on the CPU; print whether the answers agree, for `test_cuda_closing`."""
 
 from __future__ import annotations
 
