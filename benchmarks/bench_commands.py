@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
-from clench.apps.cli.commands import Order, Source
+from clench.apps.cli.inputs.choices import Order, Source
 from clench.apps.cli.parsing import parse_call
 from clench.core.defaults import FRICTION, MASS
-from clench.core.errors import UnknownNameError
+from clench.core.exceptions import UnknownNameError
 
 from .bench_options import (
     Case,

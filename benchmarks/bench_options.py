@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import clench
-from clench.apps.cli.results import print_json
-from clench.core.errors import CommandError
+from clench.apps.cli.output.results import print_json
+from clench.core.exceptions import CommandError
 from clench.core.files.json_files import check_writable
-from clench.core.visible_text import visible
+from clench.core.showing.visible_text import visible
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
@@ -140,7 +140,7 @@ def at_least(least: int, **counts: int) -> None:
 def drawable(plot: Path | None) -> None:
     """Refuse a file that no picture can be written to, before anything is measured."""
     if plot is not None:
-        from clench.apps.figures.style import check_figure
+        from clench.apps.figures.drawing.style import check_figure
 
         check_figure(plot)
 

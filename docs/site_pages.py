@@ -110,7 +110,7 @@ def _relinked(markdown: str, source: str, uri: str) -> str:
 
 
 def _command_options() -> str:
-    from clench.apps.cli.commands import COMMANDS
+    from clench.apps.cli.command_table import COMMANDS
 
     return "".join(_command(name, command) for name, command in COMMANDS.items() if name != "bench")
 

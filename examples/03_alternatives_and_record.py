@@ -11,7 +11,8 @@ hand, bottle = clench.Hand.load("robonaut2"), clench.GraspObject.load("bottle")
 
 with clench.Record(folder / "record.sqlite") as record:
     for pose in clench.approach_poses(hand, bottle, count=5, seed=7):
-        command = clench.GraspCommand(hand_pose=pose, seed=7, check_sets=True)  # measure every set's penetration
+        # Measure every set's penetration; without a preshape, the sets of all preshapes would be measured.
+        command = clench.GraspCommand(hand_pose=pose, preshape="open", seed=7, check_sets=True)
         solution = clench.solve(hand, bottle, command, record=record)
     print(f"{len(record)} solves recorded")
     for entry in record.find(limit=5):

@@ -1,4 +1,4 @@
-"""Measure which branches of kernels and grasp steps the tests take: ``cd tests && python -m branch_coverage``.
+"""Measure which branches of kernels and steps the tests take: ``cd tests && python -m branch_coverage``.
 
 Kernels are seen only while they run as Python (see `interpreted`), which is slow: for them a part of the tests runs,
 and tests that take longer than `--at-most` seconds of processor time are ended. The tests of the steps run with kernels
@@ -15,21 +15,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("kernels", "grasp")
+PACKAGES = ("kernels", "closing", "mechanics", "scoring")
 #: What holds the kernels in short tests, what does so in longer ones; and the steps.
 BRIEF = (
     "kernels",
     "mutation/few_planar.py",
-    "grasp/test_boxes.py",
-    "grasp/test_containment.py",
-    "grasp/test_depths.py",
+    "closing/test_link_bodies.py",
+    "closing/test_containment.py",
+    "closing/test_depths.py",
     "benchmarks/test_bench_peers.py",
 )
 WHOLE = (
-    *("solver/test_batch_of_small_hands.py", "grasp/test_closing.py", "mutation/few_width.py"),
-    *("kernels/test_pressing.py", "solver/test_close_by.py", "solver/test_orders.py"),
+    *("solver/batch/test_batch_of_small_hands.py", "closing/test_kernel_run.py", "mutation/few_width.py"),
+    *("kernels/toi/test_full_width.py", "solver/test_close_by.py", "solver/test_orders.py"),
 )
-STEP_TESTS = ("grasp", "solver", "kernels/test_warming.py")
+STEP_TESTS = ("closing", "mechanics", "scoring", "solver", "kernels/runtime/test_warming.py")
 
 
 def run_tests(files: Sequence[str], options: Sequence[str], data: Path) -> None:
@@ -89,7 +89,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         data = (asked.keep or Path(folder)).absolute() / "coverage"
         data.parent.mkdir(parents=True, exist_ok=True)
-        interpreted = ["-p", "interpreted", "--ignore=tests/kernels/test_warming.py", "--at-most"]
+        interpreted = ["-p", "interpreted", "--ignore=tests/kernels/runtime/test_warming.py", "--at-most"]
         run_tests(BRIEF, [*interpreted, str(asked.at_most)], data)
         run_tests(WHOLE, [*interpreted, str(10.0 * asked.at_most)], data)
         run_tests(STEP_TESTS, [], data)

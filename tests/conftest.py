@@ -9,6 +9,7 @@ import pytest
 from clench.kernels.runtime.warming import announce, warm_up
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
+from mug_grasp import MugGrasp, make_mug_grasp
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 
@@ -44,6 +45,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def shared_data() -> Path:
     """Return the folder of real hands and objects."""
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def mug_grasp() -> MugGrasp:
+    """Return the grasp that tests of pictures, pages and scene files show."""
+    return make_mug_grasp()
 
 
 @pytest.fixture

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from clench.dataset.columns import COLUMNS
-from clench.dataset.generating import generate
-from clench.dataset.job import DatasetJob, job_from, read_job
-from clench.dataset.part_files import encode_part, sha256
-from clench.dataset.unit_run import UnitRecord, UnitResult
-from clench.dataset.units import Unit
+from clench.dataset.jobs.job import DatasetJob, job_from, read_job
+from clench.dataset.jobs.units import Unit
+from clench.dataset.running.generating import generate
+from clench.dataset.running.unit_run import UnitRecord, UnitResult
+from clench.dataset.storage.columns import COLUMNS
+from clench.dataset.storage.part_files import encode_part, sha256
 
 JOINTS = ("a", "b", "c")
 

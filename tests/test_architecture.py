@@ -14,11 +14,15 @@ from pathlib import Path
 
 import pytest
 
+import branch_coverage
 import clench
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "clench"
 BENCHMARKS = ROOT / "benchmarks"
+TESTS = ROOT / "tests"
+#: Tests that are not of one part of the package: oracles, other programs, malformed files, mistakes put in.
+OTHER_TESTS = {"benchmarks", "engine", "fuzz", "graspit", "hostile", "mutation", "oracle"}
 LAYERS = ["core", "kernels", "models", "mechanics", "closing", "scoring", "solver", "execution", "planner", "dataset"]
 LAYERS += ["apps"]
 #: Files that list public names by the modules that define them: imports in them are for type checkers alone.
@@ -33,7 +37,10 @@ SOURCES = [*FILES, *sorted(BENCHMARKS.rglob("*.py"))]
 KERNEL_FILES = [path for path in SOURCES if "kernels" in path.relative_to(ROOT).parent.parts]
 MAX_FILE_LINES = 400
 MAX_BODY_LINES = 60
-MAX_FOLDER_FILES = 15
+#: Of one folder, `__init__.py` among them.
+MAX_FOLDER_FILES = 16
+#: Folders that are still larger.
+LARGE_FOLDERS = {PACKAGE / "kernels" / name for name in ("closing", "sections", "toi")}
 
 
 def shown(path: Path) -> str:
@@ -174,16 +181,33 @@ def test_the_package_does_not_import_the_benchmarks() -> None:
     assert imports_of_benchmarks("from benchmarks.speed import solving", FILES[0])
 
 
-def test_benchmarks_have_names_of_their_own_in_small_folders() -> None:
-    everything = [*SOURCES, *(ROOT / "tests").rglob("*.py"), *(ROOT / "examples").rglob("*.py")]
-    count = Counter(path.name for path in everything)
-    mine = [path for path in SOURCES if path.is_relative_to(BENCHMARKS)]
+def names_twice(paths: Iterable[Path], among: Iterable[Path]) -> list[str]:
+    """Name the files whose name another file has, too."""
+    count = Counter(path.name for path in among)
+    return [f"{shown(p)}: {count[p.name]} files have this name" for p in paths if count[p.name] > 1]
+
+
+def large_folders(paths: Iterable[Path]) -> dict[Path, str]:
+    """Name the folders that have too many files."""
+    files = Counter(path.parent for path in paths)
+    return {path: f"{shown(path)} has {n} files" for path, n in files.items() if n > MAX_FOLDER_FILES}
+
+
+def test_no_two_files_share_a_name() -> None:
+    modules = [path for path in SOURCES if path.name != "__init__.py"]
+    assert len(modules) > 400
+    expect_none(names_twice(modules, modules))
+    # Programs of the benchmarks are also started by name, where tests and examples can be imported.
+    others = [*(ROOT / "tests").rglob("*.py"), *(ROOT / "examples").rglob("*.py")]
+    mine = [path for path in modules if path.is_relative_to(BENCHMARKS)]
     assert len(mine) > 20
-    expect_none(
-        f"{shown(path)} has a name twice" for path in mine if path.name != "__init__.py" and count[path.name] > 1
-    )
-    files = Counter(path.parent for path in mine)
-    expect_none(f"{shown(folder)} has {n} files" for folder, n in files.items() if n > MAX_FOLDER_FILES)
+    expect_none(names_twice(mine, [*mine, *others]))
+
+
+def test_folders_are_small() -> None:
+    large = large_folders(SOURCES)
+    expect_none(finding for folder, finding in large.items() if folder not in LARGE_FOLDERS)
+    expect_none(f"{shown(folder)} is small now, and no exception" for folder in LARGE_FOLDERS - set(large))
 
 
 def test_every_folder_is_a_layer() -> None:
@@ -241,6 +265,10 @@ def test_the_other_checks_see_what_they_look_for() -> None:
     assert not vague_names("", path)
     assert vague_names("", PACKAGE / "grasp" / "utils.py")
     assert vague_names("", PACKAGE / "common" / "x.py")
+    assert names_twice([path], [path, PACKAGE / "core" / "x.py"])
+    assert not names_twice([path], [path])
+    assert large_folders([path] * (MAX_FOLDER_FILES + 1))
+    assert not large_folders([path] * MAX_FOLDER_FILES)
 
 
 #: Compiled without counts of references.
@@ -298,11 +326,50 @@ def test_kernels_that_count_no_references_hand_out_no_arrays() -> None:
 
 def test_no_two_test_files_have_one_name() -> None:
     # Test folders are not packages, so pytest collects only one of two modules of the same name.
-    paths = sorted(Path(__file__).parent.rglob("test_*.py"))
+    paths = sorted(TESTS.rglob("test_*.py"))
     count = Counter(path.name for path in paths)
     expect_none(
         f"{shown(path)} has a name that occurs {count[path.name]} times" for path in paths if count[path.name] > 1
     )
+
+
+def mirrored(module: Path) -> list[Path]:
+    """Return where a test file of a module may be: in the folder of the same name, or above it."""
+    folder = module.relative_to(PACKAGE).parent
+    return [TESTS / each / f"test_{module.stem}.py" for each in (folder, *folder.parents)]
+
+
+def test_every_module_has_a_test_file_of_its_name_or_another_one_that_is_named() -> None:
+    table = tomllib.loads((TESTS / "tested_by.toml").read_text(encoding="utf-8"))
+    expect_none(f"tests/{name} does not exist" for name in table if not (TESTS / name).is_file())
+    listed = Counter(module for modules in table.values() for module in modules)
+    modules = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in FILES if path.stem != "__init__"}
+    own = {name for name, path in modules.items() if any(test.is_file() for test in mirrored(path))}
+    assert len(own) > 180
+    expect_none(
+        f"{name} has no test file, and is not in tests/tested_by.toml" for name in set(modules) - own - set(listed)
+    )
+    expect_none(f"tests/tested_by.toml: {name} has a test file" for name in own & set(listed))
+    expect_none(f"tests/tested_by.toml: there is no module {name}" for name in set(listed) - set(modules))
+    expect_none(f"tests/tested_by.toml: {name} is listed {n} times" for name, n in listed.items() if n > 1)
+
+
+def test_folders_of_tests_are_folders_of_the_package() -> None:
+    folders = {path.parent.relative_to(TESTS) for path in TESTS.rglob("test_*.py")}
+    assert len(folders) > 20
+    expect_none(
+        f"tests/{folder} has no folder in the package"
+        for folder in folders
+        if folder.parts and folder.parts[0] not in OTHER_TESTS and not (PACKAGE / folder).is_dir()
+    )
+
+
+def test_measured_branches_are_of_packages_and_tests_that_exist() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["tool"]["coverage"]["run"]["source"] == [f"src/clench/{name}" for name in branch_coverage.PACKAGES]
+    expect_none(f"{name} is no layer" for name in branch_coverage.PACKAGES if name not in LAYERS)
+    named = {*branch_coverage.BRIEF, *branch_coverage.WHOLE, *branch_coverage.STEP_TESTS}
+    expect_none(f"tests/{name} does not exist" for name in named if not (TESTS / name).exists())
 
 
 def test_python_never_imports_a_kernel_without_an_entry() -> None:
@@ -311,9 +378,11 @@ def test_python_never_imports_a_kernel_without_an_entry() -> None:
     assert "close_group" in inner
     callers = [path for path in SOURCES if path not in KERNEL_FILES]
     wrong = []
-    for path in [*callers, *Path(__file__).parent.rglob("*.py")]:
+    for path in [*callers, *TESTS.rglob("*.py")]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and "kernels" in (node.module or "").split("."):
+            if isinstance(node, ast.ImportFrom) and re.match(
+                r"(clench|benchmarks)\.(.*\.)?kernels\b", node.module or ""
+            ):
                 names = sorted(inner & {alias.name for alias in node.names})
                 wrong += [f"{shown(path)}:{node.lineno} imports {name}" for name in names]
     expect_none(wrong)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from clench.apps.cli.commands import Order
+from clench.apps.cli.inputs.choices import Order
 from clench.models.command import ClosingOrder
 
 ROOT = Path(__file__).parents[1]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import clench
-from clench.apps.cli.commands import COMMANDS
+from clench.apps.cli.command_table import COMMANDS
 from clench.execution.hardware.driver import MEMBERS
 from clench.models.command_file import KEYS, command_from_dict
 from clench.models.hand.findings import FindingCode

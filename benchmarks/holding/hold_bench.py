@@ -16,7 +16,7 @@ from clench.core.files.json_files import write_atomically, write_json
 from clench.execution.simulation.convex_pieces import in_pieces
 from clench.execution.simulation.hold import Hold, HoldTest
 from clench.execution.simulation.mujoco_scene import lowest
-from clench.mechanics.contact_kinds import GraspKind
+from clench.mechanics.grasp.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.obstacles import table

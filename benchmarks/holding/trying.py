@@ -15,7 +15,7 @@ from clench.execution.simulation.mujoco_scene import Scene, build_scene
 from clench.execution.simulation.pulling import hold_and_pull
 from clench.execution.simulation.simulated_hand import nearest
 from clench.execution.trajectory import plan_trajectory
-from clench.mechanics.contact_kinds import GraspKind
+from clench.mechanics.grasp.contact_kinds import GraspKind
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource

@@ -11,7 +11,7 @@ import numpy as np
 
 from clench.closing.collision.depths import hand_depths
 from clench.closing.collision.packed_object import PackedObject
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Finger, Hand
 from clench.models.mesh import TriangleMesh

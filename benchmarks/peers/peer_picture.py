@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.apps.figures.style import CHOSEN, CONTACT, FAINT, INK, JOINT_COLORS, PAPER, new_figure, save_figure
+from clench.apps.figures.drawing.style import CHOSEN, CONTACT, FAINT, INK, JOINT_COLORS, PAPER, new_figure, save_figure
 
 from ..bench_report import Value
 from .peer_sweep import FACTORS, Misses, Swept

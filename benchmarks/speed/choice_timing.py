@@ -13,7 +13,7 @@ from clench.closing.candidates import FingerCandidate
 from clench.models.command import GraspCommand
 from clench.scoring.calibration import Calibration
 from clench.scoring.choice import HandChoice, choose
-from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_types import ScoringContext
 from clench.solver.alternatives import finger_sets
 from clench.solver.problem import make_problem, make_setting
 

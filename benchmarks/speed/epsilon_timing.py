@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import clench
-from clench.apps.figures.style import CHOSEN, FAINT, INK, new_figure, save_figure
+from clench.apps.figures.drawing.style import CHOSEN, FAINT, INK, new_figure, save_figure
 from clench.core.pose import FloatArray
-from clench.mechanics.actuation import HoldingForces, least_effort
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.epsilon_quality import EDGES, epsilon, epsilon_bound
-from clench.mechanics.held import HeldObject, held_by_contacts
-from clench.mechanics.loads import six_pulls_and_twists, weight
-from clench.mechanics.squeeze import squeeze_forces
-from clench.mechanics.wrench_space import volume_l1
+from clench.mechanics.epsilon.epsilon_quality import EDGES, epsilon, epsilon_bound
+from clench.mechanics.epsilon.wrench_space import volume_l1
+from clench.mechanics.forces.actuation import HoldingForces, least_effort
+from clench.mechanics.forces.squeeze import squeeze_forces
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.held import HeldObject, held_by_contacts
+from clench.mechanics.grasp.loads import six_pulls_and_twists, weight
 from clench.solver.analysis.holding import hold
 
 from ..bench_report import BenchReport, describe_place, timed

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from clench.apps.figures.style import CHOSEN, CONTACT, FAINT, INK, JOINT_COLORS, new_figure, save_figure
+from clench.apps.figures.drawing.style import CHOSEN, CONTACT, FAINT, INK, JOINT_COLORS, new_figure, save_figure
 
 if TYPE_CHECKING:
     from .scaling import Axis

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from clench.core.display import register_display
 from clench.core.lazy_names import lazy_names
+from clench.core.showing.display import register_display
 
 if TYPE_CHECKING:
     from clench import criteria as criteria
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from clench.apps.pages.page import write_page
     from clench.closing.collision.approach import approach_poses
     from clench.closing.collision.self_check import check_hand
-    from clench.core.errors import ClenchError
+    from clench.core.exceptions import ClenchError
     from clench.core.pose import Pose
     from clench.execution.executing import execute
     from clench.execution.formats.exchange import export_grasps, import_grasps
@@ -50,7 +50,7 @@ __version__ = "0.1.0"
 
 # One documented path per name: the module that defines it. A test holds this equal to `__all__`.
 _HOMES = {
-    "ClenchError": "clench.core.errors",
+    "ClenchError": "clench.core.exceptions",
     "ClosingOrder": "clench.models.command",
     "GraspBatch": "clench.solver.batch.grasp_batch",
     "GraspCommand": "clench.models.command",

@@ -8,13 +8,13 @@ from clench.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from clench.scoring.calibration import Calibration, load_calibration
-    from clench.scoring.criteria import Criterion, HandCriterion
     from clench.scoring.criterion_registry import register_criterion
+    from clench.scoring.criterion_types import Criterion, HandCriterion
 
 _HOMES = {
     "Calibration": "clench.scoring.calibration",
-    "Criterion": "clench.scoring.criteria",
-    "HandCriterion": "clench.scoring.criteria",
+    "Criterion": "clench.scoring.criterion_types",
+    "HandCriterion": "clench.scoring.criterion_types",
     "load_calibration": "clench.scoring.calibration",
     "register_criterion": "clench.scoring.criterion_registry",
 }

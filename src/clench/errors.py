@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 from clench.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from clench.core.errors import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
+    from clench.core.exceptions import ClenchError, CommandError, FileError, HandError, ObjectError, UnknownNameError
     from clench.execution.hardware.driver import DriverError
 
 _HOMES = {
-    "ClenchError": "clench.core.errors",
-    "CommandError": "clench.core.errors",
+    "ClenchError": "clench.core.exceptions",
+    "CommandError": "clench.core.exceptions",
     "DriverError": "clench.execution.hardware.driver",
-    "FileError": "clench.core.errors",
-    "HandError": "clench.core.errors",
-    "ObjectError": "clench.core.errors",
-    "UnknownNameError": "clench.core.errors",
+    "FileError": "clench.core.exceptions",
+    "HandError": "clench.core.exceptions",
+    "ObjectError": "clench.core.exceptions",
+    "UnknownNameError": "clench.core.exceptions",
 }
 
 __all__ = [

@@ -8,7 +8,7 @@ from clench.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from clench.closing.collision.packed_object import set_object_cache
-    from clench.mechanics.contact_kinds import GraspKind
+    from clench.mechanics.grasp.contact_kinds import GraspKind
     from clench.models.hand.findings import Finding, FindingCode
     from clench.models.hand.hand import JointRole
     from clench.models.objects.grasp_object import Body, BodyRole
@@ -32,7 +32,7 @@ _HOMES = {
     "FindingCode": "clench.models.hand.findings",
     "FingerResult": "clench.solver.solution",
     "FingerStatus": "clench.solver.solution",
-    "GraspKind": "clench.mechanics.contact_kinds",
+    "GraspKind": "clench.mechanics.grasp.contact_kinds",
     "GraspSearch": "clench.planner.search",
     "JointRole": "clench.models.hand.hand",
     "PlannedGrasp": "clench.planner.grasp_plan",

@@ -15,7 +15,7 @@ from benchmarks.bench_report import BenchReport, describe_place
 from benchmarks.speed import choice_timing, solving
 from benchmarks.speed.answer_checks import Checked, Surface, check_answer, triangle_distances
 from clench.closing.kernel_run import empty_answers, run_stages, solve_packed
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.kernels.closing.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.scoring.calibration import calibration_of

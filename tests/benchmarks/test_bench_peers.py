@@ -19,7 +19,7 @@ from benchmarks.peers.peer_sweep import FACTORS, blade_misses, with_wires
 from benchmarks.peers.stepper import RULES, Stepper
 from chain_hands import one_link
 from clench.closing.collision.packed_object import pack_object
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.pose import Pose
 from clench.models.shapes import CollisionSource
 

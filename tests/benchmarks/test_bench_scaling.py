@@ -13,7 +13,7 @@ from benchmarks.bench_commands import main
 from benchmarks.speed import scaling
 from benchmarks.speed.refined import base_mesh, parted, refinements
 from benchmarks.speed.scaling import Axis
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.models.mesh import TriangleMesh
 
 SMALL = ["scaling", "--poses", "1", "--passes", "1", "--triangles", "16000", "--batch", "4", "--stream", "3"]

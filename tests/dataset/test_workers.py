@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from clench.dataset.generating import generate
-from clench.dataset.job import DatasetJob
-from clench.dataset.unit_run import UnitRecord
-from clench.dataset.workers import run_units
+from clench.dataset.jobs.job import DatasetJob
+from clench.dataset.running.generating import generate
+from clench.dataset.running.unit_run import UnitRecord
+from clench.dataset.running.workers import run_units
 
 pytestmark = pytest.mark.long
 

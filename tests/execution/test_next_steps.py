@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.execution.next_steps import Phase, moved_joints, plan_after_touch, plan_next_steps, squeeze_offsets
 from clench.execution.timing import ACCELERATION
 from clench.execution.trajectory import Trajectory, plan_trajectory

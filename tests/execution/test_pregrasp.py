@@ -11,7 +11,7 @@ import clench
 from clench.apps.cli.main import main
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.collision.reach import nearest_link
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import invert
 from clench.models.shapes import CollisionSource
 

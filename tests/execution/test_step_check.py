@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_drives import FAR
 
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.core.pose import Pose
 from clench.execution.executing import execute
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.next_steps import Phase, plan_next_steps
-from clench.execution.report import ExecutionReport
 from clench.execution.simulation.mujoco_scene import PREFIX, build_scene
 from clench.execution.simulation.simulated_hand import SimulatedHand
 from clench.execution.step_check import squeeze_overlap, step_overlap
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution
+from execution.simulation.test_simulated_actuators import FAR
 from handmade import make_contact, make_solution
 
 #: A thumb that is driven in is deeper than this at some way-point [m].

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.execution.timing import Profile, time_path
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import DEFAULT_SPEED, Coupling, Hand, Joint, JointRole
 from clench.solver.solution import GraspSolution

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fake_driver import FakeDriver
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.execution.hardware.hardware_hand import HardwareHand
 from clench.execution.next_steps import Phase
 from clench.execution.simulation.simulated_hand import SimulatedHand

@@ -11,9 +11,9 @@ from facing_fingers import crossing, facing_fingers
 
 import clench
 from clench.closing.collision.path_check import find_path_overlap
-from clench.core.errors import MotionError
+from clench.core.exceptions import MotionError
 from clench.execution.executing import execute
-from clench.execution.report import ExecutionReport
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource

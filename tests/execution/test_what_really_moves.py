@@ -10,7 +10,7 @@ from facing_fingers import crossing, facing_fingers
 
 from chain_hands import HandBuilder, along_x, mount
 from clench.closing.collision.path_check import find_path_overlap, place_object
-from clench.core.errors import MotionError
+from clench.core.exceptions import MotionError
 from clench.core.pose import Pose
 from clench.execution.hardware.joint_blocking import modelled_blocker
 from clench.execution.step_check import told_overlap

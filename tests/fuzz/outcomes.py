@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 
 #: No input may take longer [s].
 SLOW = 60.0

@@ -162,7 +162,7 @@ READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in (*_
 
 def _in_child(read: Callable[[str], None], path: str, place: int) -> None:
     """Read a file under limits, and end this process with the exit code that the command line would give."""
-    from clench.core.errors import ClenchError
+    from clench.core.exceptions import ClenchError
 
     os.dup2(place, 1)
     os.dup2(place, 2)
@@ -217,8 +217,8 @@ def serve() -> None:
     import tyro  # noqa: F401
 
     import clench
-    import clench.models.hand.loading
-    import clench.models.objects.loading
+    import clench.models.hand.hand_loading
+    import clench.models.objects.object_loading
 
     clench.Hand.load("patent15")
     asked: list[Any] = [json.loads(line) for line in sys.stdin]

@@ -193,7 +193,7 @@ def _peak() -> Iterator[int]:
 
 
 def _outcome(original: Original, path: Path) -> tuple[str, str]:
-    from clench.core.errors import ClenchError
+    from clench.core.exceptions import ClenchError
 
     try:
         with warnings.catch_warnings():

@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 
 from .good_files import KINDS, originals
 from .mutants import Report, mutant, run

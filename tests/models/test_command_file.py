@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_hand import small_hand
 
-from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.exceptions import CommandError, FileError, UnknownNameError
 from clench.core.pose import Pose
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.command_file import KEYS, check_command, command_from_dict, command_to_dict, load_command
 from clench.models.shapes import CollisionSource
+from models.small_hand import small_hand
 
 POSE = {"position": [0.0, 0.1, 0.2], "wxyz": [1, 0, 0, 0]}
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from small_hand import small_hand
 
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.core.pose import Pose
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command
+from models.small_hand import small_hand
 
 POSE = Pose([0.1, 0.2, 0.3], [0, 1, 0, 0])
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.topology import edge_defects

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.planner.confidence import LEVEL, ConfidenceTable, shipped_table
 
 OUTCOMES = st.lists(st.tuples(st.floats(0.0, 1.0), st.booleans()), min_size=1, max_size=400)

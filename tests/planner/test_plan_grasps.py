@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import CommandError, ObjectError, UnknownNameError
+from clench.core.exceptions import CommandError, ObjectError, UnknownNameError
 from clench.execution.simulation.hold import Hold
 from clench.execution.simulation.pulling import hold_and_pull
 from clench.models.objects.obstacles import table

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 
 POINTS = np.array([[0.0, 0.0, 0.0], [0.5, 0.5, 0.5], [1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
 

@@ -12,7 +12,7 @@ import pytest
 import clench
 from clench.closing import packed_problem
 from clench.closing.packed_problem import pack_problem
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 from clench.scoring import criterion_registry
 from clench.solver import alternatives, pose_solver

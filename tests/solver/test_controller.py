@@ -8,7 +8,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, one_link, three_links, turned
-from clench.core.errors import CommandError, HandError, UnknownNameError
+from clench.core.exceptions import CommandError, HandError, UnknownNameError
 from clench.core.pose import Pose
 
 BALL = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.045, 0.004, 0.035]))

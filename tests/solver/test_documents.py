@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.core.errors import ClenchError, FileError
+from clench.core.exceptions import ClenchError, FileError
 from clench.core.files.json_files import write_atomically
 from clench.core.pose import Pose
 from clench.models.hand.reading.extremes import LARGEST_ANGLE

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from images import mirrored_hand, mirrored_object, mirrored_pose, scaled_hand, scaled_object, scaled_pose
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, turned
 from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
+from solver.images import mirrored_hand, mirrored_object, mirrored_pose, scaled_hand, scaled_object, scaled_pose
 
 EXACT = 1e-9
 HANDS = {

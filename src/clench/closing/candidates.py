@@ -15,7 +15,7 @@ from clench.closing.collision.object_surface import object_surface
 from clench.closing.collision.packed_object import PackedObject
 from clench.core.pose import FloatArray
 from clench.core.tolerances import PASSED_GAP
-from clench.mechanics.contacts import without_repeats
+from clench.mechanics.grasp.contacts import without_repeats
 from clench.models.hand.hand import Hand
 
 from .finger_plan import FingerPlan

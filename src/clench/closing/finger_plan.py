@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray, invert
 from clench.core.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Finger, Hand, JointRole

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from clench.closing.collision.packed_object import ROUND_POLYHEDRA, SWEEP_DEVIATION, PackedObject, shape_elements
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource, ShapeKind

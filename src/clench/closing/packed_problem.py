@@ -17,7 +17,7 @@ from clench.closing.collision.containment import link_within_link
 from clench.closing.collision.depths import link_mesh_arrays, mesh_mask, object_mesh
 from clench.closing.collision.object_surface import object_surface, round_arrays
 from clench.closing.collision.packed_object import PackedObject
-from clench.core.keeping import kept_while_alive
+from clench.core.caching.keeping import kept_while_alive
 from clench.models.hand.hand import Finger
 
 from .finger_links import pack_finger_links

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from clench.closing.collision.depths import LinkDepth, hand_depths, link_mesh_arrays, mesh_mask
 from clench.closing.collision.packed_object import PackedObject
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.models.hand.hand import Hand

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from .errors import CommandError
+from .exceptions import CommandError
 
 #: Ways to make an object of each public type, by the name of the type.
 _MADE_BY: Final = {

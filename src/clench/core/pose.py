@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import CommandError
+from .exceptions import CommandError
 from .numbers import real_array
 from .tolerances import LARGEST_LENGTH, QUATERNION_NORM
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import CommandError
+from .exceptions import CommandError
 from .numbers import real_array
 from .pose import FloatArray, Pose, quaternions_from_rotations
 from .tolerances import LARGEST_LENGTH, QUATERNION_NORM

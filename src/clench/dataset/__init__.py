@@ -5,39 +5,31 @@ Names are imported when first used: pyarrow, h5py and Ray belong to extras.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from clench.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from .exporting import export
-    from .generating import generate
-    from .job import DatasetJob
-    from .merging import merge
-    from .ray_driver import generate_on_ray
-    from .reading import GraspDataset, open
-    from .shards import Shard
+    from clench.dataset.access.exporting import export
+    from clench.dataset.access.reading import GraspDataset, open
+    from clench.dataset.jobs.job import DatasetJob
+    from clench.dataset.jobs.shards import Shard
+    from clench.dataset.ray_driver import generate_on_ray
+    from clench.dataset.running.generating import generate
+    from clench.dataset.storage.merging import merge
 
 _HOMES = {
-    "DatasetJob": "job",
-    "GraspDataset": "reading",
-    "Shard": "shards",
-    "export": "exporting",
-    "generate": "generating",
-    "generate_on_ray": "ray_driver",
-    "merge": "merging",
-    "open": "reading",
+    "DatasetJob": "clench.dataset.jobs.job",
+    "GraspDataset": "clench.dataset.access.reading",
+    "Shard": "clench.dataset.jobs.shards",
+    "export": "clench.dataset.access.exporting",
+    "generate": "clench.dataset.running.generating",
+    "generate_on_ray": "clench.dataset.ray_driver",
+    "merge": "clench.dataset.storage.merging",
+    "open": "clench.dataset.access.reading",
 }
 
 __all__ = ["DatasetJob", "GraspDataset", "Shard", "export", "generate", "generate_on_ray", "merge", "open"]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'clench.dataset' has no attribute {name!r}; it has: {', '.join(__all__)}")
-    value = getattr(importlib.import_module(f"clench.dataset.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = lazy_names(__name__, _HOMES)

@@ -12,13 +12,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import ClenchError, CommandError
+from clench.core.exceptions import ClenchError, CommandError
 
-from .generating import GenerateReport, Told, generate
-from .job import DatasetJob, job_from, read_job
-from .unit_run import UnitRecord, UnitResult, run_unit
-from .units import Unit
-from .workers import THREADS, TRIES
+from .jobs.job import DatasetJob, job_from, read_job
+from .jobs.units import Unit
+from .running.generating import GenerateReport, Told, generate
+from .running.unit_run import UnitRecord, UnitResult, run_unit
+from .running.workers import THREADS, TRIES
 
 #: Units that are handed out per core of the cluster, so that none waits.
 _AHEAD: Final = 2

@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from clench.execution.drivers.orca import OrcaDriver
     from clench.execution.drivers.ros2 import Ros2Driver
     from clench.execution.executing import Executor, execute
+    from clench.execution.execution_report import ExecutionReport
     from clench.execution.hardware.driver import DriverError, DriverLimits, HandDriver, HandState, JointPath
     from clench.execution.hardware.hardware_hand import HardwareHand
     from clench.execution.hardware.joint_map import JointMap
     from clench.execution.hardware.ready_signal import ReadySignal
     from clench.execution.history import ExecutionHistory
     from clench.execution.pregrasp import plan_pregrasp
-    from clench.execution.report import ExecutionReport
     from clench.execution.simulation.convex_pieces import in_pieces
     from clench.execution.simulation.filming import Film
     from clench.execution.simulation.hold import Hold, HoldReport
@@ -28,7 +28,7 @@ _HOMES = {
     "DriverError": "clench.execution.hardware.driver",
     "DriverLimits": "clench.execution.hardware.driver",
     "ExecutionHistory": "clench.execution.history",
-    "ExecutionReport": "clench.execution.report",
+    "ExecutionReport": "clench.execution.execution_report",
     "Executor": "clench.execution.executing",
     "Film": "clench.execution.simulation.filming",
     "HandDriver": "clench.execution.hardware.driver",

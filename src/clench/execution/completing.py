@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from clench.core.defaults import MASS
-from clench.mechanics.contacts import ContactModel
+from clench.mechanics.grasp.contacts import ContactModel
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.analysis.quality import grasp_quality

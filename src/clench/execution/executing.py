@@ -9,13 +9,13 @@ import numpy as np
 
 from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError, MotionError, UnknownNameError
+from clench.core.exceptions import CommandError, MotionError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution
 
-from .report import ExecutionReport
+from .execution_report import ExecutionReport
 from .trajectory import Trajectory, plan_trajectory
 from .trajectory_checks import ROUNDING
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from clench.core.pose import FloatArray
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from clench.core.pose import FloatArray
-from clench.mechanics.contacts import make_contacts
-from clench.mechanics.jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
+from clench.mechanics.grasp.contacts import make_contacts
+from clench.mechanics.grasp.jacobian import DegreesOfFreedom, degrees_of_freedom, hand_jacobian
 from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import Contact, GraspSolution

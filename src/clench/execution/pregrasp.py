@@ -9,7 +9,7 @@ import numpy as np
 
 from clench.closing.collision.path_check import find_path_overlap
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError, MotionError
+from clench.core.exceptions import CommandError, MotionError
 from clench.core.pose import FloatArray, invert
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject

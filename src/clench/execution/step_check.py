@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from clench.closing.collision.path_check import PlacedObject, find_path_overlap, place_object
-from clench.core.errors import MotionError
+from clench.core.exceptions import MotionError
 from clench.core.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

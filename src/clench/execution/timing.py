@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
 
 #: Default largest acceleration of a joint [rad/s²]: models do not state one.

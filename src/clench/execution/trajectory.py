@@ -10,10 +10,10 @@ import msgspec
 import numpy as np
 
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.json_files import non_finite_path, read_json, write_json
 from clench.core.pose import FloatArray
-from clench.core.short_repr import described
+from clench.core.showing.short_repr import described
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution

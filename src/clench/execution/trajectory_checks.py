@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.pose import FloatArray
 from clench.models.hand.reading.extremes import LARGEST_ANGLE
 from clench.solver.preshapes.named_angles import posture

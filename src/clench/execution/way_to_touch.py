@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from clench.closing.collision.path_check import PathOverlap, find_path_overlap
-from clench.core.errors import MotionError
+from clench.core.exceptions import MotionError
 from clench.core.pose import FloatArray
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import Hand, JointRole

@@ -11,7 +11,7 @@ from typing import Any
 
 from clench.core.argument_types import check_type
 from clench.core.pose import FloatArray, Pose
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 from clench.models.hand.hand import Hand
 
 from .shapes import CollisionSource

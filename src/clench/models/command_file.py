@@ -14,7 +14,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.file_bytes import expanded, read_file
 from clench.core.files.file_limits import COMMAND_ITEMS, COMMAND_SETS, JSON_BYTES
 from clench.core.files.nesting import TOO_DEEP, is_too_deep

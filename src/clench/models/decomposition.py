@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand, JointRole
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clench.core.pose import FloatArray, Pose
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 IntArray = NDArray[np.int64]
 

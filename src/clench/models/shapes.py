@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from clench.core.pose import Pose
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 from .mesh import TriangleMesh
 

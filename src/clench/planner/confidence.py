@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.json_files import read_json
 from clench.core.pose import FloatArray
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import MotionError
+from clench.core.exceptions import MotionError
 from clench.core.pose import FloatArray, Pose
 from clench.execution.trajectory import plan_trajectory
-from clench.mechanics.contacts import ContactModel
-from clench.mechanics.epsilon_quality import epsilon
+from clench.mechanics.epsilon.epsilon_quality import epsilon
+from clench.mechanics.grasp.contacts import ContactModel
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clench.core import display
-from clench.core.display import Displayed
 from clench.core.pose import Pose
+from clench.core.showing import display
+from clench.core.showing.display import Displayed
 from clench.execution.trajectory import Trajectory
-from clench.mechanics.contact_kinds import GraspKind
+from clench.mechanics.grasp.contact_kinds import GraspKind
 from clench.models.command import GraspCommand
 from clench.solver.analysis.squeezing import SqueezePlan
 from clench.solver.solution import GraspSolution

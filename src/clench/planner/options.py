@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clench.core.defaults import MASS
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.core.pose import FloatArray, checked_vector
-from clench.mechanics.contact_kinds import GraspKind
-from clench.mechanics.contacts import DEFAULT_TORSION, ContactModel, friction_range
-from clench.mechanics.loads import check_loads, mass_range
+from clench.mechanics.grasp.contact_kinds import GraspKind
+from clench.mechanics.grasp.contacts import DEFAULT_TORSION, ContactModel, friction_range
+from clench.mechanics.grasp.loads import check_loads, mass_range
 from clench.models.hand.hand import Hand
 
 from .regions import Region

@@ -8,7 +8,7 @@ import numpy as np
 
 from clench.closing.collision.approach import GraspableSurface
 from clench.closing.collision.packed_object import PackedObject
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.pose import FloatArray
 from clench.models.objects.grasp_object import GraspObject
 

@@ -8,9 +8,9 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, checked_vector
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray, Pose, invert, quaternions_from_rotations
-from clench.mechanics.batch_bounds import epsilon_bounds
-from clench.mechanics.contact_kinds import KINDS, GraspKind, contact_kinds
-from clench.mechanics.contacts import ContactModel, pair_friction
+from clench.mechanics.epsilon.batch_bounds import epsilon_bounds
+from clench.mechanics.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
+from clench.mechanics.grasp.contacts import ContactModel, pair_friction
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand

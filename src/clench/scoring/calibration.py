@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.errors import ClenchError, CommandError, FileError, UnknownNameError
+from clench.core.exceptions import ClenchError, CommandError, FileError, UnknownNameError
 from clench.core.files.toml_files import read_toml
 from clench.core.pose import FloatArray
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 from .criterion_registry import check_numbers, find_criterion
 

@@ -14,7 +14,6 @@ from clench.core.pose import FloatArray
 
 from .calibration import Calibration
 from .combinations import Ceilings, Combination, best_combination
-from .criteria import ScoringContext
 from .criterion_registry import (
     bound_hand,
     find_criterion,
@@ -25,6 +24,7 @@ from .criterion_registry import (
     score_hand,
     score_sets,
 )
+from .criterion_types import ScoringContext
 
 #: Tiers that rank one set before another regardless of the scores, strongest first; as `tier` lists them.
 TIERS = (

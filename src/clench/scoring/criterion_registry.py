@@ -11,10 +11,10 @@ from typing import Final, TypeGuard
 import numpy as np
 
 from clench.closing.candidates import FingerCandidate
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.core.pose import FloatArray
 
-from .criteria import Criterion, HandCriterion, ScoringContext
+from .criterion_types import Criterion, HandCriterion, ScoringContext
 from .finger_criteria import (
     Clearance,
     LimitDistance,

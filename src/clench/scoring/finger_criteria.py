@@ -9,13 +9,13 @@ import numpy as np
 from clench.closing.candidates import FingerCandidate
 from clench.closing.collision.reach import nearest_link, obstacle_body
 from clench.closing.finger_plan import FingerPlan
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import Pose
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import BodyRole
 
 from .closing_stages import closing_stages
-from .criteria import ScoringContext, own_angles
+from .criterion_types import ScoringContext, own_angles
 from .pose_change import PoseChange
 
 #: More clearance than this is no better [m].

@@ -13,16 +13,16 @@ import numpy as np
 
 from clench.closing.candidates import FingerCandidate, combined_posture
 from clench.core.pose import FloatArray
-from clench.mechanics.actuation import Effort, least_effort
-from clench.mechanics.alternative_wrenches import AlternativeWrenches
-from clench.mechanics.contacts import ContactSet, make_contacts, pair_friction
-from clench.mechanics.epsilon_quality import EDGES
-from clench.mechanics.held import HeldObject, held_by_contacts, held_by_hand
-from clench.mechanics.loads import GRAVITY, gravity_any_direction, six_pulls, task_wrench, weight
-from clench.mechanics.wrench_space import epsilon_l1
+from clench.mechanics.epsilon.alternative_wrenches import AlternativeWrenches
+from clench.mechanics.epsilon.epsilon_quality import EDGES
+from clench.mechanics.epsilon.wrench_space import epsilon_l1
+from clench.mechanics.forces.actuation import Effort, least_effort
+from clench.mechanics.grasp.contacts import ContactSet, make_contacts, pair_friction
+from clench.mechanics.grasp.held import HeldObject, held_by_contacts, held_by_hand
+from clench.mechanics.grasp.loads import GRAVITY, gravity_any_direction, six_pulls, task_wrench, weight
 from clench.models.objects.mass import mass_properties
 
-from .criteria import ScoringContext
+from .criterion_types import ScoringContext
 
 #: Key of the directions in which judged sets were weakest.
 _WEAKEST: Final = "weakest"

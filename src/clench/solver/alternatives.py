@@ -13,12 +13,12 @@ from clench.closing.hand_plan import HandPlan
 from clench.closing.kernel_run import close_items, row_of
 from clench.closing.packed_problem import PackedProblem, Terms, pack_problem
 from clench.closing.start_blocking import start_overlaps
-from clench.core.deferring import once
+from clench.core.caching.deferring import once
 from clench.models.command import ClosingOrder
 from clench.scoring.calibration import Calibration
 from clench.scoring.choice import HandChoice, choose
-from clench.scoring.criteria import ScoringContext
 from clench.scoring.criterion_registry import ALWAYS, is_built_in, score_hand
+from clench.scoring.criterion_types import ScoringContext
 from clench.scoring.explaining import explain_choice
 
 from .planning import plan_hand

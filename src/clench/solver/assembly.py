@@ -14,7 +14,7 @@ from clench.closing.collision.depths import LinkDepth, retreat_distance
 from clench.closing.collision.object_surface import nearest_body
 from clench.closing.collision.packed_object import hash_hand
 from clench.closing.motion import asked_fingers, decompose
-from clench.core.deferring import DeferredMapping
+from clench.core.caching.deferring import DeferredMapping
 from clench.core.pose import FloatArray, Pose
 from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.models.command import ClosingOrder, GraspCommand

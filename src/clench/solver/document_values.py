@@ -9,7 +9,7 @@ from typing import Any, NoReturn, TypeVar
 import msgspec
 import numpy as np
 
-from clench.core.errors import ClenchError, FileError
+from clench.core.exceptions import ClenchError, FileError
 from clench.core.pose import Pose
 
 _T = TypeVar("_T")

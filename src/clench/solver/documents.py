@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.json_files import encode_document, non_finite_path, read_json, write_json
 from clench.core.pose import Pose
 from clench.models.hand.reading.extremes import LARGEST_ANGLE

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.scoring.criterion_registry import find_criterion, is_of_hand
 from clench.scoring.explaining import say_what_decided

@@ -9,7 +9,7 @@ from typing import Final
 from clench.closing.finger_plan import FingerPlan, closing_joints, plan_finger
 from clench.closing.hand_plan import HandPlan, make_hand_plan
 from clench.closing.motion import alternatives, asked_fingers
-from clench.core.errors import CommandError, HandError
+from clench.core.exceptions import CommandError, HandError
 from clench.models.command import GraspCommand
 
 from .problem import Problem

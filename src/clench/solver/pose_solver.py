@@ -8,7 +8,7 @@ from functools import partial
 
 from clench.closing.candidates import FingerCandidate, held_touches, read_candidates
 from clench.closing.kernel_run import Answers, row_of, solve_packed
-from clench.core.deferring import DeferredMapping, once
+from clench.core.caching.deferring import DeferredMapping, once
 from clench.models.command import GraspCommand
 from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand

@@ -10,14 +10,14 @@ import numpy as np
 from clench.closing.collision.packed_object import PackedObject, pack_object
 from clench.closing.collision.sizes import warn_of_size
 from clench.closing.motion import next_postures, palm_pose, task_wrenches
-from clench.core.errors import ObjectError, UnknownNameError
+from clench.core.exceptions import ObjectError, UnknownNameError
 from clench.core.pose import FloatArray, Pose
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
 from clench.scoring.calibration import Calibration
-from clench.scoring.criteria import ScoringContext
+from clench.scoring.criterion_types import ScoringContext
 
 from .checked_command import checked
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.core import display
-from clench.core.deferring import DeferredMapping, LateFields
-from clench.core.display import Displayed
+from clench.core.caching.deferring import DeferredMapping, LateFields
 from clench.core.pose import FloatArray, Pose
-from clench.core.short_repr import described, short_repr
+from clench.core.showing import display
+from clench.core.showing.display import Displayed
+from clench.core.showing.short_repr import described, short_repr
 
 if TYPE_CHECKING:
     from clench.models.hand.hand import Hand

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.deferring import DeferredMapping
+from clench.core.caching.deferring import DeferredMapping
 from clench.core.tolerances import ALLOWED_PENETRATION, CONTACT_OVERLAP, PASSED_GAP
 
 from .solution import Contact, FingerResult, FingerStatus, GraspSolution

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.apps.viewer.live_session import LiveSession
 from clench.apps.viewer.serving import OpenPage, serve
+from clench.apps.viewer.session.live_session import LiveSession
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = [

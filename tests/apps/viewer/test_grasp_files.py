@@ -12,10 +12,10 @@ import pytest
 import clench
 from clench import ClenchError, FileError
 from clench.apps.cli.main import main
-from clench.apps.viewer.grasp_files import GraspFiles, same_command
-from clench.apps.viewer.live_session import LiveSession
+from clench.apps.viewer.grasps.grasp_files import GraspFiles, same_command
+from clench.apps.viewer.grasps.planned_list import plan_list
 from clench.apps.viewer.opening import Given, open_list, open_session
-from clench.apps.viewer.planned_list import plan_list
+from clench.apps.viewer.session.live_session import LiveSession
 
 
 def reader(hand: str | None = None, object: str | None = None) -> GraspFiles:

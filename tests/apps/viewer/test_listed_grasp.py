@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from clench import GraspCommand, Pose
-from clench.apps.viewer.listed_grasp import ANY, GraspFilter, ListedGrasp, words_of
+from clench.apps.viewer.grasps.listed_grasp import ANY, GraspFilter, ListedGrasp, words_of
 
 
 def grasp(name: str, **known: Any) -> ListedGrasp:

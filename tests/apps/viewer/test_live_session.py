@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import clench
-from clench.apps.viewer.live_session import LiveSession
 from clench.apps.viewer.opening import Given, open_session
-from clench.apps.viewer.view_state import Ask, ViewState
+from clench.apps.viewer.session.live_session import LiveSession
+from clench.apps.viewer.session.view_state import Ask, ViewState
 
 #: A grasp of the built-in hand on the mug.
 GOOD_POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import clench
-from clench.apps.viewer.motion_player import MotionPlayer
-from clench.apps.viewer.motion_track import LIFT, Frame, MotionTrack, Recorder, planned_track
+from clench.apps.viewer.motion.motion_player import MotionPlayer
+from clench.apps.viewer.motion.motion_track import LIFT, Frame, MotionTrack, Recorder, planned_track
 from clench.apps.viewer.opening import Given, open_session
-from clench.apps.viewer.play_panel import hold_text
-from clench.apps.viewer.settled_answer import SettledAnswer
+from clench.apps.viewer.panels.play_panel import hold_text
+from clench.apps.viewer.session.settled_answer import SettledAnswer
 from clench.execution.simulation.hold import Hold
 from clench.execution.simulation.pulling import hold_and_pull
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from clench.apps.viewer.newest_wins import NewestWins
+from clench.apps.viewer.session.newest_wins import NewestWins
 
 
 def test_what_was_asked_in_between_is_dropped() -> None:

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 import clench
-from clench.apps.viewer.camera_place import good_view
-from clench.apps.viewer.contact_marks import cone_lines
-from clench.apps.viewer.drawn_meshes import MOST_OF_BODY, drawn
-from clench.apps.viewer.film_strip import score_colors
-from clench.apps.viewer.finger_pull import find_pull
 from clench.apps.viewer.opening import Given, open_session
-from clench.apps.viewer.plane_panel import plane_picture
-from clench.apps.viewer.quick_answer import QuickAnswer
-from clench.apps.viewer.scene_code import scene_code
-from clench.apps.viewer.settled_answer import SettledAnswer
-from clench.apps.viewer.status_card import answer_card, failed_card
-from clench.apps.viewer.weights_panel import comparison
+from clench.apps.viewer.panels.plane_panel import plane_picture
+from clench.apps.viewer.panels.status_card import answer_card, failed_card
+from clench.apps.viewer.panels.weights_panel import comparison
+from clench.apps.viewer.scene.camera_place import good_view
+from clench.apps.viewer.scene.contact_marks import cone_lines
+from clench.apps.viewer.scene.drawn_meshes import MOST_OF_BODY, drawn
+from clench.apps.viewer.scene.film_strip import score_colors
+from clench.apps.viewer.scene.finger_pull import find_pull
+from clench.apps.viewer.session.quick_answer import QuickAnswer
+from clench.apps.viewer.session.scene_code import scene_code
+from clench.apps.viewer.session.settled_answer import SettledAnswer
 
 #: A grasp of the built-in hand on the mug.
 GOOD_POSE = clench.Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clench import ClosingOrder, GraspCommand, Pose
-from clench.apps.viewer.view_state import History, ViewState
+from clench.apps.viewer.session.view_state import History, ViewState
 
 
 def state(x: float = 0.0) -> ViewState:

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import clench
-from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.exceptions import CommandError, FileError, UnknownNameError
 from clench.core.pose import Pose
 from clench.execution.formats.exchange import GraspFormat, export_grasps, import_grasps
 from clench.execution.formats.grasp_posture import GraspPosture

@@ -15,7 +15,7 @@ from six_directions import Settings, holds, read_grasp
 
 import clench
 from clench.apps.cli.main import main
-from clench.core.errors import CommandError, UnknownNameError
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.execution.formats.inert_pickle import NotNumbers, read_pickled_arrays
 from hostile.data import Forged, forged_dtype, pickled
 

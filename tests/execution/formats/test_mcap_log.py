@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
+from clench.execution.execution_report import ExecutionReport, JointReached
 from clench.execution.formats import mcap_log
 from clench.execution.formats.mcap_log import write_log
 from clench.execution.history import ExecutionHistory
-from clench.execution.report import ExecutionReport, JointReached
 from clench.solver.solution import GraspSolution
 
 pytest.importorskip("mcap_ros2", reason="needs mcap-ros2-support")

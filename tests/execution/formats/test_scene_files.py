@@ -12,34 +12,28 @@ import pytest
 
 import clench
 from clench.apps.cli.main import main
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.pose import FloatArray
 from clench.execution.formats.scene_files import grasp_line, posed_scene
 from clench.execution.formats.scene_glb import Y_UP
 from clench.models.objects.obstacles import table
 from clench.solver.solution import GraspSolution
-
-COMMAND = clench.GraspCommand(
-    hand_pose=clench.Pose([0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5]),
-    object_pose=clench.Pose([0.1, 0.0, 0.0], rpy=[0.0, 0.0, 0.1]),
-    preshape="open",
-    planes=1,
-)
+from mug_grasp import MugGrasp
 
 
 @pytest.fixture(scope="module")
-def hand() -> clench.Hand:
-    return clench.Hand.load("robonaut2")
+def hand(mug_grasp: MugGrasp) -> clench.Hand:
+    return mug_grasp.hand
 
 
 @pytest.fixture(scope="module")
-def mug() -> clench.GraspObject:
-    return clench.GraspObject.load("mug")
+def mug(mug_grasp: MugGrasp) -> clench.GraspObject:
+    return mug_grasp.mug
 
 
 @pytest.fixture(scope="module")
-def solution(hand: clench.Hand, mug: clench.GraspObject) -> GraspSolution:
-    return clench.solve(hand, mug, COMMAND)
+def solution(mug_grasp: MugGrasp) -> GraspSolution:
+    return mug_grasp.solution
 
 
 @pytest.fixture(scope="module")
@@ -131,13 +125,13 @@ def test_openusd_reads_hand_object_contacts_and_grasp_line(
 
 
 def test_names_that_usd_does_not_allow_are_told_apart(
-    hand: clench.Hand, mug: clench.GraspObject, solution: GraspSolution, tmp_path: Path, pxr: Any
+    hand: clench.Hand, mug: clench.GraspObject, solution: GraspSolution, tmp_path: Path, pxr: Any, mug_grasp: MugGrasp
 ) -> None:
     from pxr import Usd
 
     bodies = tuple(replace(table(-0.1 * k), name=name) for k, name in enumerate(("2 b", "2 b", "grasp_identifier"), 1))
     scene = replace(mug, bodies=(*mug.bodies, *bodies))
-    found = clench.solve(hand, scene, COMMAND)
+    found = clench.solve(hand, scene, mug_grasp.command)
     stage = Usd.Stage.Open(str(clench.formats.export_scene(tmp_path / "a.usda", found, hand, scene)))
     children = stage.GetPrimAtPath("/World/object").GetChildren()
     assert [(p.GetName(), p.GetDisplayName()) for p in children] == [
@@ -204,7 +198,12 @@ def test_what_cannot_be_written(
 
 
 def test_the_command_writes_scenes_by_their_ending(
-    hand: clench.Hand, mug: clench.GraspObject, solution: GraspSolution, tmp_path: Path, capsys: Any
+    hand: clench.Hand,
+    mug: clench.GraspObject,
+    solution: GraspSolution,
+    tmp_path: Path,
+    capsys: Any,
+    mug_grasp: MugGrasp,
 ) -> None:
     solution.save(tmp_path / "solution.json")
     source = str(tmp_path / "solution.json")
@@ -215,7 +214,7 @@ def test_the_command_writes_scenes_by_their_ending(
     assert main(["export", source, "--out", str(tmp_path / "b.glb"), "--hold"]) == 2
     assert "leave out --root, --name, --hold" in capsys.readouterr().err
     with_table = mug.with_body(table(-0.1))
-    clench.solve(hand, with_table, COMMAND).save(tmp_path / "on_table.json")
+    clench.solve(hand, with_table, mug_grasp.command).save(tmp_path / "on_table.json")
     assert main(["export", str(tmp_path / "on_table.json"), "--out", str(tmp_path / "c.glb")]) == 0
     assert "Written without the object" in capsys.readouterr().out
     assert {p.name for p in tmp_path.glob("*.[gG]*")} == {"a.glb", "a.GLB", "c.glb"}

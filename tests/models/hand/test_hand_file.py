@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_models import three_fingers, written
 
-from clench.core.errors import ClenchError, FileError, HandError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, HandError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.hand.hand_file import read_hand_file
 from clench.models.shapes import CollisionSource
+from models.hand.hand_models import three_fingers, written
 
 
 def load(tmp_path, toml: str) -> Hand:

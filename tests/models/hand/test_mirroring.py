@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import clench
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.models.hand.mirroring import mirrored_mesh, mirrored_pose
 
 SIGNS = np.array([1.0, -1.0, 1.0])

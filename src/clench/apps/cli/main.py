@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from clench import __version__
-from clench.core.errors import ClenchError, UnknownNameError
+from clench.core.exceptions import ClenchError, UnknownNameError
 
 from .parsing import EXIT_BAD_INPUT, EXIT_INTERRUPTED, PRINT_COMPLETION, parse_call, print_completion
 
@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    from .commands import COMMANDS, bench
+    from .command_table import COMMANDS, bench
 
     # Imported modules stay: repeated garbage collections of them take a twelfth of a short command's time.
     gc.set_threshold(*GARBAGE_THRESHOLDS)

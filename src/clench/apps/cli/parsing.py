@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 from typing import Any, Final
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130

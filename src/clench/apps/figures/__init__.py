@@ -37,10 +37,10 @@ def draw_solution(
     """
     from clench.solver.orders import settled
 
-    from .curl_plane import draw_finger
-    from .finger_scenes import FingerScenes
-    from .hand_view import draw_hand
-    from .set_grid import draw_sets
+    from .planes.curl_plane import draw_finger
+    from .planes.finger_scenes import FingerScenes
+    from .planes.set_grid import draw_sets
+    from .sheets.hand_view import draw_hand
 
     folder, command = make_folder(directory), settled(command, solution)
     files = []
@@ -71,9 +71,9 @@ def draw_plan(
     Raises:
         FileError: a file cannot be written.
     """
-    from .contact_map import draw_contacts
-    from .grasp_sheet import draw_grasps
-    from .zone_map import draw_zones
+    from .maps.contact_map import draw_contacts
+    from .maps.zone_map import draw_zones
+    from .sheets.grasp_sheet import draw_grasps
 
     folder = Path(directory)
     return [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.json_files import check_writable, write_atomically
 from clench.core.pose import FloatArray
 from clench.models.appearance import Solid, solid_pose
@@ -17,12 +17,12 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution
 
-from . import style
-from .camera import Camera, Image, fitted_camera, look_along
-from .contact_labels import photograph
-from .dots import dotted
-from .stage import Stage, solution_poses, solution_solids
-from .viewpoints import focus_of, viewpoints
+from .drawing import style
+from .drawing.camera import Camera, Image, fitted_camera, look_along
+from .drawing.contact_labels import photograph
+from .drawing.dots import dotted
+from .drawing.stage import Stage, solution_poses, solution_solids
+from .drawing.viewpoints import focus_of, viewpoints
 
 if TYPE_CHECKING:
     from clench.execution.trajectory import Trajectory

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import clench
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
@@ -21,12 +21,12 @@ from clench.scoring.criterion_registry import find_criterion
 from clench.solver.analysis.examples import solve_scores
 from clench.solver.solution import GraspSolution
 
-from . import style
-from .camera import Image, fitted_camera
-from .contact_labels import dot, photograph
-from .stage import Stage, solution_poses, solution_solids
-from .viewpoints import focus_of, viewpoints
-from .views import show
+from .drawing import style
+from .drawing.camera import Image, fitted_camera
+from .drawing.contact_labels import dot, photograph
+from .drawing.stage import Stage, solution_poses, solution_solids
+from .drawing.viewpoints import focus_of, viewpoints
+from .drawing.views import show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

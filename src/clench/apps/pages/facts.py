@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.visible_text import visible
+from clench.core.showing.visible_text import visible
 from clench.models.hand.hand import Hand
 from clench.planner.grasp_plan import PlannedGrasp
 from clench.solver.solution import GraspSolution

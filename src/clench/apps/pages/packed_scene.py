@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray, Pose
-from clench.core.visible_text import visible
+from clench.core.showing.visible_text import visible
 from clench.models.appearance import Solid, SolidKind
 from clench.models.mesh import TriangleMesh
 

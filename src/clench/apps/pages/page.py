@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 import clench
-from clench.core.errors import CommandError, MotionError
+from clench.core.exceptions import CommandError, MotionError
 from clench.core.files.json_files import check_writable, write_atomically
 from clench.core.pose import FloatArray
-from clench.core.visible_text import visible
+from clench.core.showing.visible_text import visible
 from clench.models.appearance import Solid, hand_solids, object_solids, solid_pose
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution

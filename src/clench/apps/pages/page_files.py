@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.json_files import check_writable
 
 

@@ -15,13 +15,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.apps.figures.camera import Image, fitted_camera
-from clench.apps.figures.contact_labels import photograph
-from clench.apps.figures.dots import covered, dotted
-from clench.apps.figures.stage import Stage, solution_poses
-from clench.apps.figures.viewpoints import focus_of, viewpoints
-from clench.apps.figures.views import hand_sides
-from clench.core.errors import ClenchError, CommandError
+from clench.apps.figures.drawing.camera import Image, fitted_camera
+from clench.apps.figures.drawing.contact_labels import photograph
+from clench.apps.figures.drawing.dots import covered, dotted
+from clench.apps.figures.drawing.stage import Stage, solution_poses
+from clench.apps.figures.drawing.viewpoints import focus_of, viewpoints
+from clench.apps.figures.drawing.views import hand_sides
+from clench.core.exceptions import ClenchError, CommandError
 from clench.core.pose import FloatArray
 from clench.execution.executing import check_geometry
 from clench.models.appearance import Solid, SolidKind, hand_solids, object_solids

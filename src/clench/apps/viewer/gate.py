@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 
 #: Names of this machine that nothing but this machine reaches.
 LOCAL: Final = ("localhost", "127.0.0.1", "::1")

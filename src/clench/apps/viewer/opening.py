@@ -14,16 +14,16 @@ from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.hand.reading.model_files import builtin_names
 from clench.models.objects.grasp_object import GraspObject
-from clench.models.objects.loading import BUILTIN
+from clench.models.objects.object_loading import BUILTIN
 from clench.solver.orders import settled
 from clench.solver.preshapes.postures import preshape_angles
 
-from .grasp_files import GraspFiles
-from .listed_grasp import ListedGrasp
-from .live_session import LiveSession, in_palm_frame
-from .scene_code import call_code
-from .shelf import Shelf
-from .view_state import Ask, ViewState
+from .grasps.grasp_files import GraspFiles
+from .grasps.listed_grasp import ListedGrasp
+from .session.live_session import LiveSession, in_palm_frame
+from .session.scene_code import call_code
+from .session.shelf import Shelf
+from .session.view_state import Ask, ViewState
 
 Model = TypeVar("Model")
 

@@ -11,11 +11,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 
 from .gate import LOCAL, Gate, new_token
-from .listed_grasp import ListedGrasp
-from .live_session import LiveSession
+from .grasps.listed_grasp import ListedGrasp
+from .session.live_session import LiveSession
 from .viewer_page import ViewerPage
 
 if TYPE_CHECKING:

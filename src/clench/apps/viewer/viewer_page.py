@@ -13,25 +13,25 @@ import numpy as np
 from clench.core.pose import Pose
 from clench.models.shapes import CollisionSource
 
-from .browse_panel import BrowsePanel
-from .camera_place import FIELD_OF_VIEW, ROOM, ROOM_FOR_STRIP, good_view
-from .contact_marks import ContactMarks
-from .finger_pull import find_pull
-from .grasp_panel import GraspPanel
-from .listed_grasp import ListedGrasp
-from .live_session import LiveSession
-from .motion_track import Frame
-from .plane_panel import PlanePanel
-from .play_panel import PlayPanel
-from .posture_panel import PosturePanel, start_angle
-from .quick_answer import QuickAnswer
-from .save_panel import SavePanel
-from .scene_nodes import SceneNodes
-from .settled_answer import SettledAnswer
-from .status_card import answer_card, busy_card, failed_card
-from .user_events import when_set
-from .view_state import ViewState
-from .weights_panel import WeightsPanel
+from .grasps.listed_grasp import ListedGrasp
+from .motion.motion_track import Frame
+from .panels.browse_panel import BrowsePanel
+from .panels.grasp_panel import GraspPanel
+from .panels.plane_panel import PlanePanel
+from .panels.play_panel import PlayPanel
+from .panels.posture_panel import PosturePanel, start_angle
+from .panels.save_panel import SavePanel
+from .panels.status_card import answer_card, busy_card, failed_card
+from .panels.user_events import when_set
+from .panels.weights_panel import WeightsPanel
+from .scene.camera_place import FIELD_OF_VIEW, ROOM, ROOM_FOR_STRIP, good_view
+from .scene.contact_marks import ContactMarks
+from .scene.finger_pull import find_pull
+from .scene.scene_nodes import SceneNodes
+from .session.live_session import LiveSession
+from .session.quick_answer import QuickAnswer
+from .session.settled_answer import SettledAnswer
+from .session.view_state import ViewState
 
 if TYPE_CHECKING:
     import viser

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError, ObjectError
+from clench.core.exceptions import CommandError, ObjectError
 from clench.core.memory import in_parts
 from clench.core.pose import FloatArray, Pose, invert, quaternion_from_rotation, rotation_about
 from clench.models.hand.hand import Hand

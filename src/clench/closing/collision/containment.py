@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from clench.closing.linkage import placed_links
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.closing.linkage import placed_links
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import LinkMesh, link_meshes

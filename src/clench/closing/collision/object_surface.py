@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clench.core.keeping import kept_while_alive
+from clench.core.caching.keeping import kept_while_alive
 from clench.core.pose import FloatArray
 from clench.models.objects.grasp_object import BodyRole
 

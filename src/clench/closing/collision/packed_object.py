@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.errors import CommandError
-from clench.core.keeping import KeptBySize, kept_by_identity
+from clench.core.caching.keeping import KeptBySize, kept_by_identity
+from clench.core.exceptions import CommandError
 from clench.core.memory import expect
 from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand

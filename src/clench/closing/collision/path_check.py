@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import hand_frames
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject

@@ -10,7 +10,7 @@ import numpy as np
 from clench.closing.finger_plan import FingerPlan, last_closing_joint
 from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import placed_links
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 
 from clench.core.argument_types import check_type
+from clench.core.showing.visible_text import visible
 from clench.core.tolerances import ALLOWED_PENETRATION
-from clench.core.visible_text import visible
 from clench.models.hand.findings import Finding, FindingCode, Severity, in_hand_file
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes, overlap_depth

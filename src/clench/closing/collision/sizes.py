@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from clench.core.keeping import kept_by_identity
+from clench.core.caching.keeping import kept_by_identity
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
-from clench.models.objects.checks import smaller
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.objects.mesh_checks import smaller
 
 from .packed_object import pack_object
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 
 from .file_limits import ARCHIVE_LIST_BYTES, ARRAY_BYTES, JSON_BYTES
 

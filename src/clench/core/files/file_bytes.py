@@ -6,7 +6,7 @@ import os
 import stat
 from pathlib import Path
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 
 
 def read_file(path: str | Path, most: int, missing: str = "no such file.") -> bytes:

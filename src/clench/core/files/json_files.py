@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from clench.core.errors import ClenchError, FileError
+from clench.core.exceptions import ClenchError, FileError
 
 from .file_bytes import read_file
 from .file_limits import JSON_BYTES

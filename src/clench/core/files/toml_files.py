@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 
 from .file_bytes import read_text
 from .file_limits import DOCUMENT_DEPTH, TOML_BYTES

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 
 from .file_bytes import read_file
 from .file_limits import MODEL_BYTES, XML_DEPTH, XML_ELEMENTS

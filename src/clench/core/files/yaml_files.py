@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 
 from .file_bytes import read_text
 from .file_limits import DOCUMENT_DEPTH, DOCUMENT_VALUES, LINE_BYTES, YAML_BYTES

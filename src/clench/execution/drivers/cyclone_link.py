@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.execution.hardware.driver import DriverError
 
 from .ros2 import JointStates, on_this_machine_only

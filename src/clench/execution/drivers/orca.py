@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-from clench.core.errors import CommandError, FileError
-from clench.core.short_repr import described
+from clench.core.exceptions import CommandError, FileError
+from clench.core.showing.short_repr import described
 from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 
 from .ros2 import JointStates
 

@@ -19,8 +19,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from clench.core.errors import CommandError, UnknownNameError
-from clench.core.short_repr import described
+from clench.core.exceptions import CommandError, UnknownNameError
+from clench.core.showing.short_repr import described
 from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
 #: Within this time, a hand that was told to stop is back at its measured angles [s].

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.file_bytes import read_file
 from clench.core.files.file_limits import PICKLE_BYTES
 from clench.core.files.json_files import write_atomically

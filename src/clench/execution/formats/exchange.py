@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from clench.core.errors import CommandError, FileError, UnknownNameError
-from clench.core.short_repr import short_repr
+from clench.core.exceptions import CommandError, FileError, UnknownNameError
+from clench.core.showing.short_repr import short_repr
 from clench.execution.simulation.hold import Hold
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

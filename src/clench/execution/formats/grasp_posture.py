@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose, invert
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.file_limits import DOCUMENT_DEPTH, DOCUMENT_VALUES
 
 #: Plain numbers: letter and bytes.

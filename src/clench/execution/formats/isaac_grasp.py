@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.json_files import write_atomically
 from clench.core.files.yaml_files import read_yaml
 from clench.core.numbers import is_finite_number

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.files.json_files import encode_document, write_atomically
-from clench.execution.report import ExecutionReport
+from clench.execution.execution_report import ExecutionReport
 from clench.solver.solution import GraspSolution
 
 MEASURED: Final = "/joint_states"

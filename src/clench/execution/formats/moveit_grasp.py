@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.json_files import non_finite_path, read_json, write_json
 from clench.core.pose import Pose
 

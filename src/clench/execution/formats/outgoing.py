@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from clench.core.defaults import MASS
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose, invert
 from clench.execution.executing import check_angles, check_geometry
 from clench.execution.pregrasp import plan_pregrasp
@@ -16,7 +16,7 @@ from clench.execution.simulation.hold import Hold
 from clench.execution.simulation.piece_hold import hold_as_collided
 from clench.execution.step_check import told_overlap
 from clench.execution.trajectory import plan_trajectory
-from clench.mechanics.contacts import DEFAULT_TORSION, ContactModel
+from clench.mechanics.grasp.contacts import DEFAULT_TORSION, ContactModel
 from clench.models.hand.forward import base_pose
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -243,7 +243,7 @@ def _beyond(solution: GraspSolution, angles: Mapping[str, float]) -> Iterator[st
 
 def _offsets(solution: GraspSolution, hand: Hand, torques: Mapping[str, float], stiffness: float) -> dict[str, float]:
     """Return the offsets for servos of one gain at every joint or tendon [rad]."""
-    from clench.mechanics.jacobian import degrees_of_freedom
+    from clench.mechanics.grasp.jacobian import degrees_of_freedom
 
     if not stiffness > 0.0:
         raise CommandError(f"stiffness: expected a number above 0 Nm/rad, got {stiffness!r}.")

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.json_files import check_writable, write_atomically
 from clench.core.pose import FloatArray
 from clench.execution.executing import check_geometry

@@ -8,10 +8,10 @@ from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from clench.core.errors import ClenchError, CommandError
+from clench.core.exceptions import ClenchError, CommandError
 from clench.core.numbers import real_array
 from clench.core.pose import FloatArray
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 
 
 class DriverError(ClenchError):

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 
 from .driver import DriverError, HandDriver
 

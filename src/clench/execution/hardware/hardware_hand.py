@@ -9,11 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from clench.core.argument_types import check_type
-from clench.core.errors import ClenchError, CommandError, UnknownNameError
+from clench.core.exceptions import ClenchError, CommandError, UnknownNameError
 from clench.core.pose import FloatArray
-from clench.core.short_repr import described
+from clench.core.showing.short_repr import described
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.history import CommandsSent
-from clench.execution.report import ExecutionReport
 from clench.execution.trajectory import Trajectory
 from clench.execution.trajectory_checks import check_for_hand
 from clench.models.hand.hand import Hand

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clench.core.pose import FloatArray
+from clench.execution.execution_report import ExecutionReport, JointReached, judge_steps, notes_on_steps
 from clench.execution.history import CommandsSent, ExecutionHistory
-from clench.execution.report import ExecutionReport, JointReached, judge_steps, notes_on_steps
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.preshapes.named_angles import posture

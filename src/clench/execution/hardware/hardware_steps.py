@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from clench.core.pose import FloatArray
+from clench.execution.execution_report import JointReached, NextStepReached, step_sentence
 from clench.execution.next_steps import Phase, moved_joints, plan_next_steps
-from clench.execution.report import JointReached, NextStepReached, step_sentence
 from clench.execution.step_check import step_overlap
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import CommandError, FileError, UnknownNameError
+from clench.core.exceptions import CommandError, FileError, UnknownNameError
 from clench.core.files.toml_files import read_toml
 from clench.core.numbers import is_finite_number
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 from clench.models.hand.hand import Hand
 
 #: Units of a controller by name: how many of them one radian is.

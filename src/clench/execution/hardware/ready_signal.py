@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.files.json_files import check_writable, write_json
-from clench.core.short_repr import described
-from clench.execution.report import ExecutionReport
+from clench.core.showing.short_repr import described
+from clench.execution.execution_report import ExecutionReport
 from clench.execution.trajectory import Trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

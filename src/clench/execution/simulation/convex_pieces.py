@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from clench.core.cache_folder import cache_folder
-from clench.core.errors import ObjectError
+from clench.core.caching.cache_folder import cache_folder
+from clench.core.exceptions import ObjectError
 from clench.core.files.json_files import write_atomically
 from clench.core.pose import FloatArray
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, GraspObject
-from clench.models.objects.loading import in_source
+from clench.models.objects.object_loading import in_source
 from clench.models.shapes import CollisionSource, ShapeKind
 from clench.models.tessellation import convex_hull
 

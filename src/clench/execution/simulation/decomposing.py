@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.pose import FloatArray
 from clench.models.mesh import TriangleMesh
 

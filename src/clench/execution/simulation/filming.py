@@ -11,11 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.errors import ClenchError, FileError
+from clench.core.exceptions import ClenchError, FileError
 from clench.core.files.json_files import check_folder, check_writable, write_atomically
-from clench.core.offscreen import Offscreen
-from clench.core.opengl import OpenGLError, import_mujoco, open_context
-from clench.core.short_repr import short_repr
+from clench.core.rendering.offscreen import Offscreen
+from clench.core.rendering.opengl import OpenGLError, import_mujoco, open_context
+from clench.core.showing.short_repr import short_repr
 
 from .mujoco_scene import Scene
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from clench.core.defaults import FRICTION, MASS
-from clench.core.errors import CommandError
-from clench.core.short_repr import described, short_repr
-from clench.mechanics.contacts import ContactModel, check_friction, friction_range
-from clench.mechanics.loads import mass_range
+from clench.core.exceptions import CommandError
+from clench.core.showing.short_repr import described, short_repr
+from clench.mechanics.grasp.contacts import ContactModel, check_friction, friction_range
+from clench.mechanics.grasp.loads import mass_range
 
 #: The lightest object that the simulation carries [kg].
 LIGHTEST = 1e-3

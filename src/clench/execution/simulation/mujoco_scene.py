@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import HandError
-from clench.core.opengl import import_mujoco
+from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray, Pose, invert
-from clench.mechanics.loads import GRAVITY
+from clench.core.rendering.opengl import import_mujoco
+from clench.mechanics.grasp.loads import GRAVITY
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import Body, GraspObject
 from clench.models.shapes import CollisionSource, Shape, ShapeKind

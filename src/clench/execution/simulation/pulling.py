@@ -10,7 +10,7 @@ import numpy as np
 
 from clench.core.pose import FloatArray
 from clench.execution.trajectory import Trajectory
-from clench.mechanics.jacobian import DegreesOfFreedom, hand_jacobian
+from clench.mechanics.grasp.jacobian import DegreesOfFreedom, hand_jacobian
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.solver.analysis.squeezing import DOWN, SqueezePlan, plan_squeeze

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clench.core.errors import CommandError, HandError
-from clench.core.opengl import import_mujoco
+from clench.core.exceptions import CommandError, HandError
 from clench.core.pose import FloatArray
-from clench.mechanics.jacobian import degrees_of_freedom
+from clench.core.rendering.opengl import import_mujoco
+from clench.mechanics.grasp.jacobian import degrees_of_freedom
 from clench.models.hand.hand import Hand
 from clench.models.hand.reading.kinematics import fixed_tendon
 

@@ -11,10 +11,8 @@ import numpy as np
 
 from clench.core.argument_types import check_type
 from clench.core.pose import FloatArray, Pose
-from clench.core.short_repr import described
-from clench.execution.hardware.joint_blocking import simulated_blocker
-from clench.execution.history import ExecutionHistory
-from clench.execution.report import (
+from clench.core.showing.short_repr import described
+from clench.execution.execution_report import (
     ContactReached,
     ExecutionReport,
     JointReached,
@@ -22,6 +20,8 @@ from clench.execution.report import (
     judge_steps,
     notes_on_steps,
 )
+from clench.execution.hardware.joint_blocking import simulated_blocker
+from clench.execution.history import ExecutionHistory
 from clench.execution.trajectory import Trajectory
 from clench.execution.trajectory_checks import check_for_hand
 from clench.models.hand.hand import Hand

@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 
 from clench.core.pose import FloatArray
+from clench.execution.execution_report import JointReached, NextStepReached, step_sentence
 from clench.execution.hardware.joint_blocking import simulated_blocker
 from clench.execution.next_steps import Phase, moved_joints, plan_next_steps
-from clench.execution.report import JointReached, NextStepReached, step_sentence
 from clench.models.hand.hand import Hand
 from clench.solver.solution import GraspSolution
 

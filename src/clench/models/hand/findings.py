@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from clench.core.short_repr import short_repr
-from clench.core.visible_text import visible
+from clench.core.showing.short_repr import short_repr
+from clench.core.showing.visible_text import visible
 
 
 class Severity(StrEnum):

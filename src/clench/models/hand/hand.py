@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core import display
-from clench.core.display import Displayed
-from clench.core.errors import CommandError, UnknownNameError
-from clench.core.keeping import Keeper
+from clench.core.caching.keeping import Keeper
+from clench.core.exceptions import CommandError, UnknownNameError
 from clench.core.pose import FloatArray
-from clench.core.short_repr import described, short_repr
+from clench.core.showing import display
+from clench.core.showing.display import Displayed
+from clench.core.showing.short_repr import described, short_repr
 from clench.models.hand.reading.tendons import TendonMap
 from clench.models.shapes import CollisionSource, Shape
 
@@ -238,7 +238,7 @@ class Hand(Keeper, Displayed):
             FileError: missing, unreadable or malformed file. HandError: unsupported or contradictory model.
             UnknownNameError: no such link, joint or built-in hand.
         """
-        from .loading import load_hand
+        from .hand_loading import load_hand
 
         return load_hand(model, hand_file=hand_file, palm=palm, collision_source=collision_source)
 

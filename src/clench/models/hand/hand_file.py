@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clench.core.errors import FileError, HandError
+from clench.core.exceptions import FileError, HandError
 from clench.core.files.toml_files import read_toml
 from clench.core.numbers import is_finite_number
 from clench.models.hand.reading.tendons import TendonMap

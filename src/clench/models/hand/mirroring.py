@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.errors import HandError
-from clench.core.opengl import import_mujoco
+from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray, Pose
+from clench.core.rendering.opengl import import_mujoco
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import Shape
 

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 from numpy.typing import ArrayLike
 
 from clench.core.argument_types import check_type
-from clench.core.errors import ObjectError
-from clench.core.keeping import Keeper
+from clench.core.caching.keeping import Keeper
+from clench.core.exceptions import ObjectError
 from clench.core.pose import Pose
-from clench.core.short_repr import described, short_repr
+from clench.core.showing.short_repr import described, short_repr
 from clench.models.mesh import TriangleMesh
 from clench.models.shapes import CollisionSource, Shape
 
@@ -126,7 +126,7 @@ class GraspObject:
         Raises:
             FileError: missing file, not a mesh. ObjectError: empty, NaN, bad parameter. UnknownNameError.
         """
-        from .loading import load_object
+        from .object_loading import load_object
 
         return load_object(model, scale=scale, pose=pose, collision_source=collision_source)
 
@@ -145,7 +145,7 @@ class GraspObject:
         Raises:
             ObjectError: sizes that are not positive, or a malformed mesh. UnknownNameError: no such shape.
         """
-        from .loading import object_from_shape
+        from .object_loading import object_from_shape
 
         return object_from_shape(shape, name=name, pose=pose, role=role, collision_source=collision_source)
 
@@ -167,7 +167,7 @@ class GraspObject:
         Raises:
             ObjectError: empty, NaN, an index out of range, no graspable part. UnknownNameError: no such role.
         """
-        from .loading import object_from_meshes
+        from .object_loading import object_from_meshes
 
         return object_from_meshes(parts, name=name, pose=pose, collision_source=collision_source)
 
@@ -202,7 +202,7 @@ class GraspObject:
         Raises:
             UnknownNameError: no such role.
         """
-        from .loading import role_named
+        from .object_loading import role_named
 
         placed = (body.moved(pose) if pose else body for body in other.bodies)
         added = tuple(replace(body, role=role_named(role)) if role else body for body in placed)

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.pose import FloatArray
 from clench.models.mesh import IntArray
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.file_bytes import read_file
 from clench.core.files.file_limits import MESH_BYTES
 from clench.core.memory import expect

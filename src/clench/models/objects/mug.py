@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from clench.core.deferring import DeferredSequence
+from clench.core.caching.deferring import DeferredSequence
 from clench.core.pose import FloatArray
 from clench.models.mesh import IntArray, TriangleMesh
 from clench.models.shapes import Shape, ShapeKind

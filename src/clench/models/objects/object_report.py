@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from numpy.typing import ArrayLike
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.numbers import real_array
 from clench.models.shapes import ShapeKind
 

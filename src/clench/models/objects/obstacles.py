@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.pose import Pose
 from clench.models.shapes import Shape, ShapeKind
 

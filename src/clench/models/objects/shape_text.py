@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from clench.core.errors import ObjectError, UnknownNameError
+from clench.core.exceptions import ObjectError, UnknownNameError
 from clench.models.shapes import Shape, ShapeKind
 
 _TEXT = re.compile(r"[A-Za-z]{2,}:[^/\\]*")

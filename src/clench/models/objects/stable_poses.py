@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clench.core.errors import ObjectError
+from clench.core.exceptions import ObjectError
 from clench.core.numbers import is_finite_number
 from clench.core.pose import FloatArray, Pose, checked_vector
 from clench.models.shapes import Shape, ShapeKind

@@ -17,7 +17,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from clench.core.errors import ClenchError, FileError
+from clench.core.exceptions import ClenchError, FileError
 from clench.core.files.json_files import non_finite_path, read_json
 from clench.core.pose import FloatArray
 from clench.scoring.calibration import Calibration

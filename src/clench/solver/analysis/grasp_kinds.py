@@ -9,7 +9,7 @@ import numpy as np
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.collision.reach import graspable_body, nearest_link
 from clench.core.pose import invert
-from clench.mechanics.contact_kinds import KINDS, GraspKind, contact_kinds
+from clench.mechanics.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from clench.core.argument_types import check_type
 from clench.core.pose import FloatArray, Pose, checked_vector
-from clench.core.short_repr import short_repr
-from clench.mechanics.contacts import (
+from clench.core.showing.short_repr import short_repr
+from clench.mechanics.grasp.contacts import (
     DEFAULT_TORSION,
     ContactModel,
     check_friction,
@@ -20,7 +20,7 @@ from clench.mechanics.contacts import (
     pair_friction,
     without_repeats,
 )
-from clench.mechanics.held import HeldObject, held_by_hand
+from clench.mechanics.grasp.held import HeldObject, held_by_hand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.objects.mass import mass_properties

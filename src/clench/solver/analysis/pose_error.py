@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose, quaternion_from_rotation, rotation_about
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 from clench.models.command import GraspCommand, as_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -8,12 +8,12 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from clench.core.defaults import MASS
-from clench.core.short_repr import described
-from clench.mechanics.actuation import Actuation, Effort, actuation
-from clench.mechanics.contacts import DEFAULT_TORSION, ContactModel
-from clench.mechanics.epsilon_quality import EDGES, epsilon, epsilon_within_torques
-from clench.mechanics.loads import gravity_any_direction, mass_range
-from clench.mechanics.wrench_space import Ball, WrenchNorm, volume_l1
+from clench.core.showing.short_repr import described
+from clench.mechanics.epsilon.epsilon_quality import EDGES, epsilon, epsilon_within_torques
+from clench.mechanics.epsilon.wrench_space import Ball, WrenchNorm, volume_l1
+from clench.mechanics.forces.actuation import Actuation, Effort, actuation
+from clench.mechanics.grasp.contacts import DEFAULT_TORSION, ContactModel
+from clench.mechanics.grasp.loads import gravity_any_direction, mass_range
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution

@@ -14,10 +14,10 @@ from typing import Any, Self
 
 import msgspec
 
-from clench.core.errors import ClenchError, FileError, UnknownNameError
+from clench.core.exceptions import ClenchError, FileError, UnknownNameError
 from clench.core.files.file_limits import JSON_BYTES
 from clench.core.files.json_files import check_writable, parse_json
-from clench.core.short_repr import described
+from clench.core.showing.short_repr import described
 from clench.solver.documents import solution_from_dict, solution_to_json
 from clench.solver.solution import FingerStatus, GraspSolution, SolutionStatus
 

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from clench.closing.collision.packed_object import PackedObject, hash_hand, pack_object
 from clench.closing.finger_plan import closing_joints
 from clench.core.argument_types import check_type
-from clench.core.errors import ClenchError
+from clench.core.exceptions import ClenchError
 from clench.core.pose import FloatArray
-from clench.core.short_repr import short_repr
+from clench.core.showing.short_repr import short_repr
 from clench.models.command import ClosingOrder
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.models.objects.loading import collision_source_named
+from clench.models.objects.object_loading import collision_source_named
 from clench.models.shapes import CollisionSource
 from clench.scoring.closing_stages import closing_stages, stages_at_once
 from clench.scoring.pose_change import PoseChange

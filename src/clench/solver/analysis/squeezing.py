@@ -18,9 +18,10 @@ from clench.core.defaults import (
     MOST_FORCE_PER_WEIGHT,
 )
 from clench.core.pose import FloatArray
-from clench.core.short_repr import described
-from clench.mechanics.contacts import DEFAULT_TORSION, ContactModel
-from clench.mechanics.loads import (
+from clench.core.showing.short_repr import described
+from clench.mechanics.forces.squeeze import SqueezeForces, squeeze_forces
+from clench.mechanics.grasp.contacts import DEFAULT_TORSION, ContactModel
+from clench.mechanics.grasp.loads import (
     GRAVITY,
     check_loads,
     gravity_any_direction,
@@ -28,7 +29,6 @@ from clench.mechanics.loads import (
     six_pulls_and_twists,
     weight,
 )
-from clench.mechanics.squeeze import SqueezeForces, squeeze_forces
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.solution import GraspSolution

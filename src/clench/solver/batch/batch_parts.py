@@ -12,10 +12,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.errors import FileError
+from clench.core.caching.fingerprint import fingerprint
+from clench.core.exceptions import FileError
 from clench.core.files.array_files import read_arrays
 from clench.core.files.json_files import check_folder, check_writable, read_json, write_json
-from clench.core.fingerprint import fingerprint
 from clench.core.pose import FloatArray, Pose
 from clench.scoring.calibration import calibration_of
 

@@ -12,7 +12,7 @@ import numpy as np
 from clench.closing.finger_plan import closing_joints
 from clench.closing.kernel_run import Answers, solve_packed
 from clench.closing.motion import asked_fingers, palm_pose
-from clench.core.deferring import once
+from clench.core.caching.deferring import once
 from clench.core.pose import FloatArray, Pose
 from clench.core.pose_arrays import pose_of_row
 from clench.models.command import GraspCommand

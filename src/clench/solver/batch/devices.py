@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 
 CPU: Final = "cpu"
 CUDA: Final = "cuda"

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.deferring import LateFields
-from clench.core.errors import CommandError
+from clench.core.caching.deferring import LateFields
+from clench.core.exceptions import CommandError
 from clench.core.files.json_files import write_atomically
 from clench.core.pose import FloatArray
 from clench.core.pose_arrays import pose_of_row
-from clench.core.short_repr import described, short_repr
+from clench.core.showing.short_repr import described, short_repr
 from clench.solver.solution import FingerStatus, GraspSolution, SolutionStatus
 
 from .saved_question import question_arrays

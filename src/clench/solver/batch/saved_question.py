@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from clench.core.errors import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError
 from clench.core.files.array_files import read_arrays
 from clench.core.files.json_files import parse_json
 from clench.core.pose_arrays import pose_of_row

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from clench.closing.threads import core_count
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.core.pose_arrays import pose_rows
 from clench.models.command import GraspCommand

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from clench.core.argument_types import check_type
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
-from clench.core.short_repr import described
+from clench.core.showing.short_repr import described
 from clench.models.command import GraspCommand, as_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import CommandError
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from clench.closing.motion import open_posture
 from clench.closing.threads import core_count, share_out
-from clench.core.deferring import DeferredMapping
+from clench.core.caching.deferring import DeferredMapping
 from clench.core.pose import FloatArray
 from clench.core.pose_arrays import pose_of_row
 from clench.models.command import GraspCommand

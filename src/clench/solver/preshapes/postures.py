@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from clench.closing.motion import asked_fingers
-from clench.core.errors import UnknownNameError
-from clench.core.keeping import kept_while_alive
+from clench.core.caching.keeping import kept_while_alive
+from clench.core.exceptions import UnknownNameError
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Finger, Hand
 from clench.solver.checked_command import checked

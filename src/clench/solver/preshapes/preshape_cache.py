@@ -16,10 +16,10 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.core.cache_folder import cache_folder
-from clench.core.errors import ClenchError
+from clench.core.caching.cache_folder import cache_folder
+from clench.core.caching.fingerprint import fingerprint
+from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import read_json, write_atomically
-from clench.core.fingerprint import fingerprint
 from clench.models.hand.hand import Hand
 
 #: The value of this environment variable that switches the files off is "0".

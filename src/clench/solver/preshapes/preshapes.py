@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.keeping import kept_while_alive
+from clench.core.caching.keeping import kept_while_alive
 from clench.core.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at

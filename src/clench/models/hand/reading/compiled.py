@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import FileError, HandError
-from clench.core.opengl import import_mujoco
+from clench.core.exceptions import FileError, HandError
+from clench.core.rendering.opengl import import_mujoco
 
 from .model_files import ModelText
 

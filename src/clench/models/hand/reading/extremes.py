@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.core.files.file_limits import MODEL_BODIES
 from clench.core.tolerances import LARGEST_LENGTH
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray, Pose
 from clench.models.hand.findings import Finding, FindingCode, Severity
 from clench.models.hand.hand import Joint

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Iterable
 from pathlib import Path
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.file_bytes import read_file
 from clench.core.files.file_limits import ASSET_BYTES, MESH_BYTES
 from clench.models.mesh_parsing import PARSED, MeshError, parse_mesh

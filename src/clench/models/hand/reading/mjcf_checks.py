@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Final
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.file_limits import MODEL_PARTS, PICTURE_PIXELS
 
 #: Elements whose count says how many copies of something are made.

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from clench.core.errors import FileError, UnknownNameError
+from clench.core.exceptions import FileError, UnknownNameError
 from clench.core.files.file_bytes import expanded
 from clench.core.files.file_limits import MODEL_BYTES
 from clench.core.files.xml_files import check_xml, read_xml

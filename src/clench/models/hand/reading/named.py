@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
-from clench.core.errors import HandError, UnknownNameError
+from clench.core.exceptions import HandError, UnknownNameError
 
 MENAGERIE: Final = "mujoco_menagerie"
 DESCRIPTIONS: Final = "robot_descriptions"

@@ -6,7 +6,7 @@ import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 from clench.core.files.file_limits import MODEL_NUMBER
 
 #: Attributes that hold names, which may look like numbers ("inf").

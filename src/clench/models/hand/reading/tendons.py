@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray
 
 

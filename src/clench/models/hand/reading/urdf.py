@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
 
-from clench.core.errors import FileError
+from clench.core.exceptions import FileError
 
 from .mesh_files import MeshStore
 from .urdf_checks import check_urdf

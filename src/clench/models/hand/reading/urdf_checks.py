@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from collections import Counter
 from pathlib import Path
 
-from clench.core.errors import FileError, UnknownNameError
+from clench.core.exceptions import FileError, UnknownNameError
 from clench.core.files.file_limits import MODEL_BODIES
 
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from clench.core.errors import UnknownNameError
+from clench.core.exceptions import UnknownNameError
 from clench.models.hand.findings import Finding, FindingCode, quoted
 from clench.models.hand.hand import Hand, Link
 from clench.models.hand.hand_file import HandFile

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clench.core.errors import HandError
+from clench.core.exceptions import HandError
 from clench.models.hand.findings import Finding, FindingCode
 from clench.models.hand.hand import Coupling
 from clench.models.hand.reading.compiled import CompiledModel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clench.core.errors import FileError, HandError, UnknownNameError
+from clench.core.exceptions import FileError, HandError, UnknownNameError
 from clench.core.pose import FloatArray
 from clench.models.hand.findings import Finding, FindingCode, quoted
 from clench.models.hand.hand import Finger, Hand, Link

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from clench.core.errors import HandError, UnknownNameError
+from clench.core.exceptions import HandError, UnknownNameError
 from clench.models.hand.reading.compiled import CompiledModel
 
 #: A branch that forks again within so many joints is a metacarpal of the same hand, not an arm.

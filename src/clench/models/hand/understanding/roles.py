@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from clench.core.errors import FileError, HandError, UnknownNameError
+from clench.core.exceptions import FileError, HandError, UnknownNameError
+from clench.core.showing.visible_text import visible
 from clench.core.tolerances import CLOSING_ANGLE
-from clench.core.visible_text import visible
 from clench.models.hand.findings import Finding, FindingCode, in_hand_file, quoted
 from clench.models.hand.hand import Finger, Hand, Joint, JointRole
 from clench.models.hand.hand_file import HandFile, JointOverride

@@ -1,0 +1,217 @@
+"""The command that opens the viewer: a page in the browser that solves while the user drags."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from clench.apps.cli.inputs.choices import Kind, Order, Source
+from clench.apps.cli.inputs.command_files import read_command
+from clench.apps.cli.inputs.scene_options import scene_code, with_scene
+from clench.apps.cli.parsing import as_range
+from clench.core.exceptions import CommandError
+
+if TYPE_CHECKING:
+    from clench.apps.viewer.grasps.listed_grasp import ListedGrasp
+    from clench.apps.viewer.opening import Given
+    from clench.apps.viewer.session.live_session import LiveSession
+    from clench.models.objects.grasp_object import GraspObject
+
+HAND, OBJECT = "robonaut2", "mug"
+
+
+def view(
+    files: tuple[Path, ...] = (),
+    /,
+    *,
+    hand: str | None = None,
+    object: str | None = None,
+    command: Path | None = None,
+    hand_file: Path | None = None,
+    palm: str | None = None,
+    scale: float = 1.0,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
+    collision_source: Source | None = None,
+    order: Order | None = None,
+    criteria: str | None = None,
+    mass: tuple[float, ...] = (),
+    friction: tuple[float, ...] = (),
+    gravity: tuple[float, float, float] | None = None,
+    kinds: tuple[Kind, ...] = (),
+    fingers: tuple[str, ...] = (),
+    min_fingers: int = 2,
+    approach: tuple[float, float, float] | None = None,
+    approach_angle: float = 45.0,
+    seed: int = 0,
+    host: str = "localhost",
+    port: int = 8765,
+    dark: bool = False,
+    without_browser: bool = False,
+    json: bool = False,
+) -> int:
+    """Open a page in the browser where hand and object can be dragged, and every move is solved (docs/viewer.md).
+
+    Args:
+        files: grasps to look through: solutions, plan.json of `clench plan --out`, a record, a batch (.npz), the folder
+            of a dataset, or a file of another program that `clench import` reads.
+        hand: built-in name (robonaut2 by default), path to a .urdf or .xml file, or a name that clench[hands] finds
+            (docs/own-hand.md); for files the one that they name.
+        object: built-in name (mug by default), path to a mesh, or a shape such as cylinder:r=0.03,h=0.1; for files the
+            one that they name.
+        command: command file (JSON); without it clench plans a grasp, from --seed.
+        hand_file: TOML file that overrides what was found in the hand's model.
+        palm: name of the palm link, to pick a hand inside a whole robot.
+        scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
+        table: a table under the object, at its lowest point, or with its top at this height [m].
+        obstacle: other things, each as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz (docs/surroundings.md).
+        collision_source: geometry of the hand to solve for.
+        order: in which the joints close.
+        criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
+        mass: of the object [kg]; 0.1 by default; of two numbers, a range, the largest counts.
+        friction: of links on the object; by default what hand file and object say, else 0.6; of two numbers the least
+            counts.
+        gravity: its direction in the world, for planning; by default the object is held in any direction.
+        kinds: of planned grasps; any by default.
+        fingers: names of the fingers that may close in planned grasps; all by default.
+        min_fingers: fingers that touch at least in planned grasps.
+        approach: direction in the world in which the palm comes in planned grasps.
+        approach_angle: how far the palm may come from another direction [degrees].
+        seed: of planned grasps.
+        host: address to listen on. Anything but this machine itself makes clench print an address with a token.
+        port: to listen on; 0 takes a free one.
+        dark: begin with a dark page.
+        without_browser: print the address, and open no browser.
+        json: print the address as one JSON document on standard output.
+    """
+    from math import radians
+
+    from clench.apps.viewer.opening import open_session
+    from clench.apps.viewer.serving import check_viewer, serve
+    from clench.core.defaults import MASS
+    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.mechanics.grasp.contacts import friction_range
+    from clench.mechanics.grasp.loads import mass_range
+
+    check_viewer()
+    carried, gripped = as_range(mass, "--mass"), as_range(friction, "--friction")
+    forces: dict[str, Any] = {
+        "friction": None if gripped is None else friction_range(gripped, "--friction")[0],
+        "mass": mass_range(MASS if carried is None else carried, "--mass")[1],
+        "planning": {
+            "gravity": gravity,
+            "kinds": kinds or None,
+            "fingers": fingers or None,
+            "min_fingers": min_fingers,
+            "approach": approach,
+            "approach_angle": radians(approach_angle),
+            "seed": seed,
+        },
+    }
+    loaded = {"hand_file": hand_file, "palm": palm, "collision_source": collision_source}
+    if files:
+        if command is not None or table is not None or obstacle:
+            raise CommandError(
+                "view: files of grasps have their own commands; leave out --command, --table, --obstacle."
+            )
+        session, grasps = _of_files(files, hand, object, loaded, None if scale == 1.0 else scale, forces)
+    else:
+        asked = {"order": order, "criteria": criteria, "collision_source": collision_source}
+        around = command, table, obstacle
+        session, grasps = open_session(_given(hand or HAND, object or OBJECT, loaded, scale, around, asked, forces)), []
+    announce()
+    warm_up()
+    with serve(session, host, port, grasps, dark) as page:
+        _announce(page.url, without_browser, json)
+        _wait()
+    return 0
+
+
+def _of_files(
+    files: Sequence[Path],
+    hand: str | None,
+    object: str | None,
+    loaded: dict[str, Any],
+    scale: float | None,
+    forces: dict[str, Any],
+) -> tuple[LiveSession, list[ListedGrasp]]:
+    """Return a session with the grasps of files."""
+    import clench
+    from clench.apps.cli.inputs.command_files import loadable
+    from clench.apps.viewer.grasps.grasp_files import GraspFiles
+    from clench.apps.viewer.opening import open_list
+
+    def load_object(model: str, named: float, geometry: str) -> GraspObject:
+        return clench.GraspObject.load(model, scale=named if scale is None else scale, collision_source=geometry)
+
+    given = None if hand is None else loadable(hand), None if object is None else loadable(object)
+    read = GraspFiles(lambda model: clench.Hand.load(model, **loaded), load_object, *given)
+    return open_list(read, files, **forces)
+
+
+def _given(
+    hand: str,
+    object: str,
+    loaded: dict[str, Any],
+    scale: float,
+    around: tuple[Path | None, tuple[float, ...] | None, tuple[str, ...]],
+    asked: dict[str, Any],
+    forces: dict[str, Any],
+) -> Given:
+    """Return what the options of a single scene say."""
+    import clench
+    from clench.apps.cli.inputs.command_files import loadable
+    from clench.apps.viewer.opening import Given
+    from clench.apps.viewer.session.scene_code import call_code
+    from clench.models.command import ClosingOrder
+    from clench.models.shapes import CollisionSource
+
+    command, table, obstacle = around
+    the_hand = clench.Hand.load(hand, **loaded)
+    the_object = clench.GraspObject.load(object, scale=scale)
+    the_command = None if command is None else read_command(command, the_hand)
+    placed = the_object, None if the_command is None else the_command.object_pose, table, obstacle
+    enums = {"order": ClosingOrder, "collision_source": CollisionSource}
+    wanted = {name: enums.get(name, str)(value) for name, value in asked.items() if value is not None}
+    code = {name: str(v.resolve()) if isinstance(v, Path) else v for name, v in loaded.items()}
+    size = None if scale == 1.0 else scale
+    return Given(
+        the_hand,
+        with_scene(*placed),
+        the_command,
+        wanted,
+        **forces,
+        hand_model=loadable(hand),
+        object_model=loadable(object),
+        hand_code=call_code("clench.Hand.load", loadable(hand), **code),
+        object_code=(
+            "obj = " + call_code("clench.GraspObject.load", loadable(object), scale=size),
+            *scene_code(*placed),
+        ),
+    )
+
+
+def _announce(url: str, without_browser: bool, json: bool) -> None:
+    """Say where the page is, and open it where there is a browser."""
+    import webbrowser
+
+    from clench.apps.cli.output.results import print_json
+
+    if json:
+        print_json({"schema": "clench.view/1", "url": url})
+    else:
+        sys.stdout.write(f"clench view: {url} (Ctrl+C ends it)\n")
+        sys.stdout.flush()
+    if not without_browser:
+        with contextlib.suppress(webbrowser.Error):
+            webbrowser.open(url)
+
+
+def _wait() -> None:
+    """Wait until the user interrupts."""
+    with contextlib.suppress(KeyboardInterrupt):
+        threading.Event().wait()

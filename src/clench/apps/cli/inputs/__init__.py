@@ -1,0 +1,1 @@
+"""Turn options and files into hands, scenes, commands and controllers."""

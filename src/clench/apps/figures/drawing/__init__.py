@@ -1,0 +1,1 @@
+"""What every picture needs: camera, stage, style, marks."""

@@ -1,0 +1,1 @@
+"""Maps of a hand and of an object."""

@@ -1,0 +1,1 @@
+"""Lists of grasps to look through."""

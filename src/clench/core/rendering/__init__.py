@@ -1,0 +1,1 @@
+"""Draw without a screen, through MuJoCo and OpenGL."""

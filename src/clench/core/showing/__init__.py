@@ -1,0 +1,1 @@
+"""Show objects as text and in notebooks."""

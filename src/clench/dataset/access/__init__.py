@@ -1,0 +1,1 @@
+"""Read a dataset, as rows, arrays or files of other formats."""

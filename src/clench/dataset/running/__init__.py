@@ -1,0 +1,1 @@
+"""Do the units of a job on one machine."""

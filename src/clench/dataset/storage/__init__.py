@@ -1,0 +1,1 @@
+"""What is written: columns, rows, parts, folder, merged file, card."""

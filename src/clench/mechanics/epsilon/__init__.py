@@ -1,0 +1,1 @@
+"""The wrenches that a grasp resists, and bounds of them."""

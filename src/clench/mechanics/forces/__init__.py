@@ -1,0 +1,1 @@
+"""Contact forces and joint torques that hold a load."""

@@ -1,0 +1,145 @@
+"""Second-order cone programs over contact forces, solved by Clarabel (interior point), and balanced afterwards.
+
+Forces that are sent to a hand are planned with the round friction cones. Polyhedra inside them are used where many
+programs or hulls are needed: for epsilon, volume and the fast bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from clench.core.pose import FloatArray
+from clench.mechanics.grasp.contacts import ContactSet
+from clench.mechanics.grasp.tendon_tensions import TendonDrive
+
+#: Accuracy asked of the solver, relative and absolute [-].
+_ACCURACY = 1e-10
+#: Step lengths towards the boundary. Shorter steps follow if the solver finds neither forces nor a proof that none
+#: exist; near the limits about one program in a hundred cycles [-].
+_STEPS = (0.99, 0.9)
+#: Weight of the squared forces beside the cost: among equally good ones the smallest are taken [-].
+_SMALLEST = 1e-9
+#: Cones and limits are narrowed by this fraction, so that balancing afterwards stays inside them [-].
+_INSIDE = 1e-8
+
+
+@dataclass
+class ConeProgram:
+    """Collect a program over `size` unknowns: minimise `cost x + small |x|²` under the added constraints.
+
+    Args:
+        size: number of unknowns. cost: shape (size,).
+    """
+
+    size: int
+    cost: FloatArray
+    _equal: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    _most: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    _cones: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+
+    def equal(self, rows: FloatArray, values: FloatArray) -> None:
+        """Demand `rows x = values`."""
+        self._equal.append((rows, values))
+
+    def at_most(self, rows: FloatArray, values: FloatArray) -> None:
+        """Demand `rows x <= values`; infinite values demand nothing."""
+        finite = np.isfinite(values)
+        if finite.any():
+            self._most.append((rows[finite], values[finite]))
+
+    def inside_cone(self, rows: FloatArray, values: FloatArray) -> None:
+        """Demand that the first entry of `rows x + values` is at least the norm of the others."""
+        self._cones.append((rows, values))
+
+    def solve(self) -> FloatArray | None:
+        """Return the best x, or None where nothing satisfies the demands."""
+        import clarabel
+        from scipy import sparse
+
+        blocks = [
+            *((rows, values) for rows, values in self._equal),
+            *((rows, values) for rows, values in self._most),
+            *((-rows, values) for rows, values in self._cones),
+        ]
+        cones: list[Any] = []
+        if self._equal:
+            cones.append(clarabel.ZeroConeT(sum(len(v) for _, v in self._equal)))
+        if self._most:
+            cones.append(clarabel.NonnegativeConeT(sum(len(v) for _, v in self._most)))
+        cones += [clarabel.SecondOrderConeT(len(v)) for _, v in self._cones]
+        A = sparse.csc_matrix(np.vstack([rows for rows, _ in blocks]))
+        b = np.concatenate([values for _, values in blocks])
+        P = sparse.csc_matrix(np.eye(self.size) * _SMALLEST)
+        status = clarabel.SolverStatus
+        for step in _STEPS:
+            answer = clarabel.DefaultSolver(P, self.cost, A, b, cones, _settings(clarabel, step)).solve()
+            if answer.status in (status.Solved, status.AlmostSolved):
+                return np.array(answer.x)
+            if answer.status in (status.PrimalInfeasible, status.AlmostPrimalInfeasible):
+                return None
+        return None
+
+
+def demand_cones(
+    program: ConeProgram, contacts: ContactSet, forces: FloatArray, extra: FloatArray | None = None
+) -> None:
+    """Demand that contact forces lie inside their friction cones.
+
+    Args:
+        program: to add to. contacts: C of them.
+        forces: rows that give all force components from the unknowns, shape (C * width, size).
+        extra: added to them, shape (C * width,).
+    """
+    width = contacts.width
+    scale = np.ones((len(contacts), width))
+    scale[:, :2] = 1.0 / contacts.reach[:, :2]
+    scale[:, 3:] = 1.0 / contacts.reach[:, 2:]
+    scale[:, 2] = 1.0 - _INSIDE
+    order = [2, 0, 1, 3][:width]
+    constant = np.zeros(len(contacts) * width) if extra is None else extra
+    for c in range(len(contacts)):
+        own = slice(c * width, (c + 1) * width)
+        rows = (forces[own] * scale[c][:, None])[order]
+        program.inside_cone(rows, (constant[own] * scale[c])[order])
+
+
+def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, extra: FloatArray | None = None) -> None:
+    """Demand `|rows x + extra| <= limits`, a little inside."""
+    constant = np.zeros(len(rows)) if extra is None else extra
+    inner = limits * (1.0 - _INSIDE)
+    program.at_most(rows, inner - constant)
+    program.at_most(-rows, inner + constant)
+
+
+def demand_tensions(program: ConeProgram, torques: FloatArray, drive: TendonDrive, first: int) -> FloatArray:
+    """Demand that tendons within their limits give torques; return the rows that give the tensions, shape (T, size).
+
+    Args:
+        program: to add to.
+        torques: rows of the torques of all degrees of freedom, in units in which they are as large as forces.
+        drive: the tendons, in the same units. first: place of the first tension among the unknowns.
+    """
+    tensions = np.eye(len(drive.t_min), program.size, first)
+    program.equal(torques[list(drive.columns)] - drive.arms @ tensions, np.zeros(len(drive.columns)))
+    program.at_most(tensions / drive.t_max[:, None], np.full(len(tensions), 1.0 - _INSIDE))
+    program.at_most(-tensions, -drive.t_min * (1.0 + _INSIDE))
+    return tensions
+
+
+def balanced(G: FloatArray, forces: FloatArray, wrench: FloatArray) -> FloatArray:
+    """Return the nearest forces with `G f = wrench` to rounding."""
+    for _ in range(2):
+        forces = forces + np.linalg.pinv(G) @ (wrench - G @ forces)
+    return forces
+
+
+def _settings(clarabel: Any, step: float) -> Any:
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_feas = settings.tol_gap_abs = settings.tol_gap_rel = _ACCURACY
+    settings.max_threads = 1
+    settings.max_step_fraction = step
+    return settings

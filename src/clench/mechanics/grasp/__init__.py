@@ -1,0 +1,1 @@
+"""A grasp as mechanics sees it: contacts, loads, grasp map, Jacobian, limits."""

@@ -1,0 +1,112 @@
+"""The names of Numba and llvmlite that they do not promise to keep: which are used, and where they are."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from clench.kernels.closing.solve_poses import solve_poses
+from clench.kernels.runtime.kernel_cache import index_of
+
+ROOT = Path(__file__).parents[3]
+#: The first version that has not been tried. Try it, and read its changes of the names below, before this is raised.
+UNTRIED = "0.69"
+#: What is imported from modules that the manual of Numba does not describe.
+IMPORTED = {
+    "llvmlite.ir",
+    "numba.core.cgutils",
+    "numba.core.imputils.impl_ret_borrowed",
+    "numba.core.registry.CPUDispatcher",
+    "numba.core.typing.templates.AttributeTemplate",
+}
+#: Attributes of these, of compiled functions, and of what the extension interface passes to functions.
+ATTRIBUTES = {
+    "llvmlite.ir.IRBuilder": {"extract_value", "insert_value", "inttoptr", "load", "store"},
+    "llvmlite.ir.Type": {"as_pointer"},
+    "numba.core.base.BaseContext": {"get_abi_sizeof", "get_constant", "get_dummy_value", "get_value_type"},
+    "numba.core.cgutils": {"alloca_once_value", "gep_inbounds"},
+    "numba.core.cpu.CPUTargetOptions": {"_nrt", "no_cfunc_wrapper", "no_cpython_wrapper"},
+    "numba.core.datamodel.manager.DataModelManager": {"lookup"},
+    "numba.core.pythonapi.PythonAPI": {"decref", "long_as_longlong", "object_getattr_string"},
+    "numba.core.registry.CPUDispatcher": {"get_call_template"},
+}
+#: Attributes of compiled functions and of their index on disk, which only objects have.
+OF_KERNELS = {"_cache", "_cache_file", "_load_index", "_source_stamp"}
+SOURCES = [path for folder in ("src", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
+FUTURE = "from __future__ import annotations\n"
+RUNTIME = sorted((ROOT / "src" / "clench" / "kernels" / "runtime").glob("*.py"))
+
+
+def undocumented_imports(path: Path) -> set[str]:
+    """Return the names that a file imports from where the manual describes nothing."""
+    found, text = set[str](), path.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(text)) if re.search("numba|llvmlite", text) else ():
+        if isinstance(node, ast.ImportFrom) and re.match(r"llvmlite\b|numba\.(?!extending$|cuda$)", node.module or ""):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            names = (alias.name for alias in node.names)
+            found |= {name for name in names if re.match(r"llvmlite\b|numba\.(?!extending$|cuda$)", name)}
+    return found
+
+
+def find(name: str) -> object:
+    """Return a module, or what a module has."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError:
+        module, _, rest = name.rpartition(".")
+        return getattr(importlib.import_module(module), rest)
+
+
+def test_every_undocumented_import_is_listed_and_exists() -> None:
+    used = set().union(*map(undocumented_imports, SOURCES))
+    assert used == IMPORTED
+    for name in IMPORTED:
+        assert find(name) is not None
+
+
+def test_undocumented_names_are_used_in_the_runtime_only() -> None:
+    others = [path for path in SOURCES if path not in RUNTIME]
+    assert len(others) > 400
+    assert [path for path in others if undocumented_imports(path)] == []
+    private = re.compile(rf"\.({'|'.join(OF_KERNELS)})\b")
+    assert [path for path in others if private.search(path.read_text(encoding="utf-8"))] == []
+
+
+@pytest.mark.parametrize("owner", ATTRIBUTES)
+def test_undocumented_attributes_exist(owner: str) -> None:
+    assert {name for name in ATTRIBUTES[owner] if not hasattr(find(owner), name)} == set()
+
+
+def owner_of(node: ast.Attribute) -> str:
+    """Return the last name before an attribute: `pyapi` of `c.pyapi.decref`."""
+    return ast.unparse(node.value).rpartition(".")[2]
+
+
+def test_every_undocumented_attribute_is_listed_and_used() -> None:
+    listed = OF_KERNELS.union(*ATTRIBUTES.values())
+    text = "".join(path.read_text(encoding="utf-8") for path in RUNTIME)
+    assert {name for name in listed if not re.search(rf"\b{name}\b", text)} == set()
+    attributes = [node for node in ast.walk(ast.parse(text.replace(FUTURE, ""))) if isinstance(node, ast.Attribute)]
+    interface = {"cgutils", "builder", "manager", "context", "pyapi"}
+    used = {a.attr for a in attributes if owner_of(a) in interface}
+    used |= {a.attr for a in attributes if re.match(r"_[a-z]", a.attr) and owner_of(a) != "self"}
+    assert len(used) > 15
+    assert used <= listed
+
+
+def test_a_kernel_has_what_its_cache_is_known_by() -> None:
+    index = index_of(solve_poses)
+    assert callable(index._load_index)
+    assert isinstance(index._source_stamp, bytes)
+
+
+def test_the_versions_that_are_allowed_were_tried() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (numba,) = [each for each in project["dependencies"] if each.startswith("numba>")]
+    assert numba.endswith(f",<{UNTRIED}")
