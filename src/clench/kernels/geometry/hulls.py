@@ -25,8 +25,11 @@ FEW: Final = 16
 MANY: Final = 200
 COARSE: Final = 8
 FINE: Final = 16
-#: More than rounding, as a fraction of a hull's size, and of a cone's width [-].
+#: More than rounding, as a fraction of a hull's size [-].
 ROUNDING: Final = 1e-12
+#: Points are taken to lie in a plane if their box is thinner than this fraction of its size [-].
+THIN: Final = 1e-6
+#: By which a cone is widened [-].
 SLACK: Final = 1e-6
 
 
@@ -78,36 +81,23 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
 
 
 def _corners(points: Floats, radius: float) -> tuple[Floats, float]:
-    """Return the corners of the hull of points, and the radius by which it is grown to hold them, grown by theirs."""
+    """Return the points that can be corners of their hull, and the radius by which that is grown to hold all of them.
+
+    Of points that nearly lie in a plane all are kept: rounding does not tell there which ones lie inside.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     points = np.unique(points, axis=0)
-    margin = ROUNDING * float(np.abs(points).max(initial=0.0))
-    if len(points) > FEW:
-        try:
-            hull = ConvexHull(points)
-        except QhullError:
-            return points, radius + margin
-        left = np.delete(points, hull.vertices, axis=0)
-        left = left[(left @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1, initial=-1.0) > 0.0]
-        if len(left):
-            margin += float(np.sqrt(_squares_to_triangles(left, points[hull.simplices]).min(axis=1).max()))
-        points = points[hull.vertices]
-    return points, radius + margin
-
-
-def _squares_to_triangles(points: Floats, triangles: Floats) -> Floats:
-    """Return the squared distance of every point from a point of every triangle, mostly from the nearest one [m²]."""
-    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    uu, vv, uv = (u * u).sum(axis=1), (v * v).sum(axis=1), (u * v).sum(axis=1)
-    ap = points[:, None] - a[None]
-    pu, pv = (ap * u).sum(axis=2), (ap * v).sum(axis=2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s, t = np.nan_to_num(np.stack([vv * pu - uv * pv, uu * pv - uv * pu]) / (uu * vv - uv * uv))
-    s, t = np.clip(s, 0.0, 1.0), np.clip(t, 0.0, 1.0)
-    total = np.maximum(s + t, 1.0)
-    near = ap - (s / total)[..., None] * u - (t / total)[..., None] * v
-    return (near * near).sum(axis=2)
+    radius += ROUNDING * float(np.abs(points).max(initial=0.0))
+    if len(points) <= FEW or _box(points)[:, 4].min() < THIN * np.ptp(points, axis=0).max():
+        return points, radius
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return points, radius
+    outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1) > 0.0
+    outside[hull.vertices] = True
+    return points[outside], radius
 
 
 def _box(points: Floats) -> Floats:
