@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clench.kernels.geometry.bodies import Elements, pack_bodies
-from clench.kernels.toi import body_sweep, core_motion, pair_queue
+from clench.kernels.hulls import body_sweep
+from clench.kernels.toi import core_motion, pair_queue
 from clench.kernels.toi import separating_planes as parting
 from clench.kernels.toi import toi_work as sweeping
 from clench.kernels.toi.separating import OVERLAP

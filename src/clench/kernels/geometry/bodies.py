@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.memory import in_parts
+from clench.kernels.hulls.enclosing_hulls import HullArrays, pack_hulls
 
 from .bvh import MeshTree, build_tree
-from .hulls import HullArrays, pack_hulls
 from .obb import SLAB, node_slabs
 
 Floats = NDArray[np.float64]
@@ -104,7 +104,8 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         elements += len(part.elements)
         nodes += len(part.node)
     joined: Any = [np.concatenate(column) for column in list(zip(*packed, strict=True))[:-1]]
-    return BodyArrays(*joined, pack_hulls([_parts(body) for body in bodies]))
+    joined.append(pack_hulls([_parts(body) for body in bodies]))
+    return BodyArrays(*joined)
 
 
 def _parts(body: Elements) -> list[tuple[Floats, float]]:

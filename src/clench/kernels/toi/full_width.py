@@ -29,10 +29,10 @@ from clench.kernels.geometry.core_distance import AT_CORNER, edge_count, face_no
 from clench.kernels.geometry.crossing import across
 from clench.kernels.geometry.link_boxes import boxes_meet
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
+from clench.kernels.hulls.near_elements import list_touching
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import copy_pose
 
-from .near_elements import list_touching
 from .separating import side
 from .spatial_motion import turned_about
 from .toi_work import SweepWork, bodies_overlap, make_sweep_work, put_core

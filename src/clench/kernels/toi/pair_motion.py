@@ -14,10 +14,10 @@ from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.link_frames import FrameArrays, put_link
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, make_depth_work
 from clench.kernels.geometry.vectors import Vector
+from clench.kernels.hulls.body_sweep import sweep_body
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_pose, put_point
 
-from .body_sweep import sweep_body
 from .toi_work import SweepWork, make_sweep_work
 
 

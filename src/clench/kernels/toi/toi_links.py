@@ -11,11 +11,11 @@ import math
 from clench.core.tolerances import SWEEP_FRACTION
 from clench.kernels.closing.layout import ChainArrays, Floats, Work
 from clench.kernels.geometry.bodies import BodyArrays
+from clench.kernels.hulls.body_sweep import sweep_body
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.advance import fill_chain, place_joints
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
 
-from .body_sweep import sweep_body
 from .full_width import ExactArrays, keep_pair, last_mover, place_axes, pose_movers
 from .separating_planes import lanes_apart
 from .toi_work import SweepWork

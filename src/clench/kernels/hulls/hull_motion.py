@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.hulls import HullArrays, lowest_corner
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.toi.core_motion import base_motion
+from clench.kernels.toi.spatial_motion import axis_of, is_spatial, moved, point_bounds, turned_about
+from clench.kernels.toi.toi_work import SweepWork
 
-from .core_motion import base_motion
-from .spatial_motion import axis_of, is_spatial, moved, point_bounds, turned_about
-from .toi_work import SweepWork
+from .enclosing_hulls import HullArrays, lowest_corner
 
 
 class HullMotion(NamedTuple):
@@ -35,7 +35,7 @@ class HullMotion(NamedTuple):
 
 
 @kernel
-def hull_motion(bodies: BodyArrays, hull: int, chain: Floats, count: int, sweep: SweepWork) -> HullMotion:
+def motion_of_hull(bodies: BodyArrays, hull: int, chain: Floats, count: int, sweep: SweepWork) -> HullMotion:
     """Return how a hull moves with a chain.
 
     Args:
@@ -114,7 +114,7 @@ def height(hulls: HullArrays, motion: HullMotion, T: Floats, n: Vector) -> float
     y = T[0, 1] * n[0] + T[1, 1] * n[1] + T[2, 1] * n[2]
     z = T[0, 2] * n[0] + T[1, 2] * n[1] + T[2, 2] * n[2]
     low, _ = lowest_corner(hulls, motion.hull, x, y, z)
-    return low + n[0] * T[0, 3] + n[1] * T[1, 3] + n[2] * T[2, 3] - motion.radius
+    return float(low + n[0] * T[0, 3] + n[1] * T[1, 3] + n[2] * T[2, 3] - motion.radius)
 
 
 @kernel

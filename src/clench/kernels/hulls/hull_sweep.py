@@ -11,14 +11,15 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.gjk import lowest_of, separating_direction
-from clench.kernels.geometry.hulls import HullArrays
 from clench.kernels.geometry.obb import slab_top
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
+from clench.kernels.toi.toi_work import SweepWork
 
-from .hull_motion import HullMotion, height, hull_motion, put_pose
+from .enclosing_hulls import HullArrays
+from .gjk import lowest_of, separating_direction
+from .hull_motion import HullMotion, height, motion_of_hull, put_pose
 from .hull_window import (
     BOX_END,
     CORNERS,
@@ -38,7 +39,6 @@ from .hull_window import (
     renew_planes,
     square_from_box,
 )
-from .toi_work import SweepWork
 
 #: Windows at most.
 WINDOWS = 40
@@ -102,7 +102,7 @@ def clear_hull(
     sweep: SweepWork,
 ) -> float:
     """Return for one hull of the moving body what `clear_travel` returns."""
-    motion, window = hull_motion(moving, hull, chain, count, sweep), sweep.hull
+    motion, window = motion_of_hull(moving, hull, chain, count, sweep), sweep.hull
     forget_planes(window)
     put_pose(chain, count, 0.0, sweep, window[NOW:END])
     for c in range(3):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.gjk import lowest_of, separating_direction
-from clench.kernels.geometry.hulls import HullArrays
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
+from clench.kernels.toi.toi_work import SweepWork
 
-from .hull_motion import HullMotion, height, hull_motion, put_pose
+from .enclosing_hulls import HullArrays
+from .gjk import lowest_of, separating_direction
+from .hull_motion import HullMotion, height, motion_of_hull, put_pose
 from .hull_sweep import FINE
 from .hull_window import (
     BOX_END,
@@ -29,7 +30,6 @@ from .hull_window import (
     remember_plane,
     square_from_box,
 )
-from .toi_work import SweepWork
 
 
 @kernel
@@ -51,7 +51,7 @@ def list_near(
     """
     found, window = 0, sweep.hull
     for hull in range(moving.hulls.body[m], moving.hulls.body[m + 1]):
-        motion = hull_motion(moving, hull, chain, count, sweep)
+        motion = motion_of_hull(moving, hull, chain, count, sweep)
         forget_planes(window)
         put_pose(chain, count, 0.0, sweep, window[NOW:END])
         begin_window(moving, motion, chain, count, 0.0, end, sweep)

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.geometry import gjk
-from clench.kernels.geometry.hulls import pack_hulls
-from kernels.geometry.test_hulls import KINDS, cloud
+from clench.kernels.hulls import gjk
+from clench.kernels.hulls.enclosing_hulls import pack_hulls
+from kernels.hulls.test_enclosing_hulls import KINDS, cloud
 from kernels.kernel_entries import entry
 
 separating_direction = entry(gjk.separating_direction)

@@ -7,7 +7,7 @@ import math
 from clench.kernels.closing.layout import Floats
 from clench.kernels.runtime.compiling import kernel
 
-from .hulls import HullArrays, lowest_corner, lowest_point
+from .enclosing_hulls import HullArrays, lowest_corner, lowest_point
 
 #: Steps at most; a direction that is found by then serves as well as it does.
 STEPS = 20

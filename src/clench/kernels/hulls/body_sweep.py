@@ -9,12 +9,12 @@ from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
+from clench.kernels.toi.spatial_motion import axis_of, is_spatial, turned_about, way_of
+from clench.kernels.toi.toi_bodies import NONE, keep_earliest, measure, sweep_elements
+from clench.kernels.toi.toi_work import SweepWork, item_of, push_roots
 
 from .hull_sweep import NEAR, clear_travel
 from .near_elements import list_near
-from .spatial_motion import axis_of, is_spatial, turned_about, way_of
-from .toi_bodies import NONE, keep_earliest, measure, sweep_elements
-from .toi_work import SweepWork, item_of, push_roots
 
 #: The elements sweep so far at first from where hulls are near, as a multiple of `NEAR`; each time farther by `LONGER`.
 FIRST, LONGER = 8.0, 16.0

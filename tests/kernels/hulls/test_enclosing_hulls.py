@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.geometry import hulls as hulls_module
-from clench.kernels.geometry.hulls import FEW, MANY, pack_hulls
+from clench.kernels.hulls import enclosing_hulls as hulls_module
+from clench.kernels.hulls.enclosing_hulls import FEW, MANY, pack_hulls
 from kernels.kernel_entries import entry
 
 lowest_corner = entry(hulls_module.lowest_corner)

@@ -132,7 +132,7 @@ def _cones(side: int) -> tuple[Floats, Floats]:
                 d = np.empty((side, side, 3))
                 d[..., axis], d[..., (axis + 1) % 3], d[..., (axis + 2) % 3] = sign, a, b
                 out.append(d.reshape(-1, 3))
-        found = np.concatenate(out)
+        found: Floats = np.concatenate(out)
         return found / np.linalg.norm(found, axis=1)[:, None]
 
     center = directions((0.0, 0.0))
@@ -143,7 +143,7 @@ def _cones(side: int) -> tuple[Floats, Floats]:
 @kernel
 def place_on_edge(a: float, side: int) -> int:
     """Return the number of the interval that a coordinate from -1 to 1 is in."""
-    return min(max(int(0.5 * (a + 1.0) * side), 0), side - 1)
+    return int(min(max(int(0.5 * (a + 1.0) * side), 0), side - 1))
 
 
 @kernel

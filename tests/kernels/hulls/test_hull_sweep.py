@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.geometry.bodies import Elements, no_body, pack_bodies
-from clench.kernels.geometry.hulls import pack_hulls
-from clench.kernels.toi import core_motion, hull_motion, hull_sweep, near_elements
+from clench.kernels.hulls import hull_motion, hull_sweep, near_elements
+from clench.kernels.hulls.enclosing_hulls import pack_hulls
+from clench.kernels.toi import core_motion
 from clench.kernels.toi import toi_work as sweeping
 from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry

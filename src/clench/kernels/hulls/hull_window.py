@@ -13,14 +13,14 @@ from typing import Any
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.gjk import lowest_of
-from clench.kernels.geometry.hulls import HullArrays
 from clench.kernels.geometry.obb import slab_top
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.toi.toi_work import SweepWork
 
+from .enclosing_hulls import HullArrays
+from .gjk import lowest_of
 from .hull_motion import HullMotion, bend_along, height, lowest_between, put_pose
-from .toi_work import SweepWork
 
 #: Poses of the moving body in the resting one's frame where the window begins, and where it ends.
 NOW, END = 0, 3
