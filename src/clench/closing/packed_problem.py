@@ -155,7 +155,7 @@ def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) ->
 
     target, bodies, items = object_arrays(packed), plan.bodies, items_around(plan, packed)
     return ProblemArrays(
-        hand=plan.arrays,
+        hand=plan.arrays(planar=bool((items.low < items.high).any())),
         exact=plan.exact._replace(object=target.bodies),
         items=items,
         target=target,

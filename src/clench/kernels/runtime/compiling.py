@@ -104,7 +104,7 @@ def is_kept(function: Any) -> bool:
 class CachedKernel(CPUDispatcher):
     """A kernel that other kernels hand tuples by pointer; Python calls it with values."""
 
-    def get_call_template(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+    def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return how another kernel calls this one: once for all values of a number.
 
         Numba would compile it anew for every integer that the other kernel writes out in a call.

@@ -16,7 +16,7 @@ from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import compile_result
-from numba.core.runtime import rtsys
+from numba.core.runtime.nrt import rtsys
 
 #: Errors of reading a damaged file, or one that names modules or classes which this version does not have.
 _UNREADABLE = (ImportError, AttributeError, pickle.UnpicklingError, EOFError, TypeError, ValueError, IndexError)
