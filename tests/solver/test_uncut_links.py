@@ -34,3 +34,13 @@ def test_a_solve_on_planes_cuts_the_links(cuts, options):
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE, preshape="open", **options))
     assert cuts
+
+
+def test_the_reason_for_the_posture_is_known_before_those_for_the_sets(cuts):
+    hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
+    choice = clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE)).choice
+    assert choice["preshapes"]["chosen"] in choice["preshapes"]["compared"]
+    assert not cuts
+    assert choice["fingers"]
+    assert cuts
+    assert list(choice)[-1] == "preshapes"
