@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clench.core.errors import HandError
+from clench.core.keeping import Keeper
 from clench.core.pose import FloatArray, invert
 from clench.core.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Finger, Hand, JointRole
@@ -44,7 +45,7 @@ class PlannedJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class FingerPlan:
+class FingerPlan(Keeper):
     """The plan for closing one finger from one open posture.
 
     Args:

@@ -6,12 +6,10 @@ Surfaces that do not cross leave only this to be asked, and for each connected p
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Final
 
 import numpy as np
 
 from clench.closing.linkage import placed_links
-from clench.core.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
@@ -19,9 +17,6 @@ from clench.models.shapes import CollisionSource
 
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
 from .packed_object import PackedObject
-
-_KEPT_HANDS: Final = 16
-_KEPT_POSTURES: Final = 64
 
 
 def contained_link(
@@ -48,29 +43,12 @@ def contained_link(
 
 
 def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked: np.ndarray) -> tuple[int, int] | None:
-    """Return a link that has a part inside another one, and that one, or None; looked for once per posture.
+    """Return a link that has a part inside another one, and that one, or None.
 
     Args:
         hand: the hand. q: angles of all its joints [rad], shape (J,). source: geometry of the hand.
         checked: which links may not overlap which, shape (L, L).
     """
-    known, posture = _nested(hand, source, checked), q.tobytes()
-    if posture not in known:
-        if len(known) >= _KEPT_POSTURES:
-            known.clear()
-        known[posture] = _link_within_link(hand, q, source, checked)
-    return known[posture]
-
-
-@kept_by_identity(_KEPT_HANDS)
-def _nested(hand: Hand, source: CollisionSource, checked: np.ndarray) -> dict[bytes, tuple[int, int] | None]:
-    """Return the cached nested links, by posture."""
-    return {}
-
-
-def _link_within_link(
-    hand: Hand, q: FloatArray, source: CollisionSource, checked: np.ndarray
-) -> tuple[int, int] | None:
     from clench.kernels.geometry.mesh_distance import is_inside
 
     meshes = link_meshes(hand, source)
