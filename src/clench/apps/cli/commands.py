@@ -120,7 +120,6 @@ def solve(
     import clench
     from clench.closing.collision.sizes import warn_of_size
     from clench.models.objects.loading import size_warnings
-    from clench.solver.analysis.pareto import hand_front
     from clench.solver.orders import settled
 
     from .choice_tables import print_choice
@@ -160,6 +159,8 @@ def solve(
     if json:
         more: dict[str, Any] = {} if error is None else {"pose_error": error.to_dict()}
         if explain:
+            from clench.solver.analysis.pareto import hand_front
+
             more["pareto_front"] = [entry.to_dict() for entry in hand_front(solution)]
         print_json(solution.to_dict() | more)
     else:
