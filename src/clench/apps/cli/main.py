@@ -21,8 +21,8 @@ from clench.core.errors import ClenchError, UnknownNameError
 from .parsing import EXIT_BAD_INPUT, EXIT_INTERRUPTED, PRINT_COMPLETION, parse_call, print_completion
 
 EXIT_INTERNAL = 70
-#: Number of new objects that start the first collection, and of collections that start the next wider one. A short command
-#: makes 300,000 objects and no garbage.
+#: Number of new objects that start the first collection, and of collections that start the next wider one. A short
+#: command makes 300,000 objects and no garbage.
 GARBAGE_THRESHOLDS = (500_000, 20, 100)
 
 DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
