@@ -122,7 +122,7 @@ def solve(
     from clench.models.objects.loading import size_warnings
     from clench.solver.orders import settled
 
-    from .choice_tables import print_choice
+    from .choice_tables import plain_front, print_choice
     from .kernel_loading import compile_kernels, load_kernels
     from .preshape_tables import print_posture_choice
     from .printing import print_forces, print_pose_error, print_solution
@@ -159,9 +159,7 @@ def solve(
     if json:
         more: dict[str, Any] = {} if error is None else {"pose_error": error.to_dict()}
         if explain:
-            from clench.solver.analysis.pareto import hand_front
-
-            more["pareto_front"] = [entry.to_dict() for entry in hand_front(solution)]
+            more["pareto_front"] = plain_front(solution)
         print_json(solution.to_dict() | more)
     else:
         untold = [warning for warning in the_object.warnings if warning not in told]
