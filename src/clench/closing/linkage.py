@@ -29,9 +29,10 @@ def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
 def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
     """Return `T_palm_link` of every link at a posture [rad], as the kernels place them, shape (L, 3, 4)."""
     from clench.kernels.geometry.link_frames import place_links
+    from clench.kernels.runtime.by_reference import kept
 
     poses = np.empty((len(hand.links), 3, 4))
-    place_links(hand_frames(hand), np.ascontiguousarray(q), poses)
+    place_links(hand.kept(("kept frames",), lambda: kept(hand_frames(hand))), np.ascontiguousarray(q), poses)
     return poses
 
 

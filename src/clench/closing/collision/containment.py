@@ -34,11 +34,12 @@ def contained_link(
         T_palm_object: pose of the object, shape (4, 4). source: geometry of the hand. links: which links.
     """
     from clench.kernels.geometry.link_meshes import find_contained
+    from clench.kernels.runtime.by_reference import kept
 
     meshes = link_mesh_arrays(hand, source)
     T = np.ascontiguousarray(np.asarray(T_palm_object, dtype=np.float64)[:3])
     poses = placed_links(hand, q)
-    found = int(find_contained(meshes, mesh_mask(meshes, links), poses, object_mesh(packed), T))
+    found = int(find_contained(kept(meshes), mesh_mask(meshes, links), poses, kept(object_mesh(packed)), T))
     return None if found < 0 else found
 
 
@@ -64,6 +65,6 @@ def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked
     near &= checked[np.ix_(links[owner], links)].T != 0
     for m, k in zip(*np.nonzero(near), strict=True):
         p = (points[k] - poses[m, :3, 3]) @ poses[m, :3, :3]
-        if is_inside(meshes[m].tree, (p[0], p[1], p[2]), meshes[m].closed):
+        if is_inside(meshes[m].kept_tree, (p[0], p[1], p[2]), meshes[m].closed):
             return int(links[owner[k]]), int(links[m])
     return None
