@@ -127,3 +127,13 @@ def test_outlines_belong_to_the_joint_that_moves_their_link_last():
     first, second = found.families
     assert {(o.link, o.joint) for row in first.outlines for o in row} == {(1, 0), (2, 0), (3, 0)}
     assert {(o.link, o.joint) for row in second.outlines for o in row} == {(3, 1)}
+
+
+@pytest.mark.parametrize("planes", [1, 3, 9])
+def test_the_length_of_a_finger_bounds_its_cuts_and_ignores_their_number(planes):
+    hand = chain([CLOSING, POSTURE, CLOSING])
+    found = plan(hand, [0.0, 0.4, 0.0], planes)
+    assert found.length == plan(hand, [0.0, 0.4, 0.0], 5).length
+    reach = max(f.reach for f in found.families)
+    assert reach <= found.length * (1.0 + 1e-3)
+    assert found.length <= 1.5 * reach

@@ -1,34 +1,16 @@
-"""A command is checked once per content, and whatever changes in it is seen."""
-
-from dataclasses import replace
+"""A command is checked, and later changes of what was given do not reach the checked one."""
 
 import numpy as np
 import pytest
 
 import clench
-from clench import ClosingOrder, GraspCommand, Pose
+from clench import GraspCommand, Pose
 from clench.core.exceptions import ClenchError
-from clench.solver import checked_command as module
 from clench.solver.checked_command import checked
 
 HAND = clench.Hand.load("patent15")
 JOINT = next(j.name for j in HAND.joints if str(j.role) == "closing")
 HERE, THERE = Pose([0.0, 0.0, 0.1]), Pose([0.1, 0.0, 0.1])
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        {},
-        {"preshape": {JOINT: 0.1}, "planes": 3, "fingers": (HAND.fingers[0].name,)},
-        {"preshape": {JOINT: np.float64(0.1)}, "next_steps": ({JOINT: 0.2},)},
-        {"order": ClosingOrder.TOGETHER, "criteria": {"range_of_motion": 1.0}},
-    ],
-)
-def test_the_same_content_at_other_poses_is_checked_once(content):
-    first = checked(HAND, GraspCommand(HERE, **content))
-    assert checked(HAND, GraspCommand(THERE, object_pose=HERE, **content)) is first
-    assert checked(replace(HAND, name="another"), GraspCommand(HERE, **content)) is not first
 
 
 @pytest.mark.parametrize(
@@ -46,12 +28,11 @@ def test_the_same_content_at_other_poses_is_checked_once(content):
 )
 def test_what_only_equals_something_good_is_refused_all_the_same(good, bad):
     checked(HAND, GraspCommand(HERE, **good))
-    for _ in range(2):
-        with pytest.raises(ClenchError):
-            checked(HAND, GraspCommand(HERE, **bad))
+    with pytest.raises(ClenchError):
+        checked(HAND, GraspCommand(HERE, **bad))
 
 
-def test_a_change_of_what_was_given_is_seen_and_reaches_nothing_that_was_kept():
+def test_a_change_of_what_was_given_reaches_no_command_that_was_checked():
     preshape = {JOINT: 0.1}
     command = GraspCommand(HERE, preshape=preshape)
     before = checked(HAND, command)
@@ -65,11 +46,10 @@ def test_a_change_of_what_was_given_is_seen_and_reaches_nothing_that_was_kept():
         checked(HAND, command)
 
 
-def test_a_change_deep_inside_reaches_nothing_that_was_kept():
+def test_a_change_deep_inside_reaches_no_command_that_was_checked():
     force = [0.0, 0.0, -2.0]
     first = checked(HAND, GraspCommand(HERE, task_wrenches=({"force": force},), preshape="open"))
     force[2] = -20.0
-    assert checked(HAND, GraspCommand(HERE, task_wrenches=({"force": [0.0, 0.0, -2.0]},), preshape="open")) is first
     assert first.command.task_wrenches == ({"force": (0.0, 0.0, -2.0)},)
 
 
@@ -96,22 +76,6 @@ def test_zeros_of_either_sign_are_told_apart():
         checked(HAND, GraspCommand(HERE, preshape={JOINT: zero})).start[HAND.joint_index(JOINT)] for zero in (0.0, -0.0)
     ]
     assert [bool(np.signbit(sign)) for sign in signs] == [False, True]
-
-
-def test_values_that_may_change_unseen_are_checked_every_time():
-    class Steps(dict):
-        pass
-
-    command = GraspCommand(HERE, preshape=Steps({JOINT: 0.1}))
-    assert checked(HAND, command) is not checked(HAND, command)
-
-
-def test_few_are_kept():
-    again = checked(HAND, GraspCommand(HERE, seed=77, preshape="open"))
-    for planes in range(1, 100):
-        checked(HAND, GraspCommand(HERE, planes=planes, preshape="open"))
-        assert checked(HAND, GraspCommand(HERE, seed=77, preshape="open")) is again
-    assert len(module._kept) == 64
 
 
 def test_a_solution_has_the_poses_of_its_own_command():

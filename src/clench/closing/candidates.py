@@ -157,7 +157,8 @@ def read_candidates(
         answer = answer._replace(travel=travel, contacts=contacts)
     touches, postures = _read_items(plan, packed, T_palm_object, answer)
     sunk = [LinkDepth(SUNK - link, 0.0, None) if link <= SUNK else None for link in answer.overlap.tolist()]
-    groups, low, skipped = plan.arrays.entry_group.tolist(), plan.items.low.tolist(), answer.skipped.tolist()
+    groups = plan.arrays(planar=False).entry_group.tolist()
+    low, skipped = plan.items.low.tolist(), answer.skipped.tolist()
     candidates = []
     for i, entry in enumerate(entries):
         candidates.append(
@@ -214,12 +215,15 @@ def _read_items(
 ) -> tuple[list[tuple[Touch, ...]], FloatArray]:
     """Return the touches of every item, in stage order, and the angles of all joints, (I, J) [rad]."""
     from clench.kernels.closing.contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays, read_touches
+    from clench.kernels.closing.layout import HIT_PLANE
 
     shape = answer.hit.shape[:2]
     read = TouchArrays(np.empty((*shape, TOUCH_INTEGERS), dtype=np.int64), np.empty((*shape, TOUCH_FLOATS)))
     postures = np.empty((shape[0], len(plan.hand.joints)))
     T = np.ascontiguousarray(T_palm_object[:3])
-    read_touches(plan.arrays, plan.frames, object_surface(packed), plan.items, answer, T, read, postures)
+    found = np.arange(shape[1]) < answer.contacts[:, None]
+    hand = plan.arrays(planar=bool((answer.hit[..., HIT_PLANE] >= 0)[found].any()))
+    read_touches(hand, plan.frames, object_surface(packed), plan.items, answer, T, read, postures)
     touches = []
     for i, n in enumerate(answer.contacts.tolist()):
         numbers, values = read.number[i, :n].tolist(), read.value[i, :n].tolist()

@@ -1,14 +1,85 @@
-"""Lay curl planes across a finger (docs/method.md section 1)."""
+"""Lay curl planes across a finger, and cut its links by them (docs/method.md sections 1-2)."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from clench.core.pose import FloatArray
 from clench.core.tolerances import EDGE_INSET
+from clench.models.shapes import Shape
+
+from .outlines import RoundedOutline, cut_shape
 
 #: An edge closer than this fraction of the width to another plane gets none of its own [-].
 _SAME = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class LinkOutline:
+    """Place one rounded outline: which link it is cut from, and which of the plan's joints moves it.
+
+    Args:
+        link: index in the hand. joint: index in the plan's joints. outline: relative to that joint's pivot.
+    """
+
+    link: int
+    joint: int
+    outline: RoundedOutline
+
+
+@dataclass(frozen=True, eq=False)
+class MovedLink:
+    """Place a link that the joints of a family, or later ones, move.
+
+    Args:
+        link: index in the hand. joint: index in the plan's joints of the family's last joint before the link.
+        T_family_link: at the open posture, shape (4, 4). shapes: of the link, in its frame.
+        pivot: of the joint [m], shape (2,). arm: the joint gets no farther from the family's origin [m].
+    """
+
+    link: int
+    joint: int
+    T_family_link: FloatArray
+    shapes: tuple[Shape, ...]
+    pivot: FloatArray
+    arm: float
+
+
+@dataclass(frozen=True, eq=False)
+class CurlFamily:
+    """The parallel curl planes that consecutive joints share.
+
+    Args:
+        T_palm_family: at the open posture, shape (4, 4); y is normal to the planes.
+        offsets: of the planes along y [m], shape (P,).
+        moved: the links that the planes cut.
+    """
+
+    T_palm_family: FloatArray
+    offsets: FloatArray
+    moved: tuple[MovedLink, ...]
+
+    @cached_property
+    def outlines(self) -> tuple[tuple[LinkOutline, ...], ...]:
+        """Per plane, the outlines of every moved link; cut when first read."""
+        return tuple(tuple(o for moved in self.moved for o in _cut(moved, float(y))) for y in self.offsets)
+
+    @cached_property
+    def reach(self) -> float:
+        """No moved point on a plane gets farther from the family's origin in the plane [m]."""
+        arms, reach = {moved.joint: moved.arm for moved in self.moved}, 0.0
+        for o in (o for row in self.outlines for o in row):
+            far = float(np.linalg.norm(o.outline.vertices, axis=1).max()) + o.outline.radius
+            reach = max(reach, arms[o.joint] + far)
+        return reach
+
+    def pivot_in_palm(self, pivot: FloatArray) -> FloatArray:
+        """Return a pivot of its joints in the palm frame at the open posture [m], shape (3,)."""
+        T = self.T_palm_family
+        return np.asarray(T[:3, 3] + T[:3, 0] * pivot[0] + T[:3, 2] * pivot[1])
 
 
 def family_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> FloatArray:
@@ -72,3 +143,8 @@ def refined(offsets: FloatArray, count: int) -> FloatArray:
     missing = count - len(offsets)
     between = np.linspace(offsets[0], offsets[-1], missing + 2)[1:-1]
     return np.sort(np.concatenate([offsets, between]))
+
+
+def _cut(moved: MovedLink, offset: float) -> list[LinkOutline]:
+    cut = (cut_shape(shape, moved.T_family_link, offset) for shape in moved.shapes)
+    return [LinkOutline(moved.link, moved.joint, o.about(moved.pivot)) for o in cut if o is not None]

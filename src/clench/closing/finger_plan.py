@@ -10,14 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clench.core.caching.keeping import Keeper
 from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray, invert
 from clench.core.tolerances import PARALLEL_ANGLE
 from clench.models.hand.hand import Finger, Hand, JointRole
+from clench.models.hand.link_mesh import link_meshes
 from clench.models.shapes import CollisionSource
 
-from .curl_planes import family_frame, plane_offsets, refined
-from .outlines import RoundedOutline, cut_shape, extent
+from .curl_planes import CurlFamily, MovedLink, family_frame, plane_offsets, refined
+from .outlines import extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,42 +45,7 @@ class PlannedJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class LinkOutline:
-    """Place one rounded outline: which link it is cut from, and which of the plan's joints moves it.
-
-    Args:
-        link: index in the hand. joint: index in the plan's joints. outline: relative to that joint's pivot.
-    """
-
-    link: int
-    joint: int
-    outline: RoundedOutline
-
-
-@dataclass(frozen=True, eq=False)
-class CurlFamily:
-    """The parallel curl planes that consecutive joints share.
-
-    Args:
-        T_palm_family: at the open posture, shape (4, 4); y is normal to the planes.
-        offsets: of the planes along y [m], shape (P,).
-        outlines: per plane, the outlines of every link that the family's joints move.
-        reach: no moved point gets farther from the family's origin in the plane [m].
-    """
-
-    T_palm_family: FloatArray
-    offsets: FloatArray
-    outlines: tuple[tuple[LinkOutline, ...], ...]
-    reach: float
-
-    def pivot_in_palm(self, pivot: FloatArray) -> FloatArray:
-        """Return a pivot of its joints in the palm frame at the open posture [m], shape (3,)."""
-        T = self.T_palm_family
-        return np.asarray(T[:3, 3] + T[:3, 0] * pivot[0] + T[:3, 2] * pivot[1])
-
-
-@dataclass(frozen=True, eq=False)
-class FingerPlan:
+class FingerPlan(Keeper):
     """The plan for closing one finger from one open posture.
 
     Args:
@@ -87,7 +54,7 @@ class FingerPlan:
         lengths: travel of each group to its limit [rad]. families: see `CurlFamily`.
         speeds: relative speed of each group in simultaneous closing. breaks: whether later joints of a group continue
             when earlier joints are blocked.
-        length: of the finger [m].
+        length: no moved point gets farther from a family's origin in its plane, for round shapes nearly [m].
     """
 
     finger: Finger
@@ -168,7 +135,7 @@ def plan_finger(
     planned = tuple(_planned(hand, posture, leaders, j, f, pivot, turn) for j, f, pivot, turn in joints)
     order = list(dict.fromkeys(leaders[j] for j in closing))
     lengths = tuple(_travel(hand, posture, leader) for leader in order)
-    families = _cut_families(hand, planned, frames, split, poses, moved_by, planes, source)
+    families = _lay_families(hand, planned, frames, split, poses, moved_by, planes, source)
     return FingerPlan(
         finger,
         posture,
@@ -178,7 +145,7 @@ def plan_finger(
         tuple((speeds or {}).get(hand.joints[leader].name, 1.0) for leader in order),
         tuple(any(c.breakaway and c.leader == leader for c in hand.couplings) for leader in order),
         families,
-        max(f.reach for f in families),
+        _length(hand, families, source),
     )
 
 
@@ -318,7 +285,7 @@ def _planned(
     return PlannedJoint(j, family, group, pivot, turn, turn * speed, start, max(stop, start))
 
 
-def _cut_families(
+def _lay_families(
     hand: Hand,
     joints: tuple[PlannedJoint, ...],
     frames: list[FloatArray],
@@ -328,7 +295,7 @@ def _cut_families(
     planes: int,
     source: CollisionSource,
 ) -> tuple[CurlFamily, ...]:
-    """Lay the planes of every family and cut the links that its joints, or later ones, move."""
+    """Lay the planes of every family across the links that its joints, or later ones, move."""
     position = {p.joint: i for i, p in enumerate(joints)}
     placed = []
     for f in range(len(split)):
@@ -339,20 +306,12 @@ def _cut_families(
     most = max(len(offsets) for _, offsets in placed)
     families = []
     for f, (links, offsets) in enumerate(placed):
-        offsets = refined(offsets, most)
-        last = position[split[f][-1]]
-        cut = []
-        for offset in offsets:
-            row = []
-            for i, T in links:
-                joint = min(position[moved_by[i]], last)
-                for shape in hand.links[i].shapes[source]:
-                    outline = cut_shape(shape, T, float(offset))
-                    if outline is not None:
-                        row.append(LinkOutline(i, joint, outline.about(joints[joint].pivot)))
-            cut.append(tuple(row))
-        own = [p for p in joints if p.family == f]
-        families.append(CurlFamily(frames[f], offsets, tuple(cut), _reach(own, position, cut)))
+        last, arms = position[split[f][-1]], _arms([p for p in joints if p.family == f], position)
+        moved = []
+        for i, T in links:
+            joint = min(position[moved_by[i]], last)
+            moved.append(MovedLink(i, joint, T, hand.links[i].shapes[source], joints[joint].pivot, arms[joint]))
+        families.append(CurlFamily(frames[f], refined(offsets, most), tuple(moved)))
     return tuple(families)
 
 
@@ -361,15 +320,22 @@ def _extents(hand: Hand, links: list[tuple[int, FloatArray]], source: CollisionS
     return extents or [(0.0, 0.0)]
 
 
-def _reach(own: list[PlannedJoint], position: dict[int, int], cut: list[tuple[LinkOutline, ...]]) -> float:
+def _arms(own: list[PlannedJoint], position: dict[int, int]) -> dict[int, float]:
+    """Return the length of the chain from a family's origin to each of its joints [m]."""
     arm = 0.0
     arms = {}
     for before, p in zip([None, *own], own, strict=False):
         arm += float(np.linalg.norm(p.pivot - (before.pivot if before else 0.0)))
         arms[position[p.joint]] = arm
-    reach = 0.0
-    for row in cut:
-        for o in row:
-            far = float(np.linalg.norm(o.outline.vertices, axis=1).max()) + o.outline.radius
-            reach = max(reach, arms[o.joint] + far)
-    return reach
+    return arms
+
+
+def _length(hand: Hand, families: tuple[CurlFamily, ...], source: CollisionSource) -> float:
+    """Return the length of a finger from the triangles of its links, which need no planes [m]."""
+    vertices = {mesh.link: mesh.tree.vertices for mesh in link_meshes(hand, source)}
+    length = 0.0
+    for moved in (m for family in families for m in family.moved if m.link in vertices):
+        rows = moved.T_family_link[[0, 2]]
+        away = vertices[moved.link] @ rows[:, :3].T + (rows[:, 3] - moved.pivot)
+        length = max(length, moved.arm + float(np.sqrt((away * away).sum(axis=1).max())))
+    return length

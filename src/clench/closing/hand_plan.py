@@ -19,7 +19,7 @@ from clench.models.shapes import CollisionSource
 from .finger_plan import FingerPlan
 from .link_bodies import HandBodies, hand_bodies, pack_exact
 from .linkage import plan_frames
-from .plan_packing import pack_plans
+from .plan_packing import PackedPlans
 
 if TYPE_CHECKING:
     from clench.kernels.closing.layout import HandArrays, ItemArrays
@@ -35,7 +35,7 @@ class HandPlan:
         hand: the hand. start: posture before closing, shape (J,) [rad]. source: geometry of its links.
         plans: one per entry. finger: index into the fingers that close, of each entry. posture: index of the posture
             alternative of each entry. idle: fingers asked for that no joint closes.
-        arrays: the plans packed. exact: the links packed, and which items sweep them; the object is left out.
+        packing: the plans packed. exact: the links packed, and which items sweep them; the object is left out.
         items: of each entry its planes, one by one, then the full width, if wanted. An entry that does not lie in
             planes has the full width alone, without planes.
         whole: whether each item is the full width.
@@ -50,13 +50,21 @@ class HandPlan:
     finger: tuple[int, ...]
     posture: tuple[int, ...]
     idle: tuple[Finger, ...]
-    arrays: HandArrays
+    packing: PackedPlans
     exact: ExactArrays
     items: ItemArrays
     whole: tuple[bool, ...]
     full: bool
     together: bool
     times: int
+
+    def arrays(self, planar: bool) -> HandArrays:
+        """Return the plans packed.
+
+        Args:
+            planar: planes are swept, so the outlines of the links are needed.
+        """
+        return self.packing.with_outlines if planar else self.packing.without_outlines
 
     @cached_property
     def frames(self) -> FrameArrays:
@@ -137,9 +145,9 @@ def make_hand_plan(
         if full_width:
             rows.append((e, 0, count if planar else 0, 1))
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
-    whole, arrays = tuple(map(bool, table[:, 3])), pack_plans(plans)
+    whole, packing = tuple(map(bool, table[:, 3])), PackedPlans(plans)
     entry, low, high = (np.ascontiguousarray(table[:, k]) for k in range(3))
-    items = ItemArrays(entry, low, high, until=np.full((len(table), len(arrays.chain.rate)), np.inf))
+    items = ItemArrays(entry, low, high, until=np.full((len(table), sum(len(plan.joints) for plan in plans)), np.inf))
     bodies = hand_bodies(hand, source, start)
     exact = pack_exact(hand, plans, whole, bodies)
     if together:
@@ -152,7 +160,7 @@ def make_hand_plan(
         finger=tuple(finger for _, finger, _ in entries),
         posture=tuple(posture for _, _, posture in entries),
         idle=tuple(idle),
-        arrays=arrays,
+        packing=packing,
         exact=exact,
         items=items,
         whole=whole,

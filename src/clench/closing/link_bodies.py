@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clench.closing.collision.packed_object import ROUND_POLYHEDRA, SWEEP_DEVIATION, PackedObject, shape_elements
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.shapes import CollisionSource, ShapeKind
@@ -18,8 +17,6 @@ from .finger_plan import FingerPlan, closing_joints, last_closing_joint
 if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays
     from clench.kernels.toi.full_width import ExactArrays
-
-_KEPT_HANDS: Final = 16
 
 
 class HandBodies(NamedTuple):
@@ -44,18 +41,21 @@ def hand_bodies(hand: Hand, source: CollisionSource, start: FloatArray | None = 
             None is the open posture.
     """
     q = hand.open_angles() if start is None else start
-    return _bodies(hand, source, hand.allowed_pairs_from(source, q))
+    allowed = hand.allowed_pairs_from(source, q)
+    return hand.kept(("bodies", source, allowed), lambda: _bodies(hand, source, allowed))
 
 
-@kept_by_identity(_KEPT_HANDS)
 def _bodies(hand: Hand, source: CollisionSource, allowed: tuple[tuple[int, int], ...]) -> HandBodies:
     across = _across(hand, allowed)
     return HandBodies(link_bodies(hand, source), _within(hand, across), across)
 
 
-@kept_by_identity(_KEPT_HANDS)
 def link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
     """Return every link of a hand that can touch as a body, in its own frame; made once per hand and source."""
+    return hand.kept(("link bodies", source), lambda: _link_bodies(hand, source))
+
+
+def _link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
     from clench.kernels.geometry.bodies import join_elements, pack_bodies
 
     solid = set(hand.solid_links)
@@ -129,13 +129,8 @@ def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
 
 def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:
     """Return how far the surfaces that are swept may lie inside the true ones [m]: 0 but for cylinders, ellipsoids."""
-    return _hand_deviation(hand, source) + _deviation(packed.round_sizes)
-
-
-@kept_by_identity(_KEPT_HANDS)
-def _hand_deviation(hand: Hand, source: CollisionSource) -> float:
-    """Return what the links of a hand add to `swept_deviation` [m]."""
-    return _deviation([(s.kind, s.size) for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())])
+    sizes = [(s.kind, s.size) for i in hand.solid_links for s in hand.links[i].shapes.get(source, ())]
+    return _deviation(sizes) + _deviation(packed.round_sizes)
 
 
 def _deviation(sizes: Iterable[tuple[ShapeKind, Sequence[float]]]) -> float:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 
@@ -15,8 +14,6 @@ from .finger_plan import FingerPlan
 
 if TYPE_CHECKING:
     from clench.kernels.geometry.link_frames import FrameArrays
-
-_KEPT_HANDS: Final = 16
 
 
 def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
@@ -32,15 +29,19 @@ def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
 def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
     """Return `T_palm_link` of every link at a posture [rad], as the kernels place them, shape (L, 3, 4)."""
     from clench.kernels.geometry.link_frames import place_links
+    from clench.kernels.runtime.by_reference import kept
 
     poses = np.empty((len(hand.links), 3, 4))
-    place_links(hand_frames(hand), np.ascontiguousarray(q), poses)
+    place_links(hand.kept(("kept frames",), lambda: kept(hand_frames(hand))), np.ascontiguousarray(q), poses)
     return poses
 
 
-@kept_by_identity(_KEPT_HANDS)
 def hand_frames(hand: Hand) -> FrameArrays:
     """Return the kinematics of a hand without any entry; made once per hand."""
+    return hand.kept(("frames",), lambda: _make_frames(hand))
+
+
+def _make_frames(hand: Hand) -> FrameArrays:
     from clench.kernels.geometry.link_frames import FrameArrays
 
     joints, couplings = hand.joints, hand.couplings

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +76,7 @@ def cut_shape(shape: Shape, T_family_link: FloatArray, offset: float) -> Rounded
     """
     T = T_family_link @ shape.pose.matrix
     if shape.kind is ShapeKind.MESH or shape.kind is ShapeKind.BOX:
-        return _cut_mesh(shape.mesh if shape.mesh is not None else _box(shape.size), T, offset)
+        return _cut_mesh(shape, T, offset)
     return _cut_round(shape, T, offset)
 
 
@@ -104,10 +103,10 @@ def extent(shape: Shape, T_family_link: FloatArray) -> tuple[float, float]:
     return float(T[1, 3] - half), float(T[1, 3] + half)
 
 
-def _cut_mesh(mesh: TriangleMesh, T: FloatArray, offset: float) -> RoundedOutline | None:
+def _cut_mesh(shape: Shape, T: FloatArray, offset: float) -> RoundedOutline | None:
     from clench.kernels.sections.section import cut_mesh
 
-    tree, closed = _tree(mesh)
+    tree, closed = shape.kept(("outline tree",), lambda: _tree(shape))
     segments, _ = cut_mesh(tree, T, offset)
     if not len(segments):
         return None
@@ -175,15 +174,13 @@ def _in_line(a: FloatArray, points: FloatArray, b: FloatArray, slack: float) -> 
     return near
 
 
-@lru_cache(maxsize=512)
-def _box(size: tuple[float, float, float]) -> TriangleMesh:
-    return tessellate(Shape(ShapeKind.BOX, size), OUTLINE_DEVIATION)
-
-
-@lru_cache(maxsize=512)
-def _tree(mesh: TriangleMesh) -> tuple[MeshTree, bool]:
+def _tree(shape: Shape) -> tuple[MeshTree, bool]:
+    """Return the tree of a mesh or a box in its own frame, and whether its faces wind outwards."""
     from clench.kernels.geometry.bvh import build_tree
 
+    mesh = shape.mesh
+    if mesh is None:
+        mesh = tessellate(Shape(ShapeKind.BOX, shape.size), OUTLINE_DEVIATION)
     return build_tree(mesh.vertices, mesh.triangles), _winds_outwards(mesh)
 
 

@@ -17,7 +17,6 @@ from clench.closing.collision.containment import link_within_link
 from clench.closing.collision.depths import link_mesh_arrays, mesh_mask, object_mesh
 from clench.closing.collision.object_surface import object_surface, round_arrays
 from clench.closing.collision.packed_object import PackedObject
-from clench.core.caching.keeping import kept_while_alive
 from clench.models.hand.hand import Finger
 
 from .finger_links import pack_finger_links
@@ -122,10 +121,9 @@ class Capacity:
         self.segments = max(self.segments, 2 * wanted)
 
 
-@kept_while_alive
 def capacity_of(packed: PackedObject) -> Capacity:
     """Return how large the arenas for an object are."""
-    return Capacity()
+    return packed.kept(("capacity",), Capacity)
 
 
 def pack_problem(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) -> PackedProblem:
@@ -135,19 +133,14 @@ def pack_problem(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: b
         plan: of the hand. packed: the object. terms: of the sum that chooses among planes; empty if there is no choice
             or the caller chooses. tip_only: only fingertips may touch.
     """
-    kept, key = _packed_with(packed), (id(plan), terms, tip_only)
-    entry = kept.get(key)
+    problems = packed.kept(("problems",), OrderedDict[tuple[int, Terms, bool], PackedProblem])
+    key = (id(plan), terms, tip_only)
+    entry = problems.get(key)
     if entry is None:
-        entry = kept[key] = PackedProblem(plan, _pack(plan, packed, terms, tip_only), capacity_of(packed))
-        while len(kept) > KEPT_PROBLEMS:
-            kept.popitem(last=False)
+        entry = problems[key] = PackedProblem(plan, _pack(plan, packed, terms, tip_only), capacity_of(packed))
+        while len(problems) > KEPT_PROBLEMS:
+            problems.popitem(last=False)
     return entry
-
-
-@kept_while_alive
-def _packed_with(packed: PackedObject) -> OrderedDict[tuple[int, Terms, bool], PackedProblem]:
-    """Return the packed problems of an object."""
-    return OrderedDict()
 
 
 def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) -> ProblemArrays:
@@ -155,7 +148,7 @@ def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) ->
 
     target, bodies, items = object_arrays(packed), plan.bodies, items_around(plan, packed)
     return ProblemArrays(
-        hand=plan.arrays,
+        hand=plan.arrays(planar=bool((items.low < items.high).any())),
         exact=plan.exact._replace(object=target.bodies),
         items=items,
         target=target,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,25 +18,45 @@ if TYPE_CHECKING:
     from clench.kernels.closing.layout import ChainArrays, HandArrays, OutlineArrays
 
 
-def pack_plans(plans: Sequence[FingerPlan]) -> HandArrays:
-    """Pack plans, one entry each, with every index global; see `HandArrays`."""
-    from clench.kernels.closing.layout import HandArrays
+@dataclass(frozen=True, eq=False)
+class PackedPlans:
+    """Pack plans, one entry each, with every index global; see `HandArrays`.
 
-    families = [f for plan in plans for f in plan.families]
-    planes = [len(f.offsets) for f in families]
-    rows = [row for f in families for row in f.outlines]
-    return HandArrays(
-        entry_group=_firsts([len(plan.lengths) for plan in plans]),
-        entry_family=_firsts([len(plan.families) for plan in plans]),
-        chain=_chain(plans),
-        outlines=_outlines(plans),
-        family_pose=np.array([pose for plan in plans for pose in _relative_poses(plan)]).reshape(-1, 3, 4),
-        family_plane=_firsts(planes),
-        plane_offset=np.concatenate([f.offsets for f in families]) if families else np.empty(0),
-        family_reach=np.array([f.reach for f in families]),
-        family_length=np.array([plan.length for plan in plans for _ in plan.families]),
-        plane_outline=_firsts([len(row) for row in rows]),
-    )
+    Args:
+        plans: of the fingers.
+    """
+
+    plans: tuple[FingerPlan, ...]
+
+    @cached_property
+    def without_outlines(self) -> HandArrays:
+        """What closings that sweep no plane read; it saves cutting the links."""
+        from clench.kernels.closing.layout import HandArrays
+
+        families = [f for plan in self.plans for f in plan.families]
+        planes = [len(f.offsets) for f in families]
+        return HandArrays(
+            entry_group=_firsts([len(plan.lengths) for plan in self.plans]),
+            entry_family=_firsts([len(plan.families) for plan in self.plans]),
+            chain=_chain(self.plans),
+            outlines=_outlines([]),
+            family_pose=np.array([pose for plan in self.plans for pose in _relative_poses(plan)]).reshape(-1, 3, 4),
+            family_plane=_firsts(planes),
+            plane_offset=np.concatenate([f.offsets for f in families]) if families else np.empty(0),
+            family_reach=np.zeros(len(families)),
+            family_length=np.array([plan.length for plan in self.plans for _ in plan.families]),
+            plane_outline=np.zeros(sum(planes) + 1, dtype=np.int64),
+        )
+
+    @cached_property
+    def with_outlines(self) -> HandArrays:
+        """What closings on planes read."""
+        families = [f for plan in self.plans for f in plan.families]
+        return self.without_outlines._replace(
+            outlines=_outlines(self.plans),
+            family_reach=np.array([f.reach for f in families]),
+            plane_outline=_firsts([len(row) for f in families for row in f.outlines]),
+        )
 
 
 def _firsts(counts: list[int]) -> np.ndarray:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from clench.closing.collision.depths import LinkDepth, hand_depths, link_mesh_arrays, mesh_mask
 from clench.closing.collision.packed_object import PackedObject
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.core.tolerances import ALLOWED_PENETRATION
 from clench.models.hand.hand import Hand
@@ -17,8 +16,6 @@ from clench.models.shapes import CollisionSource
 
 from .finger_plan import FingerPlan, resting_links
 from .hand_plan import HandPlan
-
-_KEPT_PLANS = 64
 
 
 class LinkMasks(NamedTuple):
@@ -28,9 +25,8 @@ class LinkMasks(NamedTuple):
     resting: NDArray[np.int64]
 
 
-@kept_by_identity(_KEPT_PLANS)
 def link_masks(hand: Hand, plans: tuple[FingerPlan, ...], source: CollisionSource) -> LinkMasks:
-    """Return the masks of a hand's plans, found once."""
+    """Return the masks of a hand's plans."""
     meshes = link_mesh_arrays(hand, source)
     return LinkMasks(
         np.array([mesh_mask(meshes, p.finger.links) for p in plans]),

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from clench.core.caching.keeping import Keeper
 from clench.core.pose import Pose
 from clench.core.showing.short_repr import short_repr
 
@@ -48,7 +49,7 @@ class CollisionSource(StrEnum):
 
 
 @dataclass(frozen=True)
-class Shape:
+class Shape(Keeper):
     """Place one shape in the frame of its link or body.
 
     Args:

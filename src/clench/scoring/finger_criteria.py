@@ -9,7 +9,6 @@ import numpy as np
 from clench.closing.candidates import FingerCandidate
 from clench.closing.collision.reach import nearest_link, obstacle_body
 from clench.closing.finger_plan import FingerPlan
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import Pose
 from clench.models.hand.hand import DEFAULT_SPEED, Hand
 from clench.models.objects.grasp_object import BodyRole
@@ -20,7 +19,6 @@ from .pose_change import PoseChange
 
 #: More clearance than this is no better [m].
 MOST_CLEARANCE: Final = 0.05
-_KEPT_PLANS: Final = 256
 
 
 class RangeOfMotion:
@@ -69,7 +67,6 @@ class LimitDistance:
         return min([1.0, *(abs(end - q.item(j)) / span for j, end, span in _ranges(setting.hand, candidate.plan))])
 
 
-@kept_by_identity(_KEPT_PLANS)
 def _ranges(hand: Hand, plan: FingerPlan) -> list[tuple[int, float, float]]:
     """Return each closing joint that has a range, the limit in its closing direction [rad], and the range [rad]."""
     joints = [(p.joint, hand.joints[p.joint]) for p in plan.joints]

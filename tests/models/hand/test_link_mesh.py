@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import gc
 import pickle
+import threading
 import weakref
 
 import pytest
@@ -64,3 +65,18 @@ def test_an_object_at_other_poses_has_the_same_mass_properties_until_its_bodies_
     del mug, moved, found
     gc.collect()
     assert kept() is None
+
+
+def test_threads_that_make_the_same_get_the_same():
+    hand, together, found = small_hand(), threading.Barrier(4), []
+
+    def make() -> Made:
+        together.wait()
+        return Made()
+
+    threads = [threading.Thread(target=lambda: found.append(hand.kept(("test", 1), make))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(each is found[0] for each in found)

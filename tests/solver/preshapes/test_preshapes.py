@@ -13,6 +13,7 @@ import pytest
 
 import clench
 from chain_hands import HandBuilder, along_x, mount
+from clench.core.caching.keeping import Keeper
 from clench.solver.preshapes import preshape_cache, preshapes
 from clench.solver.preshapes.preshape_cache import MOST_FILES, cache_key, keep_preshapes, read_preshapes
 from clench.solver.preshapes.preshape_names import name_preshapes
@@ -69,8 +70,11 @@ def searched(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
         searches.append(given)
         return search(*given)
 
+    def forgetful(hand: clench.Hand, key: tuple[Any, ...], make: Any) -> Any:
+        return make() if key[0] == "preshapes" else Keeper.kept(hand, key, make)
+
     monkeypatch.setenv("CLENCH_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(preshapes, "_kept", lambda hand: {})
+    monkeypatch.setattr(clench.Hand, "kept", forgetful)
     monkeypatch.setattr(preshapes, "_find_zones", noted)
     monkeypatch.setattr(preshapes, "_DRAWS", 60)
     return searches

@@ -6,12 +6,10 @@ Surfaces that do not cross leave only this to be asked, and for each connected p
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Final
 
 import numpy as np
 
 from clench.closing.linkage import placed_links
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
@@ -19,9 +17,6 @@ from clench.models.shapes import CollisionSource
 
 from .depths import link_mesh_arrays, mesh_mask, object_mesh
 from .packed_object import PackedObject
-
-_KEPT_HANDS: Final = 16
-_KEPT_POSTURES: Final = 64
 
 
 def contained_link(
@@ -39,38 +34,22 @@ def contained_link(
         T_palm_object: pose of the object, shape (4, 4). source: geometry of the hand. links: which links.
     """
     from clench.kernels.geometry.link_meshes import find_contained
+    from clench.kernels.runtime.by_reference import kept
 
     meshes = link_mesh_arrays(hand, source)
     T = np.ascontiguousarray(np.asarray(T_palm_object, dtype=np.float64)[:3])
     poses = placed_links(hand, q)
-    found = int(find_contained(meshes, mesh_mask(meshes, links), poses, object_mesh(packed), T))
+    found = int(find_contained(kept(meshes), mesh_mask(meshes, links), poses, kept(object_mesh(packed)), T))
     return None if found < 0 else found
 
 
 def link_within_link(hand: Hand, q: FloatArray, source: CollisionSource, checked: np.ndarray) -> tuple[int, int] | None:
-    """Return a link that has a part inside another one, and that one, or None; looked for once per posture.
+    """Return a link that has a part inside another one, and that one, or None.
 
     Args:
         hand: the hand. q: angles of all its joints [rad], shape (J,). source: geometry of the hand.
         checked: which links may not overlap which, shape (L, L).
     """
-    known, posture = _nested(hand, source, checked), q.tobytes()
-    if posture not in known:
-        if len(known) >= _KEPT_POSTURES:
-            known.clear()
-        known[posture] = _link_within_link(hand, q, source, checked)
-    return known[posture]
-
-
-@kept_by_identity(_KEPT_HANDS)
-def _nested(hand: Hand, source: CollisionSource, checked: np.ndarray) -> dict[bytes, tuple[int, int] | None]:
-    """Return the cached nested links, by posture."""
-    return {}
-
-
-def _link_within_link(
-    hand: Hand, q: FloatArray, source: CollisionSource, checked: np.ndarray
-) -> tuple[int, int] | None:
     from clench.kernels.geometry.mesh_distance import is_inside
 
     meshes = link_meshes(hand, source)
@@ -86,6 +65,6 @@ def _link_within_link(
     near &= checked[np.ix_(links[owner], links)].T != 0
     for m, k in zip(*np.nonzero(near), strict=True):
         p = (points[k] - poses[m, :3, 3]) @ poses[m, :3, :3]
-        if is_inside(meshes[m].tree, (p[0], p[1], p[2]), meshes[m].closed):
+        if is_inside(meshes[m].kept_tree, (p[0], p[1], p[2]), meshes[m].closed):
             return int(links[owner[k]]), int(links[m])
     return None

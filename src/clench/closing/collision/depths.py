@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.closing.linkage import placed_links
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray, invert
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import LinkMesh, link_meshes
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 #: Depths below this fraction of the object's size are rounding of a touch [-].
 _TOUCHING: Final = 1e-12
-_KEPT_HANDS: Final = 16
 
 
 @dataclass(frozen=True)
@@ -200,9 +198,8 @@ def clear_distance(
     return max(ahead - (float(normal @ center) - packed.radius), 0.0)
 
 
-@kept_by_identity(_KEPT_HANDS)
 def _joined_meshes(hand: Hand, source: CollisionSource) -> LinkMeshArrays:
-    return _joined(link_meshes(hand, source))
+    return hand.kept(("joined meshes", source), lambda: _joined(link_meshes(hand, source)))
 
 
 def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:

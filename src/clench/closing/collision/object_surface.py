@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clench.core.caching.keeping import kept_while_alive
 from clench.core.pose import FloatArray
 from clench.models.objects.grasp_object import BodyRole
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from clench.kernels.closing.layout import RoundArrays
 
 
-@kept_while_alive
 def round_arrays(packed: PackedObject) -> RoundArrays:
     """Return an object's round shapes as the kernels take them."""
     from clench.kernels.closing.layout import RoundArrays
@@ -26,9 +24,12 @@ def round_arrays(packed: PackedObject) -> RoundArrays:
     return RoundArrays(r.kind.astype(np.int64), r.size, r.T_object_shape)
 
 
-@kept_while_alive
 def object_surface(packed: PackedObject) -> SurfaceArrays:
-    """Return the object's data for contact reading."""
+    """Return the object's data for contact reading; made once per object."""
+    return packed.kept(("surface",), lambda: _make_surface(packed))
+
+
+def _make_surface(packed: PackedObject) -> SurfaceArrays:
     from clench.kernels.closing.contact_reading import SurfaceArrays
 
     graspable = [role is BodyRole.GRASPABLE for role in packed.body_roles]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.caching.keeping import KeptBySize, kept_by_identity
+from clench.core.caching.keeping import Keeper, KeptBySize
 from clench.core.exceptions import CommandError
 from clench.core.memory import expect
 from clench.core.pose import FloatArray, Pose
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
-_KEPT_HANDS: Final = 16
 #: Default memory for objects that stay packed, see `set_object_cache` [bytes].
 OBJECT_CACHE: Final = 512_000_000
 ROUND_POLYHEDRA: Final = (ShapeKind.CYLINDER, ShapeKind.ELLIPSOID)
@@ -53,7 +52,7 @@ class RoundShapes(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class PackedObject:
+class PackedObject(Keeper):
     """The object data that the kernels read, in the object's own frame. It never moves and never changes.
 
     Args:
@@ -105,13 +104,8 @@ def pack_object(obj: GraspObject) -> PackedObject:
 
     Objects stay packed as long as they fit into the memory that `set_object_cache` gives them.
     """
-    global _latest
-    latest = _latest
-    if latest[0] is obj.bodies and latest[1] == obj.collision_source and latest[2] is not None:
-        return latest[2]
     bodies, source = obj.bodies, CollisionSource(obj.collision_source)
     packed: PackedObject = _packed.get((bodies, source), partial(_pack, bodies, source))
-    _latest = (obj.bodies, obj.collision_source, packed)
     return packed
 
 
@@ -163,9 +157,12 @@ def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
     return Elements(mesh.vertices, np.asarray(mesh.triangles, dtype=np.int32), np.zeros(len(mesh.triangles)))
 
 
-@kept_by_identity(_KEPT_HANDS)
 def hash_hand(hand: Hand, source: CollisionSource) -> str:
     """Return a SHA-256 over the hand's kinematics and its shapes of one collision source, hexadecimal."""
+    return hand.kept(("hash", source), lambda: _hash_hand(hand, source))
+
+
+def _hash_hand(hand: Hand, source: CollisionSource) -> str:
     digest = hashlib.sha256()
     digest.update(f"{hand.palm} {sorted(hand.fixed_links)}".encode())
     for link in hand.links:
@@ -179,11 +176,6 @@ def hash_hand(hand: Hand, source: CollisionSource) -> str:
     for c in hand.couplings:
         digest.update(f"|{c.leader} {c.follower} {c.ratio!r} {c.offset!r} {c.breakaway}".encode())
     return digest.hexdigest()
-
-
-#: The object asked for last, found by identity: comparing bodies by value costs tens of microseconds. One tuple, so
-#: that concurrent threads read either the old or the new entry.
-_latest: tuple[tuple[Body, ...] | None, str, PackedObject | None] = (None, "", None)
 
 
 def packed_size(packed: PackedObject | BodyArrays) -> int:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import hand_frames
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays
     from clench.kernels.toi.pair_motion import PathProblem
 
-_KEPT_HANDS: Final = 16
 #: Way-points whose joints are this close to a straight line lie on it [rad].
 STRAIGHT: Final = 1e-12
 
@@ -237,8 +235,11 @@ class _Tables:
     with_object: NDArray[np.int64]
 
 
-@kept_by_identity(_KEPT_HANDS)
 def _tables(hand: Hand, source: CollisionSource) -> _Tables:
+    return hand.kept(("path tables", source), lambda: _make_tables(hand, source))
+
+
+def _make_tables(hand: Hand, source: CollisionSource) -> _Tables:
     links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
     allowed = set(hand.allowed_pairs_for(source))
     count = len(hand.links)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from clench.closing.finger_plan import FingerPlan, last_closing_joint
 from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import placed_links
-from clench.core.caching.keeping import kept_by_identity
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
@@ -22,8 +21,6 @@ from .packed_object import PackedObject, role_body
 
 if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays
-
-_KEPT_PLANS: Final = 256
 
 
 def graspable_body(obj: GraspObject, packed: PackedObject) -> BodyArrays:
@@ -115,9 +112,12 @@ class _Room(NamedTuple):
     high: float
 
 
-@kept_by_identity(_KEPT_PLANS)
 def _room(hand: Hand, plan: FingerPlan, source: CollisionSource) -> _Room:
     """Return a finger's room, found once per plan; round shapes are inscribed here, and given their deviation back."""
+    return plan.kept(("room", source), lambda: _make_room(hand, plan, source))
+
+
+def _make_room(hand: Hand, plan: FingerPlan, source: CollisionSource) -> _Room:
     from clench.kernels.geometry.bodies import Elements, pack_bodies
 
     own = [p.joint for p in plan.joints]

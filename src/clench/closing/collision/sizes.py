@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from clench.core.caching.keeping import kept_by_identity
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
 from clench.models.objects.grasp_object import GraspObject
@@ -17,7 +16,6 @@ from .packed_object import pack_object
 
 #: An object that is so many times as large as the hand is hardly meant to be.
 FAR_LARGER: Final = 10.0
-_KEPT_HANDS: Final = 16
 
 
 def warn_of_size(hand: Hand, obj: GraspObject) -> bool:
@@ -33,9 +31,12 @@ def warn_of_size(hand: Hand, obj: GraspObject) -> bool:
     return True
 
 
-@kept_by_identity(_KEPT_HANDS)
 def hand_size(hand: Hand) -> float:
     """Return the diameter of a ball around the open hand [m], 0 for a hand without shapes."""
+    return hand.kept(("size",), lambda: _hand_size(hand))
+
+
+def _hand_size(hand: Hand) -> float:
     poses, meshes = hand.link_poses(hand.open_angles()), link_meshes(hand)
     if not meshes:
         return 0.0

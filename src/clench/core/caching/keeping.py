@@ -1,75 +1,13 @@
-"""Keep results: by identity for arguments that are costly to compare, and up to a number of bytes."""
+"""Keep derived values: on the object that they are derived from, or by key up to a number of bytes."""
 
 from __future__ import annotations
 
-import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from functools import cached_property, wraps
 from threading import Lock
-from typing import Any, ClassVar, Generic, ParamSpec, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 Found = TypeVar("Found")
-Argument = TypeVar("Argument")
-Arguments = ParamSpec("Arguments")
-
-
-def kept_by_identity(size: int) -> Callable[[Callable[Arguments, Found]], Callable[Arguments, Found]]:
-    """Return a decorator that computes a function once for the same arguments, which must not change.
-
-    Arguments are positional. They are kept alive with their result, so that their identity stays unique; equal
-    arguments with another identity count as different.
-
-    Args:
-        size: how many results are kept; the oldest goes first.
-    """
-
-    def decorate(function: Callable[Arguments, Found]) -> Callable[Arguments, Found]:
-        kept: OrderedDict[tuple[int, ...], tuple[tuple[object, ...], Found]] = OrderedDict()
-
-        @wraps(function)
-        def look_up(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Found:
-            if kwargs:
-                raise TypeError(f"{function.__name__}: expected positional arguments.")
-            key = tuple(map(id, args))
-            entry = kept.get(key)
-            if entry is not None:
-                return entry[1]
-            found = function(*args, **kwargs)
-            kept[key] = (args, found)
-            while len(kept) > size:
-                kept.popitem(last=False)
-            return found
-
-        return look_up
-
-    return decorate
-
-
-def kept_while_alive(function: Callable[[Argument], Found]) -> Callable[[Argument], Found]:
-    """Return a function that computes once per argument, and forgets the result when the argument is freed.
-
-    The argument is known by identity and must not change. The result must not refer to it, or neither is ever freed.
-    """
-    kept: dict[int, tuple[weakref.ref[Argument], Found]] = {}
-
-    @wraps(function)
-    def look_up(argument: Argument) -> Found:
-        key = id(argument)
-        entry = kept.get(key)
-        if entry is not None and entry[0]() is argument:
-            return entry[1]
-
-        def forget(freed: weakref.ref[Argument]) -> None:
-            # Another object may have the same address by now.
-            if (entry := kept.get(key)) is not None and entry[0] is freed:
-                kept.pop(key, None)
-
-        found = function(argument)
-        kept[key] = (weakref.ref(argument, forget), found)
-        return found
-
-    return look_up
 
 
 class Keeper:
@@ -78,19 +16,17 @@ class Keeper:
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def kept(self, key: tuple[Hashable, ...], make: Callable[[], Found]) -> Found:
-        """Return the value of a key, and make it the first time.
+        """Return the value of a key, and make it the first time; all threads get the same.
 
         Args:
-            key: name of the value, and its dependencies. make: returns it.
+            key: name of the value, and its dependencies. make: returns it. The value must not refer to this object, or
+                neither is freed before a garbage collection.
         """
-        if key not in self._kept:
-            self._kept[key] = make()
-        found: Found = self._kept[key]
+        values: dict[tuple[Hashable, ...], Any] = self.__dict__.setdefault("_kept", {})
+        if key not in values:
+            values.setdefault(key, make())
+        found: Found = values[key]
         return found
-
-    @cached_property
-    def _kept(self) -> dict[tuple[Hashable, ...], Any]:
-        return {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone."""

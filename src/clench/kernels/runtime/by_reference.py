@@ -7,8 +7,9 @@ values that it `keeps`.
 
 from __future__ import annotations
 
+import struct
 from functools import cached_property
-from typing import Any, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
@@ -30,9 +31,9 @@ from numba.extending import (
     unbox,
 )
 
-from .kernel_cache import forgive_unreadable
-
 Content = TypeVar("Content")
+#: Size and alignment of numbers and addresses [bytes].
+_WORD: Final = 8
 
 
 class Handed(types.Type):
@@ -141,15 +142,38 @@ class Kept:
     def __init__(self, content: Any) -> None:
         self.content = content
         self.kind = Handed(numba.typeof(content))
-        self._room = np.empty(room_for(content), dtype=np.uint8)
-        self.address = self._room.ctypes.data
-        put(content, self.address)
+        self._room = np.frombuffer(laid_out(content)[0], dtype=np.uint8)
+        self.address = self._room.__array_interface__["data"][0]
 
 
 def kept(content: Content) -> Content:
     """Return a tuple so that a kernel called with it reads no more than a pointer; without compiling it is itself."""
     config: Any = numba.config
     return content if config.DISABLE_JIT else cast(Content, Kept(content))
+
+
+def laid_out(value: Any) -> tuple[bytes, int]:
+    """Return a value as compiled code has it in memory, and its alignment [bytes].
+
+    Arrays name no owner, so kernels that count references leave them alone.
+
+    Args:
+        value: array, number, or tuple of values.
+    """
+    if isinstance(value, np.ndarray):
+        address = value.__array_interface__["data"][0]
+        words = (0, 0, value.size, value.itemsize, address, *value.shape, *value.strides)
+        return struct.pack(f"{len(words)}q", *words), _WORD
+    if isinstance(value, tuple):
+        room, most = b"", 1
+        for part in value:
+            content, alignment = laid_out(part)
+            room += bytes(-len(room) % alignment) + content
+            most = max(most, alignment)
+        return room + bytes(-len(room) % most), most
+    if isinstance(value, bool | np.bool_):
+        return struct.pack("?", value), 1
+    return struct.pack("d" if isinstance(value, float) else "q", value), _WORD
 
 
 @typeof_impl.register(Kept)
@@ -165,54 +189,3 @@ def point_to(kind: Handed, value: Any, c: Any) -> Any:
     address = c.pyapi.long_as_longlong(number)
     c.pyapi.decref(number)
     return NativeValue(c.builder.inttoptr(address, c.context.get_value_type(kind)))
-
-
-@numba.njit(cache=True)
-def room_for(content: Any) -> Any:
-    """Return how many bytes a tuple takes."""
-    return read_size(content)
-
-
-@numba.njit(cache=True)
-def put(content: Any, address: int) -> None:
-    """Write a tuple to an address."""
-    write(content, address)
-
-
-if not cast(Any, numba.config).DISABLE_JIT:
-    for _kernel in (room_for, put):
-        forgive_unreadable(_kernel)
-
-
-@intrinsic
-def read_size(context: Any, content: Any) -> Any:
-    """Return how many bytes a value takes."""
-
-    def read(context: Any, builder: ir.IRBuilder, signature: Any, given: Any) -> Any:
-        return context.get_constant(types.int64, context.get_abi_sizeof(context.get_value_type(content)))
-
-    return types.int64(content), read
-
-
-@intrinsic
-def write(context: Any, content: Any, address: Any) -> Any:
-    """Write a value to an address, without who owns its arrays."""
-
-    def store(context: Any, builder: ir.IRBuilder, signature: Any, given: Any) -> Any:
-        place = builder.inttoptr(given[1], context.get_value_type(content).as_pointer())
-        builder.store(_disowned(builder, content, given[0]), place)
-        return context.get_dummy_value()
-
-    return types.none(content, types.int64), store
-
-
-def _disowned(builder: Any, kind: Any, value: Any) -> Any:
-    """Return a value whose arrays name no owner: kernels that count references leave them alone."""
-    if isinstance(kind, types.Array):
-        for field in (0, 1):
-            value = builder.insert_value(value, value.type.elements[field](None), field)
-    elif isinstance(kind, types.BaseTuple):
-        parts: Any = kind
-        for i, part in enumerate(parts.types):
-            value = builder.insert_value(value, _disowned(builder, part, builder.extract_value(value, i)), i)
-    return value

@@ -15,7 +15,7 @@ from numba.core.registry import CPUDispatcher
 from clench.core import tolerances
 
 from .by_reference import handed
-from .kernel_cache import forgive_unreadable, index_of
+from .kernel_cache import index_of, keep_on_disk
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -101,7 +101,18 @@ def is_kept(function: Any) -> bool:
     return not hasattr(function, "get_call_template") or bool(index_of(function)._load_index())
 
 
-class KernelForKernels(CPUDispatcher):
+class CachedKernel(CPUDispatcher):
+    """A kernel that other kernels hand tuples by pointer; Python calls it with values."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how another kernel calls this one: once for all values of a number.
+
+        Numba would compile it anew for every integer that the other kernel writes out in a call.
+        """
+        return super().get_call_template(tuple(map(handed, args)), {name: handed(a) for name, a in kws.items()})
+
+
+class KernelForKernels(CachedKernel):
     """A kernel without an entry from Python; a call would end the process without a message."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
@@ -114,24 +125,13 @@ class KernelForKernels(CPUDispatcher):
 
 
 def _compiled(function: Callable[..., Any], *, from_python: bool, allocates: bool) -> Any:
-    """Compile a function on its first call, once for all values of a number.
-
-    Numba would compile it anew for every integer that another kernel writes out in a call.
-    """
-    settings: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": allocates}
+    """Return the kernel of a function, which is compiled or loaded on its first call."""
+    settings: Any = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": allocates}
     if not from_python:
         settings["no_cpython_wrapper"] = True
     dispatcher: Any = njit(**settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return dispatcher
-    if not from_python:
-        dispatcher.__class__ = KernelForKernels
-    forgive_unreadable(dispatcher)
-    index_of(dispatcher)._source_stamp = source_stamp(Path(function.__code__.co_filename))
-    choose = dispatcher.get_call_template
-
-    def choose_handed(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-        return choose(tuple(map(handed, args)), {name: handed(a) for name, a in kws.items()})
-
-    dispatcher.get_call_template = choose_handed
+    dispatcher.__class__ = CachedKernel if from_python else KernelForKernels
+    keep_on_disk(dispatcher, source_stamp(Path(function.__code__.co_filename)))
     return dispatcher

@@ -44,7 +44,7 @@ from clench.kernels.closing.solve_poses import solve_poses
 from clench.kernels.closing.verdict import judge_pose
 from clench.kernels.geometry.bvh import MeshTree, build_tree
 from clench.kernels.geometry.link_frames import FrameArrays, place_links, relate_poses
-from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, find_contained, measure_depths
+from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, measure_depths
 from clench.kernels.geometry.smallest_gap import smallest_gap
 from clench.kernels.meetings.meeting_layout import FingerLinks, Meetings, MeetingWork
 from clench.kernels.sections.advance import advance
@@ -67,14 +67,13 @@ HERE: tuple[Any, ...] = (
     relate_poses,
     place_links,
     measure_depths,
-    find_contained,
     read_touches,
     smallest_gap,
 )
 THERE: tuple[Any, ...] = (cut_first_families, advance, close_item, solve_poses)
 
-#: These have an entry from Python, but in a solve other kernels call them.
-_CALLED_BY_KERNELS: tuple[Any, ...] = (cut_first_families, close_item)
+#: These have an entry from Python, but in a solve other kernels call them, or Python hands them pointers.
+_BY_POINTER: tuple[Any, ...] = (cut_first_families, close_item, place_links)
 
 #: The second process is given up after this long [s].
 PATIENCE = 300.0
@@ -114,7 +113,7 @@ def argument_types(kernel: Any, values: dict[str, Any]) -> tuple[Any, ...]:
     """Return the types of a kernel's arguments, which its parameters' names tell."""
     typeof: Any = numba.typeof
     kinds = (typeof(values[name]) for name in inspect.signature(kernel.py_func).parameters)
-    return tuple(map(handed, kinds) if is_inner(kernel) or kernel in _CALLED_BY_KERNELS else kinds)
+    return tuple(map(handed, kinds) if is_inner(kernel) or kernel in _BY_POINTER else kinds)
 
 
 def is_inner(kernel: Any) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +40,13 @@ class LinkMesh:
     center: FloatArray
     radius: float
     points: FloatArray
+
+    @cached_property
+    def kept_tree(self) -> MeshTree:
+        """The tree where kernels find it by one pointer."""
+        from clench.kernels.runtime.by_reference import kept
+
+        return kept(self.tree)
 
 
 def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[LinkMesh, ...]:
@@ -85,10 +93,10 @@ def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
         return 0.0
     T_b_a = invert(poses[b.link]) @ poses[a.link]
     depth, *_ = penetration(
-        a.tree,
+        a.kept_tree,
         a.owners,
         a.closed,
-        b.tree,
+        b.kept_tree,
         b.owners,
         b.closed,
         np.ascontiguousarray(T_b_a[:3]),

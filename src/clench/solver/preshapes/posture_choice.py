@@ -7,6 +7,7 @@ open hand wins.
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -67,8 +68,10 @@ def with_posture(solution: GraspSolution, said: Mapping[str, Any], seconds: floa
     """Return a solution whose `choice` gives the reason for the posture, and the time of its choice [s]."""
     choice, timing = solution.choice, dict(solution.timing)
     timing["total"] = timing.get("total", 0.0) + seconds
+    # Two mappings: a reader of the reason for the posture does not wait for the reasons for the sets of the fingers.
+    parts: list[Any] = [{"preshapes": said}, {} if choice is None else choice]
     return solution.with_known(
-        choice=DeferredMapping(lambda: {**(choice or {}), "preshapes": dict(said)}),
+        choice=ChainMap(*parts),
         timing={"posture": seconds, **timing},
     )
 

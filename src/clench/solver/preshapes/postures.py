@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from clench.closing.motion import asked_fingers
-from clench.core.caching.keeping import kept_while_alive
 from clench.core.exceptions import UnknownNameError
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Finger, Hand
@@ -75,20 +74,12 @@ def _options(hand: Hand, fingers: tuple[Finger, ...], given: Mapping[str, float]
 
 def _preshapes_of(hand: Hand, fingers: tuple[Finger, ...]) -> list[tuple[str, dict[str, float]]]:
     """Return names and angles [rad] of all preshapes for joints of given fingers; none if no two sides oppose."""
-    kept, key = _kept(hand), tuple(finger.name for finger in fingers)
-    if key not in kept:
-        two_sides = any(True for _ in opposing_sides(hand, key))
-        own = {hand.joints[j].name for finger in fingers for j in finger.joints}
-        kept[key] = [
-            (shape.name, {joint: angle for joint, angle in shape.angles.items() if joint in own})
-            for shape in (opposition_zones(hand) if two_sides else ())
-        ]
-    return kept[key]
-
-
-@kept_while_alive
-def _kept(hand: Hand) -> dict[tuple[str, ...], list[tuple[str, dict[str, float]]]]:
-    return {}
+    two_sides = any(True for _ in opposing_sides(hand, tuple(finger.name for finger in fingers)))
+    own = {hand.joints[j].name for finger in fingers for j in finger.joints}
+    return [
+        (shape.name, {joint: angle for joint, angle in shape.angles.items() if joint in own})
+        for shape in (opposition_zones(hand) if two_sides else ())
+    ]
 
 
 def distance_from_open(hand: Hand, option: PostureOption, first: PostureOption) -> float:

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.core.caching.keeping import kept_while_alive
 from clench.core.pose import FloatArray, Pose
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
@@ -100,20 +99,17 @@ def opposition_zones(hand: Hand, fingers: tuple[str, ...] | None = None) -> tupl
         hand: the hand. fingers: names of the closing fingers; None: all.
     """
     names = tuple(finger.name for finger in hand.fingers) if fingers is None else fingers
-    kept = _kept(hand)
-    if names not in kept:
-        key = cache_key(hand, names)
-        entries = read_preshapes(key, hand.joint_names)
-        if entries is None:
-            entries = list(_find_zones(hand, names))
-            keep_preshapes(key, entries)
-        kept[names] = _named(hand, entries)
-    return kept[names]
+    return hand.kept(("preshapes", names), lambda: _read_zones(hand, names))
 
 
-@kept_while_alive
-def _kept(hand: Hand) -> dict[tuple[str, ...], tuple[Preshape, ...]]:
-    return {}
+def _read_zones(hand: Hand, names: tuple[str, ...]) -> tuple[Preshape, ...]:
+    """Return the preshapes from the cache folder, or find them."""
+    key = cache_key(hand, names)
+    entries = read_preshapes(key, hand.joint_names)
+    if entries is None:
+        entries = list(_find_zones(hand, names))
+        keep_preshapes(key, entries)
+    return _named(hand, entries)
 
 
 def _named(hand: Hand, entries: list[Entry]) -> tuple[Preshape, ...]:

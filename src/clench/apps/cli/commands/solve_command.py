@@ -80,13 +80,12 @@ def solve(
 
     import clench
     from clench.apps.cli.inputs.kernel_loading import compile_kernels, load_kernels
-    from clench.apps.cli.output.choice_tables import print_choice
+    from clench.apps.cli.output.choice_tables import plain_front, print_choice
     from clench.apps.cli.output.preshape_tables import print_posture_choice
     from clench.apps.cli.output.printing import print_forces, print_pose_error, print_solution
     from clench.apps.cli.output.results import exit_code, print_json, write_results
     from clench.closing.collision.sizes import warn_of_size
     from clench.models.objects.object_loading import size_warnings
-    from clench.solver.analysis.pareto import hand_front
     from clench.solver.orders import settled
 
     forces = forces or bool(mass or friction)
@@ -120,7 +119,7 @@ def solve(
     if json:
         more: dict[str, Any] = {} if error is None else {"pose_error": error.to_dict()}
         if explain:
-            more["pareto_front"] = [entry.to_dict() for entry in hand_front(solution)]
+            more["pareto_front"] = plain_front(solution)
         print_json(solution.to_dict() | more)
     else:
         untold = [warning for warning in the_object.warnings if warning not in told]

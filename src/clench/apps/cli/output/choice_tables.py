@@ -17,6 +17,13 @@ if TYPE_CHECKING:
 _MOST_ROWS = 10
 
 
+def plain_front(solution: GraspSolution) -> list[dict[str, Any]]:
+    """Return the Pareto front over all fingers in its JSON form."""
+    from clench.solver.analysis.pareto import hand_front
+
+    return [entry.to_dict() for entry in hand_front(solution)]
+
+
 def print_choice(solution: GraspSolution) -> None:
     """Print the criteria, the sets of every finger, and the sentences; print nothing if the solution has none."""
     from clench.solver.analysis.pareto import hand_front

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from clench.closing.finger_plan import FingerPlan, LinkOutline
+from clench.closing.curl_planes import LinkOutline
+from clench.closing.finger_plan import FingerPlan
 from clench.closing.outlines import cut_shape, extent
 from clench.core.pose import FloatArray, invert
 from clench.models.command import GraspCommand
