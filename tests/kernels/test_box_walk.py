@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from clench.kernels.geometry import box_walk
 from clench.kernels.geometry import obb as slabs
 from clench.kernels.geometry.bodies import Elements, pack_bodies
-from clench.kernels.geometry.obb import SLAB
+from clench.kernels.geometry.node_boxes import SLAB
 from clench.kernels.toi import core_motion
 from kernels.kernel_entries import entry
 from kernels.test_body_sweep import KINDS, drawn_chain, patch, pose

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clench.core.pose import FloatArray
 
 from .packed_problem import PackedProblem
-from .threads import share_out
+from clench.kernels.runtime.threads import share_out
 
 if TYPE_CHECKING:
     from clench.kernels.closing.layout import ClosingArrays

@@ -13,7 +13,7 @@ import numpy as np
 
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.motion import open_posture
-from clench.closing.threads import core_count
+from clench.kernels.runtime.threads import core_count
 from clench.core.defaults import FRICTION
 from clench.core.errors import CommandError
 from clench.core.pose import FloatArray, Pose

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clench.core.errors import CommandError
 from clench.core.keeping import KeptBySize, kept_by_identity
-from clench.core.memory import expect
+from clench.core.memory import expect, in_parts
 from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
@@ -134,6 +134,8 @@ def set_object_cache(size: int) -> None:
 
 def role_body(obj: GraspObject, role: BodyRole) -> BodyArrays:
     """Return the bodies of one role as one body, in the object's frame; cached like the results of `pack_object`."""
+    if all(body.role is role for body in obj.bodies):
+        return pack_object(obj).bodies
     source = CollisionSource(obj.collision_source)
     found: BodyArrays = _packed.get((obj.bodies, source, role), partial(_pack_role, obj.bodies, source, role))
     return found
@@ -217,9 +219,9 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     full_tree = _tree(flat + curved) if curved else tree
     joined, element_body = _bodies(placed, source) if curved else (pack_triangles(tree), tree.body)
     graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
-    held = _corners(full_tree, np.isin(full_tree.body, graspable))
+    everything = _corners(full_tree, slice(None))
+    held = everything if len(graspable) == len(bodies) else _corners(full_tree, np.isin(full_tree.body, graspable))
     center = _middle(held)
-    away = np.linalg.norm(_corners(full_tree, slice(None)) - center, axis=1)
     # With `engine` every mesh became a convex hull, which is always closed.
     closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
     return PackedObject(
@@ -234,8 +236,8 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         body_names=tuple(body.name for body in bodies),
         body_roles=tuple(body.role for body in bodies),
         center=center,
-        radius=float(away.max(initial=0.0)),
-        size=float(np.linalg.norm(held - center, axis=1).max(initial=0.0)),
+        radius=_reach(everything, center),
+        size=_reach(held, center),
         points=part_points(full_tree),
         geometry_hash=hash_bodies(bodies, source),
     )
@@ -286,6 +288,11 @@ def _middle(points: FloatArray) -> FloatArray:
     return center
 
 
+def _reach(points: FloatArray, center: FloatArray) -> float:
+    """Return how far points are from a centre at most [m]."""
+    return max((float(np.linalg.norm(points[some] - center, axis=1).max()) for some in in_parts(len(points))), default=0.0)
+
+
 def hash_bodies(bodies: tuple[Body, ...], source: CollisionSource) -> str:
     """Return a SHA-256 over an object's bodies for one collision source, hexadecimal; its pose plays no part."""
     digest = hashlib.sha256()
@@ -302,5 +309,5 @@ def _hash_shape(digest: hashlib._Hash, shape: Shape) -> None:
     digest.update(shape.pose.wxyz_xyz.tobytes())
     if shape.mesh is not None:
         digest.update(f"{shape.mesh.vertices.shape} {shape.mesh.triangles.shape}".encode())
-        digest.update(shape.mesh.vertices.tobytes())
-        digest.update(shape.mesh.triangles.tobytes())
+        digest.update(np.ascontiguousarray(shape.mesh.vertices))
+        digest.update(np.ascontiguousarray(shape.mesh.triangles))

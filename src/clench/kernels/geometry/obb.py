@@ -1,24 +1,21 @@
-"""Boxes of any direction, and capsules, around the nodes of a tree: as thin as the surface is there."""
+"""Read boxes of any direction around the nodes of a tree, and capsules: as thin as the surface is there.
+
+A box is a row of numbers, see `SLAB` in `clench.kernels.geometry.node_boxes`.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from clench.core.memory import in_parts
 from clench.kernels.closing.layout import Floats
-from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 
-if TYPE_CHECKING:
-    from .bvh import MeshTree
+from .node_boxes import ALMOST
 
-Whole = NDArray[np.int64]
-#: Numbers of a box: its middle, three half edges, the shortest last, and by how much it is grown.
-SLAB: Final = 13
 #: Corners of a core that is a rectangle, in order.
 RECTANGLE: Final = 4
 #: A capsule is that thin at most, as a fraction of the ball around the box; else the ball takes its place [-].
@@ -27,96 +24,6 @@ THIN: Final = 0.75
 FLAT: Final = 0.5
 #: How much of a box's width counts as slack beside its thickness [-].
 SOME: Final = 0.1
-#: More than how far from square the edges of a box are in single precision [-].
-ALMOST: Final = 1.0 + 1e-6
-#: More than rounding to single precision takes from the smallest numbers [m].
-TINY: Final = 1e-37
-
-
-def node_slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats) -> NDArray[np.float32]:
-    """Return a box around the elements of each node, along their principal axes.
-
-    Single precision halves the memory that is kept and read; every box is grown by a bound on the rounding.
-
-    Args:
-        tree: of the elements. begin, end: each node's elements, (N,). grown: their largest radius [m], (N,).
-
-    Returns:
-        see `SLAB` [m], (N, 13).
-    """
-    count = len(begin)
-    spread, slab = np.empty((count, 3, 3)), np.empty((count, SLAB), dtype=np.float32)
-    parts = np.column_stack([tree.first, tree.count, tree.right]).astype(np.int64)
-    middle = tree.vertices.mean(axis=0)
-    measure_spread(tree.vertices - middle, tree.triangles, parts, np.empty((count, 10)), spread)
-    for some in in_parts(count):
-        slab[some] = _slabs(tree, begin[some], end[some], grown[some], spread[some])
-    return slab
-
-
-def _slabs(tree: MeshTree, begin: Whole, end: Whole, grown: Floats, spread: Floats) -> NDArray[np.float32]:
-    """Return what `node_slabs` does for some nodes, whose second moments are given and overwritten."""
-    scale = np.abs(spread).max(axis=(1, 2), initial=0.0)
-    usual = np.isfinite(scale) & (scale > 0.0)
-    spread[usual] /= scale[usual, None, None]
-    spread[~usual] = np.eye(3)
-    axes = np.ascontiguousarray(np.linalg.eigh(spread)[1].transpose(0, 2, 1)[:, ::-1])
-    box = np.empty((len(begin), 6))
-    measure_extent(tree.vertices, tree.triangles, begin, end, axes, box)
-    middle = np.einsum("nk,nkj->nj", 0.5 * (box[:, :3] + box[:, 3:]), axes)
-    half = 0.5 * (box[:, 3:] - box[:, :3])
-    order = np.argsort(-half, axis=1, kind="stable")
-    edges = np.take_along_axis(half[:, :, None] * axes, order[:, :, None], axis=1)
-    exact = np.concatenate([middle, edges.reshape(-1, 9)], axis=1)
-    slab = np.empty((len(begin), SLAB), dtype=np.float32)
-    slab[:, :12] = exact
-    lost = np.linalg.norm((slab[:, :12] - exact).reshape(-1, 4, 3), axis=2).sum(axis=1)
-    size = np.abs(exact).sum(axis=1) + grown
-    slab[:, 12] = (grown + lost + 1e-12 * size) * ALMOST + TINY
-    return slab
-
-
-@entry_kernel
-def measure_spread(vertices: Floats, elements: Any, tree_parts: Any, sums: Floats, spread: Floats) -> None:
-    """Write the second moments of the corners of each node's elements about their mean, (N, 3, 3).
-
-    Args:
-        vertices, elements: of the tree. tree_parts: first element, number of elements and right child of each node,
-            (N, 3). sums: how many corners, the sum of their coordinates, and of those' products, (N, 10), overwritten.
-    """
-    for n in range(sums.shape[0] - 1, -1, -1):
-        first, count, right = tree_parts[n, 0], tree_parts[n, 1], tree_parts[n, 2]
-        for k in range(10):
-            sums[n, k] = 0.0 if count > 0 else sums[n + 1, k] + sums[right, k]
-        for t in range(first, first + count):
-            for k in range(3):
-                p = vertices[elements[t, k]]
-                sums[n, 0] += 1.0
-                for i in range(3):
-                    sums[n, 1 + i] += p[i]
-                    for j in range(i + 1):
-                        sums[n, 4 + i * (i + 1) // 2 + j] += p[i] * p[j]
-        for i in range(3):
-            for j in range(i + 1):
-                product = sums[n, 1 + i] * sums[n, 1 + j] / sums[n, 0]
-                spread[n, i, j] = sums[n, 4 + i * (i + 1) // 2 + j] - product
-                spread[n, j, i] = spread[n, i, j]
-
-
-@entry_kernel
-def measure_extent(vertices: Floats, elements: Any, begin: Any, end: Any, axes: Floats, box: Floats) -> None:
-    """Write the smallest and the largest coordinate of each node's elements along its axes, (N, 6)."""
-    for n in range(begin.shape[0]):
-        for i in range(3):
-            box[n, i], box[n, 3 + i] = np.inf, -np.inf
-        for t in range(begin[n], end[n]):
-            for k in range(3):
-                v = elements[t, k]
-                for i in range(3):
-                    at = (
-                        axes[n, i, 0] * vertices[v, 0] + axes[n, i, 1] * vertices[v, 1] + axes[n, i, 2] * vertices[v, 2]
-                    )
-                    box[n, i], box[n, 3 + i] = min(box[n, i], at), max(box[n, 3 + i], at)
 
 
 @kernel

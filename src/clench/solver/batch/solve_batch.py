@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.closing.threads import core_count
+from clench.kernels.runtime.threads import core_count
 from clench.core.argument_types import check_type
 from clench.core.errors import CommandError
 from clench.core.pose import FloatArray, Pose

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.closing.motion import open_posture
-from clench.closing.threads import core_count, share_out
+from clench.kernels.runtime.threads import core_count, share_out
 from clench.core.deferring import DeferredMapping
 from clench.core.pose import FloatArray
 from clench.core.pose_arrays import pose_of_row
