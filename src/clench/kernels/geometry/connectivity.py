@@ -33,7 +33,7 @@ def connected_parts(groups: NDArray[np.integer[Any]], count: int) -> Ints:
     """Return for each of so many nodes the smallest node of the part that it is in, (N,).
 
     Args:
-        groups: nodes that are connected, a group of three per row, (G, 3). count: how many nodes there are.
+        groups: nodes that are connected, one group per row, (G, K). count: how many nodes there are.
     """
     part = np.arange(count, dtype=np.int32)
     connect(np.ascontiguousarray(groups, dtype=np.int32), part)
@@ -100,10 +100,10 @@ def connect(groups: Ints, part: Ints) -> None:
     """Write for each node the smallest node of its part.
 
     Args:
-        groups: nodes that are connected, a group per row, (G, 3). part: each node's own number at the start, (N,).
+        groups: nodes that are connected, one group per row, (G, K). part: each node's own number at the start, (N,).
     """
     for g in range(groups.shape[0]):
-        for k in range(1, 3):
+        for k in range(1, groups.shape[1]):
             a, b = _root(part, groups[g, 0]), _root(part, groups[g, k])
             if a < b:
                 part[b] = a
