@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clench.core.defaults import LOAD_RESERVE
+from clench.core.deferring import LateFields, once
 from clench.core.errors import CommandError
 from clench.core.pose import FloatArray
 from clench.core.short_repr import short_repr
@@ -34,14 +35,14 @@ _TOTAL_FORCE: Final = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class SqueezeForces:
+class SqueezeForces(LateFields):
     """A squeeze.
 
     Args:
         plan: forces and torques that balance the nominal load; None when there are none.
         margin: the disturbances are resisted up to this multiple [-].
         unresisted: rows of the disturbance set that no contact forces can balance; the margin leaves them out.
-        reason: the binding limit if there is no plan, else "".
+        reason: the binding limit if there is no plan, else ""; looked for when it is first read.
         reserve: the plan counts on this part of the friction [-].
         loss: largest share of a finger's torques that joint friction takes [-].
     """
@@ -124,7 +125,10 @@ def squeeze_forces(
     careful = _with_friction(task, reserve)
     found, counted = _squeeze_of(task, careful, needed)
     if found is None:
-        return SqueezeForces(None, 0.0, unresisted, why_not(held, nominal))
+        reason = once(lambda: why_not(held, nominal))
+        return SqueezeForces.with_late(
+            lambda _: reason(), plan=None, margin=0.0, unresisted=unresisted, reserve=1.0, loss=0.0
+        )
     plan = pressed_harder(
         counted.held, found[0], found[0].forces.reshape(-1) + K @ nominal, counted.cases(found[1]), most_force
     )

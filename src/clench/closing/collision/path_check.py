@@ -12,6 +12,7 @@ from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import hand_frames
 from clench.core.keeping import kept_by_identity
 from clench.core.pose import FloatArray
+from clench.kernels.runtime.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from clench.kernels.toi.pair_motion import PathProblem
 
 _KEPT_HANDS: Final = 16
+#: Pairs of bodies that a thread checks at once.
+_PAIRS: Final = 64
 #: Way-points whose joints are this close to a straight line lie on it [rad].
 STRAIGHT: Final = 1e-12
 
@@ -125,12 +128,11 @@ def _first(
     hand: Hand, lines: _Lines, source: CollisionSource, number: int | None, around: PlacedObject | None
 ) -> PathOverlap | None:
     """Return the first overlap with one body of the object; with the first one, or without any, of the links, too."""
-    from clench.kernels.toi.path_overlap import OVERLAP, first_overlap
+    from clench.kernels.toi.path_overlap import OVERLAP
 
     path, points, kept = lines
     problem = _problem(hand, points, source, number, around)
-    out = np.zeros(2)
-    found = first_overlap(problem, out)
+    found, out = _first_pair(problem)
     if found < 0:
         return None
     m, r = problem.pairs[found].tolist()
@@ -148,6 +150,25 @@ def _first(
     assert number is not None
     body, position = _where(hand, q, m, source, around.bodies[number], around.T_palm_object)
     return PathOverlap(place, name, body, True, float(out[1]), position, from_start)
+
+
+def _first_pair(problem: PathProblem) -> tuple[int, FloatArray]:
+    """Return the pair that overlaps first, -1 when none does, and its place and depth; threads share the pairs."""
+    from clench.kernels.toi.path_overlap import first_overlap
+
+    count = len(problem.pairs)
+    parts = [slice(start, start + _PAIRS) for start in range(0, count, _PAIRS)]
+    found, out = np.full(len(parts), -1), np.full((len(parts), 2), np.inf)
+
+    def look(n: int) -> None:
+        some = parts[n]
+        found[n] = first_overlap(problem._replace(pairs=problem.pairs[some], allowed=problem.allowed[some]), out[n])
+
+    share_out(look, range(len(parts)), core_count())
+    if not (found >= 0).any():
+        return -1, np.zeros(2)
+    n = int(np.argmin(np.where(found >= 0, out[:, 0], np.inf)))
+    return int(found[n]) + parts[n].start, out[n]
 
 
 def _where(
