@@ -20,7 +20,7 @@ from clench.core.errors import CommandError
 from clench.core.pose import FloatArray
 from clench.core.short_repr import short_repr
 
-from .actuation import Effort, HoldingForces, HoldingProgram, solve_first
+from .actuation import Effort, HoldingForces, HoldingProgram, least_effort, solve_first
 from .binding import why_not
 from .held import HeldObject
 from .joint_friction import loss_of_torques, pressed_harder
@@ -123,7 +123,9 @@ def squeeze_forces(
     ends = np.zeros((1, len(change))) if spread is None else np.outer([1.0, -1.0], K @ check_loads(spread)[0])
     task = SqueezeTask(held, nominal, unit, ends, change.T[~lost], enough, most_force)
     careful = _with_friction(task, reserve)
-    found, counted = _squeeze_of(task, careful, needed)
+    # Most grasps that hold nothing do not even hold the load itself, which a small program tells.
+    held_at_all = not nominal.any() or least_effort(held, nominal) is not None
+    found, counted = _squeeze_of(task, careful, needed) if held_at_all else (None, task)
     if found is None:
         reason = once(lambda: why_not(held, nominal))
         return SqueezeForces.with_late(
@@ -148,17 +150,17 @@ def _squeeze_of(
     task: SqueezeTask, careful: SqueezeTask, needed: float
 ) -> tuple[tuple[HoldingForces, float] | None, SqueezeTask]:
     """Return forces with their margin, and the task that they fulfil: the careful task if it is feasible."""
+    # Most squeezes reach all the margin that is asked for, or nearly.
+    found = _least_torque(careful, careful.enough * (1.0 if needed else 1.0 - _GIVEN_UP))
+    if found is not None:
+        return found, careful
     if needed == 0.0:
         for each in (careful, task):
             best = _largest_margin(each)
             if best is not None:
                 return _gentle(each, best), each
         return None, task
-    # Most squeezes reach all the margin that is asked for. For the others, only loads that full friction can hold are
-    # feasible.
-    found = _least_torque(careful, careful.enough)
-    if found is not None:
-        return found, careful
+    # For the others, only loads that full friction can hold are feasible.
     best = _largest_margin(task)
     if best is None:
         return None, task
