@@ -28,7 +28,7 @@ from clench.solver.preshapes.postures import preshape_angles
 from .batch_parts import BatchParts
 from .batch_progress import shown
 from .devices import CPU, why_not
-from .grasp_batch import GraspBatch, Question
+from .grasp_batch import GraspBatch, Question, append_part
 
 #: Poses that are solved at a time: a few ten megabytes.
 CHUNK: Final = 1024
@@ -94,12 +94,13 @@ def solve_batch(
             for begin in range(0, max(len(where), 1), size):
                 some = where[begin : begin + size]
                 solve = partial(solver.solve, rows[some], None if there is None else there[some], count, device)
-                solved.append(solve() if parts is None else parts.part(len(solved), solver.names, rows[some], solve))
+                part = solve() if parts is None else parts.part(len(solved), solver.names, rows[some], solve)
+                append_part(solved, part)
                 advance(len(some))
     batch = GraspBatch.joined(solved)
     if len(groups) > 1:
         batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
-    batch = replace(batch, question=replace(question, options=batch.question.options))
+    batch = batch.with_known(question=replace(question, options=batch.question.options))
     if parts is not None:
         parts.finish(batch)
     return batch
