@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
@@ -15,6 +16,7 @@ from clench.core.errors import CommandError
 from clench.core.keeping import KeptBySize, kept_by_identity
 from clench.core.memory import expect, in_parts
 from clench.core.pose import FloatArray, Pose
+from clench.kernels.runtime.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
@@ -217,7 +219,12 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
     tree = _tree(flat)
     full_tree = _tree(flat + curved) if curved else tree
-    joined, element_body = _bodies(placed, source) if curved else (pack_triangles(tree), tree.body)
+    made = _at_once(
+        bodies=lambda: _bodies(placed, source) if curved else (pack_triangles(tree), tree.body),
+        owners=lambda: feature_owners(full_tree),
+        points=lambda: part_points(full_tree),
+        digest=lambda: hash_bodies(bodies, source),
+    )
     graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
     everything = _corners(full_tree, slice(None))
     held = everything if len(graspable) == len(bodies) else _corners(full_tree, np.isin(full_tree.body, graspable))
@@ -228,9 +235,9 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         tree=tree,
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
         full_tree=full_tree,
-        full_owners=feature_owners(full_tree),
-        bodies=joined,
-        element_body=element_body,
+        full_owners=made["owners"],
+        bodies=made["bodies"][0],
+        element_body=made["bodies"][1],
         closed=all(closed),
         body_closed=closed,
         body_names=tuple(body.name for body in bodies),
@@ -238,9 +245,20 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         center=center,
         radius=_reach(everything, center),
         size=_reach(held, center),
-        points=part_points(full_tree),
-        geometry_hash=hash_bodies(bodies, source),
+        points=made["points"],
+        geometry_hash=made["digest"],
     )
+
+
+def _at_once(**makers: Callable[[], Any]) -> dict[str, Any]:
+    """Return the values of functions by name; threads share the functions."""
+    made = dict[str, Any]()
+
+    def make(name: str) -> None:
+        made[name] = makers[name]()
+
+    share_out(make, makers, core_count())
+    return made
 
 
 def _bodies(placed: list[tuple[int, Shape]], source: CollisionSource) -> tuple[BodyArrays, NDArray[np.int32]]:
