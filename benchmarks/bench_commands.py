@@ -176,7 +176,12 @@ def scaling(
 
 
 def packing(
-    *, triangles: int = 1_000_000, passes: int = 3, points: int = 8, mesh: tuple[Path, ...] = (), common: Common = _COMMON
+    *,
+    triangles: int = 1_000_000,
+    passes: int = 3,
+    points: int = 8,
+    mesh: tuple[Path, ...] = (),
+    common: Common = _COMMON,
 ) -> int:
     """Time how long a fine sphere and a scan take to load and to be packed for the kernels, and their memory.
 

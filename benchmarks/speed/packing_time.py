@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import clench
-from clench.closing.collision.packed_object import OBJECT_CACHE, PackedObject, pack_object, packed_size, set_object_cache
+from clench.closing.collision.packed_object import (
+    OBJECT_CACHE,
+    PackedObject,
+    pack_object,
+    packed_size,
+    set_object_cache,
+)
 from clench.core.pose import FloatArray
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.mesh_file import merged
@@ -61,19 +67,16 @@ def bench_packing(asked: PackingBench, files: tuple[Path, ...]) -> BenchReport:
 
 
 def _measure_all(report: BenchReport, asked: PackingBench, files: tuple[Path, ...]) -> None:
-    scans = {"sphere": sphere_mesh, "scan": lambda n: scan_mesh(n, asked.seed)}
-    for make in scans.values():
-        mesh = make(_FIRST)
-        pack_object(clench.GraspObject.from_meshes([(mesh.vertices, mesh.triangles)]))
-    for name, make in scans.items():
-        mesh = make(asked.triangles)
+    for mesh in (sphere_mesh(_FIRST), scan_mesh(_FIRST, asked.seed)):
+        pack_object(_load(mesh))
+    for name, mesh in (("sphere", sphere_mesh(asked.triangles)), ("scan", scan_mesh(asked.triangles, asked.seed))):
+        _measure(report, name, partial(_load, mesh), asked)
+    for number, path in enumerate(files):
+        _measure(report, f"file_{number}_{path.stem}", partial(clench.GraspObject.load, path), asked)
 
-        def load(mesh: TriangleMesh = mesh, name: str = name) -> clench.GraspObject:
-            return clench.GraspObject.from_meshes([(mesh.vertices, mesh.triangles)], name=name)
 
-        _measure(report, name, load, asked)
-    for number, path in zip(count(), files):
-        _measure(report, f"file_{number}_{path.stem}", lambda path=path: clench.GraspObject.load(path), asked)
+def _load(mesh: TriangleMesh) -> clench.GraspObject:
+    return clench.GraspObject.from_meshes([(mesh.vertices, mesh.triangles)])
 
 
 def _measure(report: BenchReport, key: str, load: Callable[[], clench.GraspObject], asked: PackingBench) -> None:
@@ -82,7 +85,7 @@ def _measure(report: BenchReport, key: str, load: Callable[[], clench.GraspObjec
     for _ in range(asked.passes):
         obj, times = _timed(load)
         loads.append(times)
-        packed, times = _timed(lambda obj=obj: pack_object(obj))  # type: ignore[misc]
+        packed, times = _timed(partial(pack_object, obj))
         packs.append(times)
     for stage, times_of in (("load", loads), ("pack", packs)):
         report.values[f"{key}_{stage}_s"] = min(wall for wall, _ in times_of)

@@ -224,7 +224,9 @@ def test_packing_checks_times_and_weighs(capsys: pytest.CaptureFixture[str], tmp
     mesh = tmp_path / "cube.obj"
     corners = [f"v {x} {y} {z}" for x in (0, 0.05) for y in (0, 0.05) for z in (0, 0.05)]
     mesh.write_text("\n".join([*corners, "f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]))
-    assert main(["packing", "--triangles", "30000", "--passes", "1", "--points", "3", "--mesh", str(mesh), "--json"]) == 0
+    assert (
+        main(["packing", "--triangles", "30000", "--passes", "1", "--points", "3", "--mesh", str(mesh), "--json"]) == 0
+    )
     found = json.loads(capsys.readouterr().out)
     assert found["answers_right"] is True
     assert found["file_0_cube_triangles"] == 12

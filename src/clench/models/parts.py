@@ -28,7 +28,8 @@ def part_points(tree: MeshTree) -> FloatArray:
         # Merging places, which takes longer than all the rest, would join nothing more.
         corners = tree.vertices[used]
         corners = corners[corners[:, 0] == corners[:, 0].min()]
-        return corners[np.lexsort(corners.T[::-1])[:1]]
+        least: FloatArray = corners[np.lexsort(corners.T[::-1])[:1]]
+        return least
     order = np.lexsort(tree.vertices.T[::-1])
     sorted_vertices = tree.vertices[order]
     new = np.concatenate([[True], (sorted_vertices[1:] != sorted_vertices[:-1]).any(axis=1)])

@@ -16,7 +16,7 @@ from clench.core.errors import CommandError
 from clench.core.keeping import KeptBySize, kept_by_identity
 from clench.core.memory import expect, in_parts
 from clench.core.pose import FloatArray, Pose
-from clench.kernels.runtime.threads import core_count, share_out
+from clench.core.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
@@ -308,7 +308,9 @@ def _middle(points: FloatArray) -> FloatArray:
 
 def _reach(points: FloatArray, center: FloatArray) -> float:
     """Return how far points are from a centre at most [m]."""
-    return max((float(np.linalg.norm(points[some] - center, axis=1).max()) for some in in_parts(len(points))), default=0.0)
+    return max(
+        (float(np.linalg.norm(points[some] - center, axis=1).max()) for some in in_parts(len(points))), default=0.0
+    )
 
 
 def hash_bodies(bodies: tuple[Body, ...], source: CollisionSource) -> str:
@@ -327,5 +329,5 @@ def _hash_shape(digest: hashlib._Hash, shape: Shape) -> None:
     digest.update(shape.pose.wxyz_xyz.tobytes())
     if shape.mesh is not None:
         digest.update(f"{shape.mesh.vertices.shape} {shape.mesh.triangles.shape}".encode())
-        digest.update(np.ascontiguousarray(shape.mesh.vertices))
-        digest.update(np.ascontiguousarray(shape.mesh.triangles))
+        digest.update(np.ascontiguousarray(shape.mesh.vertices).data)
+        digest.update(np.ascontiguousarray(shape.mesh.triangles).data)

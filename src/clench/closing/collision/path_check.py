@@ -12,7 +12,7 @@ from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import hand_frames
 from clench.core.keeping import kept_by_identity
 from clench.core.pose import FloatArray
-from clench.kernels.runtime.threads import core_count, share_out
+from clench.core.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource

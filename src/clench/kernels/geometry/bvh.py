@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clench.core.threads import core_count, share_out
 from clench.kernels.runtime.compiling import entry_kernel
-from clench.kernels.runtime.threads import core_count, share_out
 
 from .connectivity import owned_features
 from .node_boxes import local_elements

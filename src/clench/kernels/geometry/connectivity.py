@@ -92,7 +92,7 @@ def end_of(triangles: Ints, side: int, lower: int) -> int:
     """Return the higher vertex of a side, or the lower one."""
     t, k = side // 3, side % 3
     v, w = np.int64(triangles[t, k]), np.int64(triangles[t, k + 1 if k < 2 else 0])
-    return min(v, w) if lower else max(v, w)
+    return int(min(v, w) if lower else max(v, w))
 
 
 @entry_kernel

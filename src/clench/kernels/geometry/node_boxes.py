@@ -8,8 +8,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.core.threads import core_count, share_out
 from clench.kernels.runtime.compiling import entry_kernel, kernel
-from clench.kernels.runtime.threads import core_count, share_out
 
 from .tree_growth import Floats, Ints, row_parts
 
@@ -90,15 +90,24 @@ def node_slabs(local: Local, spans: Spans, right: Ints) -> NDArray[np.float32]:
         see `SLAB` [m], (N, 13).
     """
     count = len(right)
-    slab, sums, middle = np.empty((count, SLAB), dtype=np.float32), np.empty((count, _SUMS)), local.vertices.mean(axis=0)
+    slab, sums, middle = (
+        np.empty((count, SLAB), dtype=np.float32),
+        np.empty((count, _SUMS)),
+        local.vertices.mean(axis=0),
+    )
     parts = [slice(start, min(start + _NODES, count)) for start in range(0, count, _NODES)]
-    share_out(lambda some: sum_leaves(*local[:2], middle, *(a[some] for a in (*spans[:2], right, sums))), parts, core_count())
-    sum_nodes(right, sums)
+
+    def sum_up(some: slice) -> None:
+        begin, end = spans.begin[some], spans.end[some]
+        sum_leaves(local.vertices, local.elements, middle, begin, end, right[some], sums[some])
 
     def measure(some: slice) -> None:
-        nodes = tuple(column[some] for column in (*spans, right, sums))
-        box_nodes(*local, *nodes, np.empty((3, 3)), np.empty((3, 3)), np.empty(6), slab[some])
+        nodes = Spans(spans.begin[some], spans.end[some], spans.grown[some])
+        axes = np.empty((2, 3, 3))
+        box_nodes(local, nodes, sums[some], axes[0], axes[1], np.empty(6), slab[some])
 
+    share_out(sum_up, parts, core_count())
+    sum_nodes(right, sums)
     share_out(measure, parts, core_count())
     return slab
 
@@ -194,27 +203,14 @@ def sum_nodes(right: Ints, sums: Floats) -> None:
 
 
 @entry_kernel
-def box_nodes(
-    vertices: Floats,
-    elements: Ints,
-    radius: Floats,
-    fresh: Ints,
-    begin: Ints,
-    end: Ints,
-    grown: Floats,
-    right: Ints,
-    sums: Floats,
-    spread: Floats,
-    axes: Floats,
-    box: Floats,
-    slab: Any,
-) -> None:
+def box_nodes(local: Local, spans: Spans, sums: Floats, spread: Floats, axes: Floats, box: Floats, slab: Any) -> None:
     """Write the box of each node along its principal axes, see `node_slabs`.
 
     Args:
-        vertices, elements, radius, fresh: see `Local`. begin, end, grown: see `Spans`. right, sums: of the nodes.
-        spread, axes: scratch space, (3, 3). box: scratch space, (6,). slab: written, (N, 13).
+        local: the elements. spans, sums: of the nodes. spread, axes: scratch space, (3, 3). box: scratch space, (6,).
+        slab: written, (N, 13).
     """
+    vertices, elements, fresh, begin, end = local.vertices, local.elements, local.fresh, spans.begin, spans.end
     for n in range(begin.shape[0]):
         put_spread(sums[n], spread)
         put_principal_axes(spread, axes)
@@ -228,7 +224,7 @@ def box_nodes(
                     reach_vertex(vertices, elements[t, k], axes, box)
         for v in range(a, b):
             reach_vertex(vertices, v, axes, box)
-        put_slab(axes, box, grown[n], slab[n])
+        put_slab(axes, box, spans.grown[n], slab[n])
 
 
 @kernel

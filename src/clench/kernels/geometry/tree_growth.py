@@ -12,8 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.core.threads import core_count, share_out
 from clench.kernels.runtime.compiling import entry_kernel, kernel
-from clench.kernels.runtime.threads import core_count, share_out
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -43,16 +43,27 @@ class Nodes(NamedTuple):
 
     def rows(self, start: int, end: int) -> Nodes:
         """Return some of the nodes, as views."""
-        return Nodes(*(column[start:end] for column in self))
+        columns: list[Any] = [column[start:end] for column in self]
+        return Nodes(*columns)
 
 
-class _Sorted(NamedTuple):
+class Sorted(NamedTuple):
     """Boxes of triangles (T, 6) and their numbers (T,), in the order of the tree as far as it has grown."""
 
     boxes: Floats
     order: Ints
     spare_boxes: Floats
     spare_order: Ints
+
+
+class Scratch(NamedTuple):
+    """Scratch space of a thread: of bins (B,), what `measure_boxes` writes, and a stack."""
+
+    bin_boxes: Floats
+    numbers: NDArray[np.int64]
+    areas: Floats
+    extent: Floats
+    todo: NDArray[np.int64]
 
 
 class _Span(NamedTuple):
@@ -77,20 +88,20 @@ def grow_tree(vertices: Floats, triangles: Ints) -> tuple[Ints, Nodes]:
     size = len(triangles)
     boxes, order = np.empty((size, 6)), np.arange(size, dtype=np.int32)
     share_out(lambda some: triangle_boxes(vertices, triangles[some], boxes[some]), row_parts(size), core_count())
-    held = _Sorted(boxes, order, np.empty_like(boxes), np.empty_like(order))
+    held = Sorted(boxes, order, np.empty_like(boxes), np.empty_like(order))
     inner, parts = _part_large(held)
     room = _room(2 * size)
     sizes = dict[int, int]()
 
     def grow(part: _Span) -> None:
         nodes = room.rows(2 * part.start, 2 * part.end)
-        sizes[part.start] = grow_nodes(*held, part.start, part.end, part.depth, *nodes, *_scratch())
+        sizes[part.start] = grow_nodes(held, part.start, part.end, part.depth, nodes, _scratch())
 
     share_out(grow, parts, core_count())
     return order, _joined(inner, parts, room, sizes)
 
 
-def _part_large(held: _Sorted) -> tuple[dict[tuple[int, int], int], list[_Span]]:
+def _part_large(held: Sorted) -> tuple[dict[tuple[int, int], int], list[_Span]]:
     """Part all nodes that are too large for one thread.
 
     Returns:
@@ -100,7 +111,7 @@ def _part_large(held: _Sorted) -> tuple[dict[tuple[int, int], int], list[_Span]]
     waiting = [_Span(0, len(held.order), 0)] if len(held.order) else []
 
     def part(span: _Span) -> None:
-        inner[span.start, span.end] = part_node(*held, *span, *_scratch()[:4])
+        inner[span.start, span.end] = part_node(held, span.start, span.end, span.depth, _scratch())
 
     while waiting:
         parts += [span for span in waiting if span.end - span.start <= _PART]
@@ -119,10 +130,9 @@ def _room(nodes: int) -> Nodes:
     return Nodes(np.empty((nodes, 3)), np.empty((nodes, 3)), *numbers)
 
 
-def _scratch() -> tuple[Any, ...]:
-    """Return scratch space of a thread: bins' boxes, counts and areas, the box of centres, and a stack."""
+def _scratch() -> Scratch:
     stack = np.empty((2 * STACK_SIZE, 4), dtype=np.int64)
-    return np.empty((_BINS, 6)), np.empty(_BINS, dtype=np.int64), np.empty(_BINS), np.empty(12), stack
+    return Scratch(np.empty((_BINS, 6)), np.empty(_BINS, dtype=np.int64), np.empty(_BINS), np.empty(12), stack)
 
 
 def _joined(inner: dict[tuple[int, int], int], parts: list[_Span], room: Nodes, sizes: dict[int, int]) -> Nodes:
@@ -142,8 +152,8 @@ def _joined(inner: dict[tuple[int, int], int], parts: list[_Span], room: Nodes, 
             continue
         count = sizes[span[0]]
         mine, theirs = made.rows(at, at + count), room.rows(2 * span[0], 2 * span[0] + count)
-        for own, other in zip(mine, theirs, strict=True):
-            own[:] = other
+        for k in range(len(mine)):
+            np.copyto(mine[k], theirs[k])
         mine.right[mine.right >= 0] += at
         mine.skip[:] += at
         at += count
@@ -174,77 +184,47 @@ def triangle_boxes(vertices: Floats, triangles: Ints, boxes: Floats) -> None:
 
 
 @entry_kernel
-def grow_nodes(
-    boxes: Floats,
-    order: Ints,
-    spare_boxes: Floats,
-    spare_order: Ints,
-    start: int,
-    end: int,
-    depth: int,
-    low: Floats,
-    high: Floats,
-    first: Ints,
-    count: Ints,
-    right: Ints,
-    skip: Ints,
-    bin_boxes: Floats,
-    numbers: Any,
-    areas: Floats,
-    extent: Floats,
-    todo: Any,
-) -> int:
+def grow_nodes(held: Sorted, start: int, end: int, depth: int, nodes: Nodes, room: Scratch) -> int:
     """Part triangles into nodes down to leaves; write the nodes, and return their number.
 
     Args:
-        boxes, order: of the triangles, which are sorted from `start` to `end`. spare_boxes, spare_order: as large.
-        depth: of the node that holds them. low, high, first, count, right, skip: the nodes, numbered from 0.
-        bin_boxes, numbers, areas: one row per bin. extent: (12,). todo: stack.
+        held: the triangles, which are sorted from `start` to `end`. depth: of the node that holds these.
+        nodes: written, numbered from 0. room: scratch space.
     """
-    waiting, nodes = 1, 0
+    low, high, first, count = nodes.low, nodes.high, nodes.first, nodes.count
+    right, skip, todo, extent = nodes.right, nodes.skip, room.todo, room.extent
+    waiting, made = 1, 0
     todo[0, 0], todo[0, 1], todo[0, 2], todo[0, 3] = start, end, -1, depth
     while waiting:
         waiting -= 1
         begin, stop, parent, level = todo[waiting, 0], todo[waiting, 1], todo[waiting, 2], todo[waiting, 3]
-        node = nodes
-        nodes += 1
+        node = made
+        made += 1
         if parent >= 0:
             right[parent] = node
         first[node], count[node], right[node] = 0, 0, -1
-        measure_boxes(boxes, begin, stop, extent)
+        measure_boxes(held.boxes, begin, stop, extent)
         for k in range(3):
             low[node, k], high[node, k] = extent[k], extent[3 + k]
         if stop - begin <= LEAF_SIZE:
             first[node], count[node] = begin, stop - begin
             continue
-        middle = _split(boxes, order, spare_boxes, spare_order, begin, stop, level, bin_boxes, numbers, areas, extent)
+        middle = _split(held, begin, stop, level, room)
         todo[waiting, 0], todo[waiting, 1], todo[waiting, 2], todo[waiting, 3] = middle, stop, node, level + 1
         # The left child is next off the stack, hence node + 1: it needs no pointer.
         todo[waiting + 1, 0], todo[waiting + 1, 1], todo[waiting + 1, 2] = begin, middle, -1
         todo[waiting + 1, 3] = level + 1
         waiting += 2
-    for node in range(nodes - 1, -1, -1):
+    for node in range(made - 1, -1, -1):
         skip[node] = node + 1 if count[node] else skip[right[node]]
-    return nodes
+    return made
 
 
 @entry_kernel
-def part_node(
-    boxes: Floats,
-    order: Ints,
-    spare_boxes: Floats,
-    spare_order: Ints,
-    start: int,
-    end: int,
-    depth: int,
-    bin_boxes: Floats,
-    numbers: Any,
-    areas: Floats,
-    extent: Floats,
-) -> int:
+def part_node(held: Sorted, start: int, end: int, depth: int, room: Scratch) -> int:
     """Part the triangles of one node; return the first of its right child. See `grow_nodes`."""
-    measure_boxes(boxes, start, end, extent)
-    return _split(boxes, order, spare_boxes, spare_order, start, end, depth, bin_boxes, numbers, areas, extent)
+    measure_boxes(held.boxes, start, end, room.extent)
+    return _split(held, start, end, depth, room)
 
 
 @kernel
@@ -261,24 +241,13 @@ def measure_boxes(boxes: Floats, start: int, end: int, extent: Floats) -> None:
 
 
 @kernel
-def _split(
-    boxes: Floats,
-    order: Ints,
-    spare_boxes: Floats,
-    spare_order: Ints,
-    start: int,
-    end: int,
-    depth: int,
-    bin_boxes: Floats,
-    numbers: Any,
-    areas: Floats,
-    extent: Floats,
-) -> int:
+def _split(held: Sorted, start: int, end: int, depth: int, room: Scratch) -> int:
     """Part triangles along the longest axis of their middles by the surface area rule; return the middle."""
     half = (start + end) // 2
     if depth >= _BALANCED_DEPTH:
         return half
-    axis = 0
+    boxes, order, spare_boxes, spare_order = held.boxes, held.order, held.spare_boxes, held.spare_order
+    axis, extent = 0, room.extent
     for k in range(1, 3):
         if extent[9 + k] - extent[6 + k] > extent[9 + axis] - extent[6 + axis]:
             axis = k
@@ -286,8 +255,8 @@ def _split(
     scale = _BINS / size if size > 0.0 else 0.0
     if not np.isfinite(scale) or scale == 0.0:
         return half
-    _fill_bins(boxes, start, end, axis, least, scale, bin_boxes, numbers)
-    cut = _best_cut(bin_boxes, numbers, areas)
+    _fill_bins(boxes, start, end, axis, least, scale, room.bin_boxes, room.numbers)
+    cut = _best_cut(room.bin_boxes, room.numbers, room.areas)
     middle, rest = start, start
     for i in range(start, end):
         n = order[i]

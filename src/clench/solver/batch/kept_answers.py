@@ -45,7 +45,8 @@ class KeptAnswers:
     """
 
     def __init__(self, parts: Sequence[KeptPart], part: NDArray[np.int64], row: NDArray[np.int64]) -> None:
-        self._parts, self._part, self._row = tuple(parts), part, row
+        self._parts: tuple[KeptPart, ...] = tuple(parts)
+        self._part, self._row = part, row
 
     @property
     def size(self) -> int:
@@ -91,8 +92,9 @@ class KeptAnswers:
         """Return the solution of a pose, or None where its answers are not kept."""
         if self._part[i] < 0:
             return None
-        one = self._parts[self._part[i]].rows(self._row[i : i + 1] if i >= 0 else self._row[[i]])
-        return one.read(one.answers, one.palms[0], one.objects[0])
+        one = self._parts[int(self._part[i])].rows(self._row[[i]])
+        found: GraspSolution = one.read(one.answers, one.palms[0], one.objects[0])
+        return found
 
 
 def _taken(arrays: Any, which: NDArray[np.integer[Any]]) -> Any:

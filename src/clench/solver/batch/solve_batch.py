@@ -14,11 +14,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.kernels.runtime.threads import core_count
 from clench.core.argument_types import check_type
 from clench.core.errors import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.core.pose_arrays import pose_rows
+from clench.core.threads import core_count
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.closing.motion import open_posture
-from clench.kernels.runtime.threads import core_count, share_out
 from clench.core.deferring import DeferredMapping
 from clench.core.pose import FloatArray
 from clench.core.pose_arrays import pose_of_row
+from clench.core.threads import core_count, share_out
 from clench.models.command import GraspCommand
 from clench.scoring.calibration import calibration_of
 from clench.scoring.explaining import say_what_decided
