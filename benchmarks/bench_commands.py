@@ -175,6 +175,29 @@ def scaling(
     return print_report(bench_scaling(case, asked, pages), common)
 
 
+def packing(
+    *,
+    triangles: int = 1_000_000,
+    passes: int = 3,
+    points: int = 8,
+    mesh: tuple[Path, ...] = (),
+    common: Common = _COMMON,
+) -> int:
+    """Time how long a fine sphere and a scan take to load and to be packed for the kernels, and their memory.
+
+    Args:
+        triangles: of the sphere and of the scan, about.
+        passes: how often each is timed; the quickest pass counts.
+        points: whose distances are checked against all triangles.
+        mesh: files to time besides.
+    """
+    from .speed.packing_time import PackingBench, bench_packing
+
+    at_least(12, triangles=triangles)
+    at_least(1, passes=passes, points=points)
+    return print_report(bench_packing(PackingBench(triangles, passes, points, common.seed), mesh), common)
+
+
 def choose(*, case: Case = _FREE, runs: Runs = _CHOICES, alternatives: int = 8, common: Common = _COMMON) -> int:
     """Time the choice over all fingers, with criteria that add up and with steadiness.
 
@@ -311,6 +334,7 @@ def displacement(
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "solve": solve,
     "batch": batch,
+    "packing": packing,
     "choose": choose,
     "steadiness": steadiness,
     "peers": peers,

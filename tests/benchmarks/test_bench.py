@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 import clench
 from benchmarks.bench_commands import BENCHMARKS, main
 from benchmarks.bench_report import BenchReport, describe_place
-from benchmarks.speed import choice_timing, solving
+from benchmarks.speed import choice_timing, packing_time, solving
 from benchmarks.speed.answer_checks import Checked, Surface, check_answer, triangle_distances
 from clench.closing.kernel_run import empty_answers, run_stages, solve_packed
 from clench.core.exceptions import CommandError, UnknownNameError
@@ -217,6 +218,29 @@ def test_the_check_of_choices_sees_one_that_is_not_the_best(monkeypatch: pytest.
 
     monkeypatch.setattr(choice_timing, "choose", worst)
     assert len(choice_timing._wrong(groups, setting)) == 2
+
+
+def test_packing_checks_times_and_weighs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    mesh = tmp_path / "cube.obj"
+    corners = [f"v {x} {y} {z}" for x in (0, 0.05) for y in (0, 0.05) for z in (0, 0.05)]
+    mesh.write_text("\n".join([*corners, "f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]))
+    assert (
+        main(["packing", "--triangles", "30000", "--passes", "1", "--points", "3", "--mesh", str(mesh), "--json"]) == 0
+    )
+    found = json.loads(capsys.readouterr().out)
+    assert found["answers_right"] is True
+    assert found["file_0_cube_triangles"] == 12
+    for name in ("sphere", "scan"):
+        assert found[f"{name}_triangles"] == 12 * 50**2
+        assert found[f"{name}_bytes_per_triangle"] <= 200.0
+        assert min(found[f"{name}_{stage}_processor_s"] for stage in ("load", "pack")) > 0.0
+
+
+def test_packing_reports_wrong_distances(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
+    exact = packing_time.triangle_distances
+    monkeypatch.setattr(packing_time, "triangle_distances", lambda *given: exact(*given) + 1e-6)
+    assert main(["packing", "--triangles", "1200", "--passes", "1", "--points", "1"]) == 1
+    assert "by all triangles" in capsys.readouterr().err
 
 
 def test_steadiness_checks_times_and_draws(capsys: pytest.CaptureFixture[str], tmp_path) -> None:

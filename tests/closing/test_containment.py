@@ -9,7 +9,7 @@ from clench.closing.collision.containment import contained_link, link_within_lin
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.link_bodies import hand_bodies
 from clench.core.pose import Pose
-from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.trees.bvh import build_tree
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.parts import part_points
 from clench.models.shapes import CollisionSource, Shape, ShapeKind

@@ -11,8 +11,8 @@ from clench.closing.finger_plan import plan_finger
 from clench.closing.hand_plan import make_hand_plan
 from clench.closing.kernel_run import close_items, row_of
 from clench.closing.packed_problem import capacity_of, items_around, pack_problem, planes_tell
-from clench.closing.threads import kernel_threads, share_out
 from clench.core.pose import Pose
+from clench.core.threads import kernel_threads, share_out
 from clench.kernels.closing.start_overlap import CROSSED, FREE
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource

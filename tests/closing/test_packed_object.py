@@ -9,7 +9,14 @@ import pytest
 from block_hands import block_hand
 
 import clench
-from clench.closing.collision.packed_object import OBJECT_CACHE, ROUND_KINDS, hash_hand, pack_object, packed_size
+from clench.closing.collision.packed_object import (
+    OBJECT_CACHE,
+    ROUND_KINDS,
+    hash_hand,
+    pack_object,
+    packed_size,
+    role_body,
+)
 from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 from clench.models.mesh import TriangleMesh
@@ -224,3 +231,21 @@ def test_forty_objects_stay_packed():
     packed = [pack_object(obj) for obj in objects]
     assert [pack_object(obj) for obj in objects] == packed
     assert sum(map(packed_size, packed)) < OBJECT_CACHE
+
+
+def test_the_bodies_to_grasp_share_their_arrays_with_the_object_where_there_are_no_others():
+    mesh = cross()
+    alone = GraspObject("cross", (Body("cross", (Shape(ShapeKind.MESH, mesh=mesh),)),))
+    assert role_body(alone, BodyRole.GRASPABLE) is pack_object(alone).bodies
+    assert len(role_body(alone, BodyRole.OBSTACLE).elements) == 0
+    table = Body("table", (Shape(ShapeKind.BOX, (1.0, 1.0, 0.1), Pose([0, 0, -0.3])),), role=BodyRole.OBSTACLE)
+    both = alone.with_body(table)
+    assert len(role_body(both, BodyRole.GRASPABLE).elements) == len(mesh.triangles)
+    assert len(role_body(both, BodyRole.OBSTACLE).elements) == 12
+
+
+def test_a_mesh_takes_about_two_hundred_bytes_per_triangle():
+    ball = Shape(ShapeKind.SPHERE, (0.03, 0.0, 0.0)).to_mesh(1e-6)
+    packed = pack_object(GraspObject("ball", (Body("ball", (Shape(ShapeKind.MESH, mesh=ball),)),)))
+    assert len(ball.triangles) > 10_000
+    assert packed_size(packed) <= 200 * len(ball.triangles)

@@ -17,10 +17,10 @@ from clench.kernels.closing.layout import (
 )
 from clench.kernels.closing.solve_layout import ObjectArrays
 from clench.kernels.geometry.bodies import no_body
-from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.sections import plane_sections as family_section
 from clench.kernels.sections.plane_sections import make_sections
 from clench.kernels.toi.full_width import planes_only
+from clench.kernels.trees.bvh import build_tree
 from kernels.kernel_entries import entry
 from kernels.plain_closing import close_items
 

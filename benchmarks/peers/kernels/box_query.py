@@ -9,10 +9,10 @@ import numpy as np
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import Elements
-from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.geometry.core_distance import crosses, separation
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
+from clench.kernels.trees.bvh import build_tree
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
 PAIRS = 512

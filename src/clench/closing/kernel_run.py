@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray
+from clench.core.threads import share_out
 
 from .packed_problem import PackedProblem
-from .threads import share_out
 
 if TYPE_CHECKING:
     from clench.kernels.closing.layout import ClosingArrays

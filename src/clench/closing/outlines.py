@@ -15,7 +15,7 @@ from clench.models.shapes import Shape, ShapeKind
 from clench.models.tessellation import tessellate
 
 if TYPE_CHECKING:
-    from clench.kernels.geometry.bvh import MeshTree
+    from clench.kernels.trees.bvh import MeshTree
 
 #: Axes closer than this to the plane count as lying in it [rad].
 ALIGNED = 1e-9
@@ -176,7 +176,7 @@ def _in_line(a: FloatArray, points: FloatArray, b: FloatArray, slack: float) -> 
 
 def _tree(shape: Shape) -> tuple[MeshTree, bool]:
     """Return the tree of a mesh or a box in its own frame, and whether its faces wind outwards."""
-    from clench.kernels.geometry.bvh import build_tree
+    from clench.kernels.trees.bvh import build_tree
 
     mesh = shape.mesh
     if mesh is None:

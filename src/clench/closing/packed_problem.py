@@ -239,6 +239,6 @@ def nothing_to_close() -> ObjectArrays:
     from clench.kernels.closing.layout import no_rounds
     from clench.kernels.closing.solve_layout import ObjectArrays
     from clench.kernels.geometry.bodies import no_body
-    from clench.kernels.geometry.bvh import build_tree
+    from clench.kernels.trees.bvh import build_tree
 
     return ObjectArrays(build_tree(np.empty((0, 3)), np.empty((0, 3))), no_rounds(), True, no_body())

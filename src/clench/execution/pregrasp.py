@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from clench.closing.collision.path_check import find_path_overlap
 from clench.core.argument_types import check_type
 from clench.core.exceptions import CommandError, MotionError
 from clench.core.pose import FloatArray, invert
+from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Finger, Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.models.shapes import CollisionSource
@@ -19,11 +19,11 @@ from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE
 from .step_check import placed_object
-from .trajectory import Trajectory, plan_trajectory
+from .trajectory import plan_closing, plan_trajectory
 
-#: Steps in which the closing path is walked back, and halvings that find the place within a step.
+#: Steps in which the closing path is walked back. The step in which the gap becomes large enough is parted again.
 _STEPS = 100
-_HALVINGS = 30
+_PARTINGS = 5
 
 
 def plan_pregrasp(
@@ -57,60 +57,76 @@ def plan_pregrasp(
             way = None
         if way is not None and way.pregrasp is not None:
             return dict(zip(hand.joint_names, way.positions[way.pregrasp].tolist(), strict=True))
-    trajectory = plan_trajectory(solution, hand, force=True)
-    q = posture(solution.joint_angles, hand, "joint_angles")
-    poses, T_palm_world = hand.link_poses(q), solution.hand_pose.inverse()
+    times, path = plan_closing(solution, hand)
+    touch = posture(solution.joint_angles, hand, "joint_angles")
+    q = touch.copy()
     for finger in hand.fingers:
-        own, moving = list(finger.joints), _moving_links(hand, finger, trajectory)
-        contacts = [c for c in solution.contacts if c.finger == finger.name and not c.passed]
-        links = [hand.link_index(c.link) for c in contacts]
-        touching = [(k, c) for k, c in zip(links, contacts, strict=True) if k in moving]
-        if not touching:
-            continue
-        places = np.array([T_palm_world.apply(c.position) for _, c in touching])
-        normals = np.array([T_palm_world.rotation @ c.normal for _, c in touching])
-        local = np.array([(invert(poses[k]) @ np.append(p, 1.0)) for (k, _), p in zip(touching, places, strict=True)])
-        numbers = [k for k, _ in touching]
-
-        def gap(
-            time: float,
-            own: list[int] = own,
-            numbers: list[int] = numbers,
-            local: FloatArray = local,
-            places: FloatArray = places,
-            normals: FloatArray = normals,
-        ) -> float:
-            there = q.copy()
-            there[own] = trajectory.at(time)[own]
-            moved = np.einsum("kij,kj->ki", hand.link_poses(there)[numbers], local)[:, :3]
-            return float(((moved - places) * normals).sum(axis=1).min())
-
-        back = _latest_clear(gap, trajectory, clearance)
-        q[own] = trajectory.at(back)[own]
-    touch, source = trajectory.positions[-1], CollisionSource(solution.collision_source)
+        gap = _finger_gap(solution, hand, finger, times, path)
+        if gap is not None:
+            back = _latest_clear(gap, float(times[-1]), clearance)
+            q[finger.own] = _angles_at(np.array([back]), times, path[:, finger.own])[0]
+    source = CollisionSource(solution.collision_source)
     around = None if obj is None else placed_object(solution, obj)
-    for before in (q, trajectory.positions[0]):
+    for before in (q, path[0]):
         if find_path_overlap(hand, np.array([touch, before]), source, around) is None:
             return dict(zip(hand.joint_names, before.tolist(), strict=True))
     return dict(zip(hand.joint_names, q.tolist(), strict=True))
 
 
-def _latest_clear(gap: Callable[[float], float], trajectory: Trajectory, clearance: float) -> float:
-    """Return the last time of a trajectory before which the gap is large enough; its start when it never is."""
-    times = np.linspace(trajectory.duration, 0.0, _STEPS + 1)
-    for later, earlier in pairwise(times.tolist()):
-        if gap(earlier) >= clearance:
-            low, high = earlier, later
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if gap(middle) >= clearance else (low, middle)
-            return float(low)
-    return 0.0
+def _finger_gap(
+    solution: GraspSolution, hand: Hand, finger: Finger, times: FloatArray, path: FloatArray
+) -> Callable[[FloatArray], FloatArray] | None:
+    """Return a function that gives the gap at a finger's contacts at times of a path; None without such a contact.
+
+    The gap is the smallest distance of the contact points of its links from the planes tangent to the object [m].
+
+    Args:
+        solution: the solution. hand: the hand. finger: one of its fingers.
+        times: of the way-points [s], (N,). path: their postures [rad], (N, J).
+    """
+    moving = _moving_links(hand, finger, path)
+    touching = [c for c in solution.contacts if c.finger == finger.name and not c.passed]
+    touching = [c for c in touching if hand.link_index(c.link) in moving]
+    if not touching:
+        return None
+    links = [hand.link_index(c.link) for c in touching]
+    T_palm_world = solution.hand_pose.inverse()
+    places = np.array([T_palm_world.apply(c.position) for c in touching])
+    normals = np.array([T_palm_world.rotation @ c.normal for c in touching])
+    there = posture(solution.joint_angles, hand, "joint_angles")
+    poses = poses_at(hand, there[None], links)[0]
+    local = np.array([(invert(T) @ np.append(p, 1.0)) for T, p in zip(poses, places, strict=True)])
+
+    def gap(at: FloatArray) -> FloatArray:
+        postures = np.tile(there, (len(at), 1))
+        postures[:, finger.own] = _angles_at(at, times, path[:, finger.own])
+        moved = np.einsum("skij,kj->ski", poses_at(hand, postures, links), local)[..., :3]
+        smallest: FloatArray = ((moved - places) * normals).sum(axis=2).min(axis=1)
+        return smallest
+
+    return gap
 
 
-def _moving_links(hand: Hand, finger: Finger, trajectory: Trajectory) -> tuple[int, ...]:
-    """Return the links of a finger that the trajectory moves."""
-    moved: FloatArray = np.ptp(trajectory.positions, axis=0)
+def _angles_at(at: FloatArray, times: FloatArray, path: FloatArray) -> FloatArray:
+    """Return the angles of a path at some times, shape (S, K)."""
+    return np.array([np.interp(at, times, column) for column in path.T]).T
+
+
+def _latest_clear(gap: Callable[[FloatArray], FloatArray], end: float, clearance: float) -> float:
+    """Return the last time before an end at which the gap is large enough; 0 when it never is."""
+    later, earlier = end, 0.0
+    for _ in range(1 + _PARTINGS):
+        times = np.linspace(later, earlier, _STEPS + 1)
+        clear = np.flatnonzero(gap(times[1:]) >= clearance)
+        if not len(clear):
+            return earlier
+        later, earlier = float(times[clear[0]]), float(times[clear[0] + 1])
+    return earlier
+
+
+def _moving_links(hand: Hand, finger: Finger, path: FloatArray) -> tuple[int, ...]:
+    """Return the links of a finger that a path moves."""
+    moved: FloatArray = np.ptp(path, axis=0)
     first = next((k for k, j in enumerate(finger.joints) if moved[j] > 0.0), None)
     if first is None:
         return ()

@@ -200,11 +200,7 @@ def plan_trajectory(
     check_type(hand, Hand, "hand")
     if obj is not None:
         check_type(obj, GraspObject, "obj")
-    if solution.rounds != 1:
-        raise CommandError(
-            f"rounds: expected a solution of 1 round, got {solution.rounds} (0 is until rest): of joints that were "
-            "gone through more than once no path is kept."
-        )
+    _check_rounds(solution)
     if not SLOWEST <= speed <= 1.0:
         raise CommandError(f"speed: expected a fraction above 0 and up to 1, at least {SLOWEST:g}, got {speed}.")
     for key, value in (("acceleration", acceleration), ("clearance", clearance)):
@@ -231,6 +227,28 @@ def plan_trajectory(
         turns=way.turns,
         open_bodies=() if obj is None else tuple(body.name for body in obj.bodies if not body.closed),
     )
+
+
+def plan_closing(solution: GraspSolution, hand: Hand) -> tuple[FloatArray, FloatArray]:
+    """Return the path on which all fingers close at the same time, each along its closing path; it may not be free.
+
+    Returns:
+        times [s], (N,), and postures [rad], (N, J).
+
+    Raises:
+        CommandError: the solution has more than one round, is of another hand, or lacks a joint.
+    """
+    _check_rounds(solution)
+    limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
+    return WayFinder(solution, hand, None, _pace(limits, 1.0, ACCELERATION)).closing()
+
+
+def _check_rounds(solution: GraspSolution) -> None:
+    if solution.rounds != 1:
+        raise CommandError(
+            f"rounds: expected a solution of 1 round, got {solution.rounds} (0 is until rest): of joints that were "
+            "gone through more than once no path is kept."
+        )
 
 
 def _pace(limits: FloatArray, speed: float, acceleration: float) -> tuple[FloatArray, FloatArray]:

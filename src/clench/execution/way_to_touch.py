@@ -165,6 +165,11 @@ class WayFinder:
         times, positions = _joined([line], goal, [joints])
         return Way(times, positions, None, (), self.overlap(positions))
 
+    def closing(self) -> tuple[FloatArray, FloatArray]:
+        """Return times [s] and postures [rad] of all fingers' closing paths at the same time, without a check."""
+        count = len(self.hand.fingers)
+        return self._timed(FingerPlan((0,) * count, (False,) * count), self.end)
+
     def search(self, goal: FloatArray, *, straight: bool = True, last: _Part | None = None) -> Way:
         """Return a free way to a posture; where none is found the first one tried, with its overlap.
 

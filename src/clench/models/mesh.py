@@ -31,7 +31,9 @@ class TriangleMesh:
         object.__setattr__(self, "triangles", t)
 
     def transformed(self, pose: Pose) -> TriangleMesh:
-        """Return the mesh with its vertices mapped by a pose."""
+        """Return the mesh with its vertices mapped by a pose; the same mesh for the identity."""
+        if pose == Pose.identity():
+            return self
         return TriangleMesh(pose.apply(self.vertices), self.triangles)
 
     @staticmethod
@@ -39,6 +41,8 @@ class TriangleMesh:
         """Return one mesh that holds the triangles of several."""
         if not meshes:
             return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+        if len(meshes) == 1:
+            return meshes[0]
         starts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
         return TriangleMesh(
             np.vstack([m.vertices for m in meshes]),

@@ -5,38 +5,38 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray
 
 if TYPE_CHECKING:
-    from clench.kernels.geometry.bvh import MeshTree
+    from clench.kernels.trees.bvh import MeshTree
 
 
 def part_points(tree: MeshTree) -> FloatArray:
-    """Return a point of every connected part of a mesh [m], shape (N, 3); places that coincide are connected."""
+    """Return a point of every connected part of a mesh [m], shape (N, 3); places that coincide are connected.
+
+    The point of a part is the corner with the smallest x, then y, then z. The points are in the same order.
+    """
+    from clench.kernels.trees.connectivity import connected_parts
+
     if not len(tree.triangles):
         return np.empty((0, 3))
-    used = np.unique(tree.triangles)
-    part = _part_of(tree.triangles, len(tree.vertices))[used]
-    if (part == part[0]).all():
+    used = np.zeros(len(tree.vertices), dtype=bool)
+    used[tree.triangles] = True
+    part = connected_parts(tree.triangles, len(tree.vertices))
+    if len(np.unique(part[used])) == 1:
         # Merging places, which takes longer than all the rest, would join nothing more.
         corners = tree.vertices[used]
-        return corners[np.lexsort(corners.T[::-1])[:1]]
-    places, index = np.unique(tree.vertices, axis=0, return_inverse=True)
-    triangles = index.reshape(-1)[tree.triangles]
-    used = np.unique(triangles)
-    _, first = np.unique(_part_of(triangles, len(places))[used], return_index=True)
-    points: FloatArray = places[used[first]]
+        corners = corners[corners[:, 0] == corners[:, 0].min()]
+        least: FloatArray = corners[np.lexsort(corners.T[::-1])[:1]]
+        return least
+    order = np.lexsort(tree.vertices.T[::-1])
+    sorted_vertices = tree.vertices[order]
+    new = np.concatenate([[True], (sorted_vertices[1:] != sorted_vertices[:-1]).any(axis=1)])
+    place = np.empty(len(order), dtype=np.int32)
+    place[order] = np.cumsum(new) - 1
+    # The smallest number of a part is that of its first place.
+    triangles = place[tree.triangles]
+    part = connected_parts(triangles, int(new.sum()))
+    points: FloatArray = sorted_vertices[new][np.unique(part[triangles[:, 0]])]
     return points
-
-
-def _part_of(triangles: NDArray[np.integer], count: int) -> NDArray[np.int32]:
-    """Return the number of the connected part that each of so many vertices is in."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    a, b = triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel()
-    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-    part: NDArray[np.int32] = connected_components(graph, directed=False)[1]
-    return part

@@ -9,8 +9,8 @@ import numpy as np
 
 from clench.closing.collision.depths import link_mesh_arrays, object_mesh
 from clench.closing.collision.packed_object import PackedObject
-from clench.closing.threads import share_out
 from clench.core.pose import FloatArray
+from clench.core.threads import share_out
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole

@@ -13,11 +13,11 @@ import numpy as np
 
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.motion import open_posture
-from clench.closing.threads import core_count
 from clench.core.defaults import FRICTION
 from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.core.showing.short_repr import described
+from clench.core.threads import core_count
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from clench.core.memory import AT_ONCE
 from clench.kernels.geometry.bodies import Elements, pack_bodies, pack_triangles
-from clench.kernels.geometry.bvh import build_tree
+from clench.kernels.trees.bvh import build_tree
 
 
 @settings(max_examples=60, deadline=None)

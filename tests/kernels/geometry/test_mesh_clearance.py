@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clench.kernels.geometry import mesh_clearance as apart
-from clench.kernels.geometry.bvh import STACK_SIZE, build_tree, feature_owners
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, measure_depths
 from clench.kernels.geometry.penetration import CROSSINGS, penetration
 from clench.kernels.sections import plane_pose as family_pose
+from clench.kernels.trees.bvh import STACK_SIZE, build_tree, feature_owners
 from kernels.kernel_entries import entry
 from kernels.kernel_solids import ball, bounding_volumes, box, gap, star
 

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clench.kernels.geometry import mesh_distance as distance
-from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.geometry.mesh_distance import (
     closest_on_triangle,
     closest_point,
@@ -15,6 +14,7 @@ from clench.kernels.geometry.mesh_distance import (
     signed_distance,
     winding_number,
 )
+from clench.kernels.trees.bvh import build_tree
 from clench.models.mesh import TriangleMesh
 from kernels.kernel_solids import ball, box, hull, moved, star, torus
 

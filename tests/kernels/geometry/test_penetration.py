@@ -6,9 +6,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.geometry.bvh import STACK_SIZE, build_tree, feature_owners
 from clench.kernels.geometry.mesh_distance import signed_distance
 from clench.kernels.geometry.penetration import CROSSINGS, penetration
+from clench.kernels.trees.bvh import STACK_SIZE, build_tree, feature_owners
 from clench.models.mesh import TriangleMesh
 from kernels.kernel_solids import ball, bounding_volumes, box, gap, moved, star
 

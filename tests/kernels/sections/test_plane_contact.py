@@ -16,9 +16,9 @@ from clench.kernels.closing.layout import (
 )
 from clench.kernels.closing.solve_layout import ObjectArrays
 from clench.kernels.geometry.bodies import no_body
-from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.sections.plane_sections import make_sections
 from clench.kernels.toi.full_width import planes_only
+from clench.kernels.trees.bvh import build_tree
 from kernels.plain_closing import close_items
 from oracle.adapter import empty_answer, pack_curve, pack_finger, solve_planar
 from oracle.cases import cases

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.geometry.bvh import build_tree
 from clench.kernels.sections.section import cut, cut_mesh
+from clench.kernels.trees.bvh import build_tree
 from clench.models.mesh import TriangleMesh
 from kernels.kernel_solids import ball, box, hull, moved, star, torus
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.geometry.bvh import build_tree, feature_owners
 from clench.kernels.toi.toi_translation import PAIRS, first_contact
+from clench.kernels.trees.bvh import build_tree, feature_owners
 from clench.models.mesh import TriangleMesh
 from kernels.kernel_solids import bounding_volumes, box, gap, hull, moved, star, torus
 

@@ -7,6 +7,7 @@ import pytest
 
 from clench.core.exceptions import FileError, ObjectError, UnknownNameError
 from clench.core.pose import Pose
+from clench.models.objects import mesh_file
 from clench.models.objects.grasp_object import BodyRole, GraspObject, MeshPart
 from clench.models.objects.mesh_file import read_mesh
 from clench.models.objects.obstacles import obstacle, table
@@ -246,6 +247,15 @@ def test_vertices_of_a_soup_are_merged():
     (body,) = GraspObject.from_meshes([(soup, np.arange(36).reshape(-1, 3))]).bodies
     assert body.closed
     assert len(body.shapes[0].mesh.vertices) == 8
+
+
+@pytest.mark.parametrize("factors", [mesh_file._FACTORS, np.zeros(3, dtype=np.uint64)], ids=["usual", "equal keys"])
+def test_places_are_told_apart_whatever_their_keys(monkeypatch, factors):
+    monkeypatch.setattr(mesh_file, "_FACTORS", factors)
+    rows = np.random.default_rng(0).integers(-2, 3, size=(200, 3))
+    first, kind = mesh_file._distinct_rows(rows)
+    assert first.tolist() == [n for n in range(200) if rows[n].tolist() not in rows[:n].tolist()]
+    np.testing.assert_array_equal(rows[first][kind], rows)
 
 
 @pytest.mark.parametrize(

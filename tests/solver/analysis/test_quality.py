@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ import clench
 from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 from clench.mechanics.grasp.loads import GRAVITY
+from clench.solver.analysis import quality
 
 
 @pytest.fixture(scope="module")
@@ -228,3 +230,40 @@ def test_bad_input_gets_one_sentence(grip) -> None:
             clench.plan_squeeze(solution, hand, ball, **values)
     with pytest.raises(CommandError, match=r"the solution does not fit hand 'patent15'"):
         clench.grasp_quality(solution, clench.Hand.load("patent15"), ball)
+
+
+def test_what_takes_long_is_computed_when_it_is_read(monkeypatch, grip) -> None:
+    hand, ball, solution = grip
+    expected = clench.grasp_quality(solution, hand, ball).to_dict()
+    calls: list[str] = []
+    for name in ("actuation", "volume_l1"):
+        exact = getattr(quality, name)
+        monkeypatch.setattr(
+            quality, name, lambda *given, name=name, exact=exact: [calls.append(name), exact(*given)][1]
+        )
+    found = clench.grasp_quality(solution, hand, ball)
+    assert found.force_closure
+    assert calls == []
+    assert found.to_dict() == expected
+    assert found.to_dict() == pickle.loads(pickle.dumps(found)).to_dict() == expected
+    assert sorted(calls) == ["actuation", "volume_l1"]
+
+
+def test_why_nothing_holds_is_looked_for_when_it_is_read(monkeypatch, grip) -> None:
+    hand, ball, solution = grip
+    weak = replace(hand, joints=tuple(replace(j, effort=1e-3) for j in hand.joints), tendons=None)
+    asked: list[object] = []
+
+    def why_not(held: object, load: object) -> str:
+        asked.append(load)
+        return "Too weak."
+
+    monkeypatch.setattr("clench.mechanics.forces.squeeze.why_not", why_not)
+    monkeypatch.setattr("clench.mechanics.forces.binding.why_not", why_not)
+    plan, effort = clench.plan_squeeze(solution, weak, ball), clench.grasp_quality(solution, weak, ball).effort
+    assert not plan.feasible
+    assert effort.worst_torque is None
+    assert asked == []
+    assert plan.text.endswith("Too weak.")
+    assert effort.reason == "Too weak."
+    assert (plan.found.reason, len(asked)) == ("Too weak.", 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 from dataclasses import fields, replace
 
@@ -253,3 +254,39 @@ def test_vectors_are_turned_with_the_same_bits_alone_and_together() -> None:
     np.testing.assert_allclose(together, np.einsum("cij,cj->ci", rotations(rows), vectors), rtol=0.0, atol=1e-14)
     alone = [turned(rotations(rows[k : k + 1]), vectors[k : k + 1])[0] for k in range(200)]
     np.testing.assert_array_equal(together, alone)
+
+
+@pytest.mark.parametrize("asked", [{"preshape": "open"}, {}, {"preshape": "open", "order": "together"}])
+def test_a_solution_of_a_batch_needs_no_other_solve(monkeypatch, asked):
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
+    poses = clench.approach_poses(hand, obj, 5, 0)
+    batch = clench.solve_batch(hand, obj, poses, clench.GraspCommand(hand_pose=poses[0], **asked))
+    expected = [plain(clench.solve(hand, obj, batch.command(i))) for i in range(5)]
+    some = batch.taken(np.array([3, 1]))
+    copied = pickle.loads(pickle.dumps(batch))
+    monkeypatch.setattr("clench.solver.solve.solve", lambda *args: pytest.fail("solved again"))
+    assert [plain(batch.solution(i)) for i in range(5)] == expected
+    assert plain(batch.solution(-1)) == expected[-1]
+    assert [plain(some.solution(i)) for i in range(2)] == [expected[3], expected[1]]
+    # A copy has no answers of the kernels.
+    monkeypatch.setattr("clench.solver.solve.solve", lambda *args: "solved")
+    assert copied.solution(0) == "solved"
+
+
+def test_a_batch_keeps_answers_up_to_a_limit(monkeypatch):
+    monkeypatch.setattr("clench.solver.batch.kept_answers.MOST_KEPT", 60_000)
+    monkeypatch.setattr("clench.solver.batch.grasp_batch.MOST_KEPT", 60_000)
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
+    poses = clench.approach_poses(hand, obj, 12, 0)
+    asked = clench.GraspCommand(hand_pose=poses[0], preshape="open")
+    batch = clench.solve_batch(hand, obj, poses, asked, chunk=2)
+    expected = [plain(clench.solve(hand, obj, batch.command(i))) for i in (0, 11)]
+    assert [plain(batch.solution(i)) for i in (0, 11)] == expected
+    monkeypatch.setattr("clench.solver.solve.solve", lambda *args: "solved")
+    assert plain(batch.solution(0)) == expected[0]
+    assert batch.solution(11) == "solved"
+
+
+def plain(solution):
+    """Return a solution's document without the times."""
+    return {**solution.to_dict(), "timing": {}}

@@ -203,8 +203,8 @@ def _joined_meshes(hand: Hand, source: CollisionSource) -> LinkMeshArrays:
 
 
 def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:
-    from clench.kernels.geometry.bvh import build_tree
     from clench.kernels.geometry.link_meshes import LinkMeshArrays
+    from clench.kernels.trees.bvh import build_tree
 
     def firsts(counts: list[int]) -> NDArray[np.int64]:
         return np.cumsum([0, *counts]).astype(np.int64)

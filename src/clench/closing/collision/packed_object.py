@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 
 from clench.core.caching.keeping import Keeper, KeptBySize
 from clench.core.exceptions import CommandError
-from clench.core.memory import expect
+from clench.core.memory import expect, in_parts
 from clench.core.pose import FloatArray, Pose
+from clench.core.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.mesh import TriangleMesh
 from clench.models.objects.grasp_object import Body, BodyRole, GraspObject
@@ -24,7 +26,7 @@ from clench.models.tessellation import shape_mesh
 
 if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays, Elements
-    from clench.kernels.geometry.bvh import MeshTree
+    from clench.kernels.trees.bvh import MeshTree
 
 #: Cylinders and ellipsoids are swept as inscribed polyhedra that are off by this fraction of their size at most [-].
 SWEEP_DEVIATION: Final = 2e-5
@@ -128,6 +130,8 @@ def set_object_cache(size: int) -> None:
 
 def role_body(obj: GraspObject, role: BodyRole) -> BodyArrays:
     """Return the bodies of one role as one body, in the object's frame; cached like the results of `pack_object`."""
+    if all(body.role is role for body in obj.bodies):
+        return pack_object(obj).bodies
     source = CollisionSource(obj.collision_source)
     found: BodyArrays = _packed.get((obj.bodies, source, role), partial(_pack_role, obj.bodies, source, role))
     return found
@@ -199,7 +203,7 @@ _packed: Final[KeptBySize[Any]] = KeptBySize(OBJECT_CACHE, packed_size)
 
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     from clench.kernels.geometry.bodies import pack_triangles
-    from clench.kernels.geometry.bvh import feature_owners
+    from clench.kernels.trees.bvh import feature_owners
 
     placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
     expect(sum(shape.mesh.triangles.nbytes for _, shape in placed if shape.mesh is not None))
@@ -207,30 +211,46 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
     tree = _tree(flat)
     full_tree = _tree(flat + curved) if curved else tree
-    joined, element_body = _bodies(placed, source) if curved else (pack_triangles(tree), tree.body)
+    made = _at_once(
+        bodies=lambda: _bodies(placed, source) if curved else (pack_triangles(tree), tree.body),
+        owners=lambda: feature_owners(full_tree),
+        points=lambda: part_points(full_tree),
+        digest=lambda: hash_bodies(bodies, source),
+    )
     graspable = [n for n, body in enumerate(bodies) if body.role is BodyRole.GRASPABLE]
-    held = _corners(full_tree, np.isin(full_tree.body, graspable))
+    everything = _corners(full_tree, slice(None))
+    held = everything if len(graspable) == len(bodies) else _corners(full_tree, np.isin(full_tree.body, graspable))
     center = _middle(held)
-    away = np.linalg.norm(_corners(full_tree, slice(None)) - center, axis=1)
     # With `engine` every mesh became a convex hull, which is always closed.
     closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
     return PackedObject(
         tree=tree,
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
         full_tree=full_tree,
-        full_owners=feature_owners(full_tree),
-        bodies=joined,
-        element_body=element_body,
+        full_owners=made["owners"],
+        bodies=made["bodies"][0],
+        element_body=made["bodies"][1],
         closed=all(closed),
         body_closed=closed,
         body_names=tuple(body.name for body in bodies),
         body_roles=tuple(body.role for body in bodies),
         center=center,
-        radius=float(away.max(initial=0.0)),
-        size=float(np.linalg.norm(held - center, axis=1).max(initial=0.0)),
-        points=part_points(full_tree),
-        geometry_hash=hash_bodies(bodies, source),
+        radius=_reach(everything, center),
+        size=_reach(held, center),
+        points=made["points"],
+        geometry_hash=made["digest"],
     )
+
+
+def _at_once(**makers: Callable[[], Any]) -> dict[str, Any]:
+    """Return the values of functions by name; threads share the functions."""
+    made = dict[str, Any]()
+
+    def make(name: str) -> None:
+        made[name] = makers[name]()
+
+    share_out(make, makers, core_count())
+    return made
 
 
 def _bodies(placed: list[tuple[int, Shape]], source: CollisionSource) -> tuple[BodyArrays, NDArray[np.int32]]:
@@ -251,7 +271,7 @@ def _corners(tree: MeshTree, triangles: NDArray[np.bool_] | slice) -> FloatArray
 
 
 def _tree(parts: list[tuple[int, TriangleMesh]]) -> MeshTree:
-    from clench.kernels.geometry.bvh import build_tree
+    from clench.kernels.trees.bvh import build_tree
 
     mesh = TriangleMesh.joined([part for _, part in parts])
     numbers = np.array([n for n, _ in parts], dtype=np.int32)
@@ -278,6 +298,13 @@ def _middle(points: FloatArray) -> FloatArray:
     return center
 
 
+def _reach(points: FloatArray, center: FloatArray) -> float:
+    """Return how far points are from a centre at most [m]."""
+    return max(
+        (float(np.linalg.norm(points[some] - center, axis=1).max()) for some in in_parts(len(points))), default=0.0
+    )
+
+
 def hash_bodies(bodies: tuple[Body, ...], source: CollisionSource) -> str:
     """Return a SHA-256 over an object's bodies for one collision source, hexadecimal; its pose plays no part."""
     digest = hashlib.sha256()
@@ -294,5 +321,5 @@ def _hash_shape(digest: hashlib._Hash, shape: Shape) -> None:
     digest.update(shape.pose.wxyz_xyz.tobytes())
     if shape.mesh is not None:
         digest.update(f"{shape.mesh.vertices.shape} {shape.mesh.triangles.shape}".encode())
-        digest.update(shape.mesh.vertices.tobytes())
-        digest.update(shape.mesh.triangles.tobytes())
+        digest.update(np.ascontiguousarray(shape.mesh.vertices).data)
+        digest.update(np.ascontiguousarray(shape.mesh.triangles).data)

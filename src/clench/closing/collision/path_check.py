@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import hand_frames
 from clench.core.pose import FloatArray
+from clench.core.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays
     from clench.kernels.toi.pair_motion import PathProblem
 
+#: Pairs of bodies that a thread checks at once.
+_PAIRS: Final = 64
 #: Way-points whose joints are this close to a straight line lie on it [rad].
 STRAIGHT: Final = 1e-12
 
@@ -123,12 +126,11 @@ def _first(
     hand: Hand, lines: _Lines, source: CollisionSource, number: int | None, around: PlacedObject | None
 ) -> PathOverlap | None:
     """Return the first overlap with one body of the object; with the first one, or without any, of the links, too."""
-    from clench.kernels.toi.path_overlap import OVERLAP, first_overlap
+    from clench.kernels.toi.path_overlap import OVERLAP
 
     path, points, kept = lines
     problem = _problem(hand, points, source, number, around)
-    out = np.zeros(2)
-    found = first_overlap(problem, out)
+    found, out = _first_pair(problem)
     if found < 0:
         return None
     m, r = problem.pairs[found].tolist()
@@ -146,6 +148,25 @@ def _first(
     assert number is not None
     body, position = _where(hand, q, m, source, around.bodies[number], around.T_palm_object)
     return PathOverlap(place, name, body, True, float(out[1]), position, from_start)
+
+
+def _first_pair(problem: PathProblem) -> tuple[int, FloatArray]:
+    """Return the pair that overlaps first, -1 when none does, and its place and depth; threads share the pairs."""
+    from clench.kernels.toi.path_overlap import first_overlap
+
+    count = len(problem.pairs)
+    parts = [slice(start, start + _PAIRS) for start in range(0, count, _PAIRS)]
+    found, out = np.full(len(parts), -1), np.full((len(parts), 2), np.inf)
+
+    def look(n: int) -> None:
+        some = parts[n]
+        found[n] = first_overlap(problem._replace(pairs=problem.pairs[some], allowed=problem.allowed[some]), out[n])
+
+    share_out(look, range(len(parts)), core_count())
+    if not (found >= 0).any():
+        return -1, np.zeros(2)
+    n = int(np.argmin(np.where(found >= 0, out[:, 0], np.inf)))
+    return int(found[n]) + parts[n].start, out[n]
 
 
 def _where(
@@ -193,9 +214,9 @@ def _problem(
     hand: Hand, path: FloatArray, source: CollisionSource, number: int | None, around: PlacedObject | None
 ) -> PathProblem:
     from clench.kernels.geometry.bodies import no_body
-    from clench.kernels.geometry.bvh import build_tree
     from clench.kernels.geometry.link_meshes import ObjectMesh
     from clench.kernels.toi.pair_motion import PathProblem
+    from clench.kernels.trees.bvh import build_tree
 
     links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
     tables = _tables(hand, source)

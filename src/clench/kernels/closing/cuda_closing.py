@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numba.cuda
 import numpy as np
 
-from clench.kernels.geometry.bvh import MeshTree
 from clench.kernels.sections.advance import make_work
 from clench.kernels.sections.plane_sections import cut_first_families, needs_planes
 from clench.kernels.sections.section_overlap import look_for_overlaps
 from clench.kernels.toi.full_width import ExactArrays
 from clench.kernels.toi.toi_work import SweepWork, make_sweep_work
+from clench.kernels.trees.bvh import MeshTree
 
 from .bundles import answer_at
 from .close_item import close_item

@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.bvh import MeshTree
 from clench.kernels.geometry.link_frames import FrameArrays
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh
 from clench.kernels.meetings.meeting_layout import FingerLinks, Meetings, MeetingWork
 from clench.kernels.toi.full_width import ExactArrays
 from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.trees.bvh import MeshTree
 
 from .contact_reading import SurfaceArrays, TouchArrays
 from .layout import ClosingArrays, Floats, HandArrays, Ints, ItemArrays, RoundArrays, SectionArrays, Work

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from clench.core.memory import in_parts
 from clench.kernels.hulls.enclosing_hulls import HullArrays, pack_hulls
-
-from .bvh import MeshTree, build_tree
-from .obb import SLAB, node_slabs
+from clench.kernels.trees.bvh import MeshTree, build_tree
+from clench.kernels.trees.node_boxes import SLAB, element_balls, local_elements, node_slabs, node_spans
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -34,7 +33,7 @@ class BodyArrays(NamedTuple):
         ball: centre and radius of the ball around each element, its own radius included [m], (T, 4).
         source: number of each element in the caller's list, (T,).
         node: centre and radius of the ball around each node [m], (N, 4).
-        slab: box of any direction around each node, see `clench.kernels.geometry.obb` [m], (N, 13).
+        slab: box of any direction around each node, see `clench.kernels.trees.obb` [m], (N, 13).
         first: first element of a leaf, (N,). count: its elements, 0 for inner nodes, (N,).
         right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
         box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
@@ -152,14 +151,9 @@ def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
     Args:
         tree: of its elements. radius: of each of them, in the tree's order [m], (T,).
     """
-    corners, ball = np.empty(len(radius), dtype=np.int32), np.empty((len(radius), 4))
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for some in in_parts(len(radius)):
-        points, grown = tree.vertices[tree.triangles[some]], radius[some]
-        corners[some], ball[some] = _corners(points), _balls(points, grown)
-        low = np.minimum(low, (points - grown[:, None, None]).min(axis=(0, 1)))
-        high = np.maximum(high, (points + grown[:, None, None]).max(axis=(0, 1)))
-    begin, end, grown = _spans(tree, radius)
+    local = local_elements(tree.vertices, tree.triangles, radius)
+    spans = node_spans(tree.first, tree.count, tree.right, radius)
+    corners, ball, (low, high) = element_balls(local)
     return BodyArrays(
         vertices=tree.vertices,
         elements=tree.triangles,
@@ -167,8 +161,8 @@ def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
         radius=radius,
         ball=ball,
         source=tree.original,
-        node=_node_balls(tree, grown),
-        slab=node_slabs(tree, begin, end, grown),
+        node=_node_balls(tree, spans.grown),
+        slab=node_slabs(local, spans, tree.right),
         first=tree.first,
         count=tree.count,
         right=tree.right,
@@ -178,35 +172,11 @@ def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
     )
 
 
-def _corners(points: Floats) -> Ints:
-    """Return how many of the first vertices of each element differ; repeated ones stand last."""
-    same_last = (points[:, 1] == points[:, 2]).all(axis=1)
-    same_all = same_last & (points[:, 0] == points[:, 1]).all(axis=1)
-    return np.where(same_all, 1, np.where(same_last, 2, 3)).astype(np.int32)
-
-
-def _balls(points: Floats, radius: Floats) -> Floats:
-    """Return the ball around each element: its middle is that of the longest side, unless a corner is outside."""
-    sides = np.linalg.norm(points - np.roll(points, -1, axis=1), axis=2)
-    k = np.argmax(sides, axis=1)
-    each = np.arange(len(points))
-    center = 0.5 * (points[each, k] + points[each, (k + 1) % 3])
-    reach = np.linalg.norm(points - center[:, None], axis=2).max(axis=1)
-    return np.column_stack([center, reach * (1.0 + 1e-12) + radius])
-
-
-def _spans(tree: MeshTree, radius: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Return the first element of each node, the one after its last, and the largest radius of them."""
-    # The elements of a node are those from its first leaf to its last one.
-    leaves = np.flatnonzero(tree.count)
-    begin = tree.first[leaves[np.searchsorted(leaves, np.arange(len(tree.low)))]].astype(np.int64)
-    last = leaves[np.searchsorted(leaves, tree.skip) - 1]
-    end = (tree.first[last] + tree.count[last]).astype(np.int64)
-    grown = np.maximum.reduceat(np.append(radius, 0.0), np.column_stack([begin, end]).ravel())[::2]
-    return begin, end, grown
-
-
 def _node_balls(tree: MeshTree, grown: Floats) -> Floats:
     """Return the ball around the box of each node, grown by the largest radius of its elements."""
-    reach = 0.5 * np.linalg.norm(tree.high - tree.low, axis=1) * (1.0 + 1e-12) + grown
-    return np.column_stack([0.5 * (tree.low + tree.high), reach])
+    ball = np.empty((len(tree.low), 4))
+    for some in in_parts(len(ball)):
+        low, high = tree.low[some], tree.high[some]
+        ball[some, :3] = 0.5 * (low + high)
+        ball[some, 3] = 0.5 * np.linalg.norm(high - low, axis=1) * (1.0 + 1e-12) + grown[some]
+    return ball

@@ -16,9 +16,9 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import move_core, plane_offset
 from clench.kernels.toi.toi_bounds import STEPS
 from clench.kernels.toi.toi_pairs import step_to_plane
+from clench.kernels.trees.obb import RECTANGLE
 
 from .mesh_distance import closest_on_triangle
-from .obb import RECTANGLE
 from .vectors import Vector, cross, dot, scaled
 
 #: How often the closest points of a core and a box are looked for, each from the other one.
@@ -36,7 +36,7 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
     Its axes are made square to each other in double precision, and as long as the edges of the node's box reach.
 
     Args:
-        slab: see `clench.kernels.geometry.obb`.
+        slab: see `clench.kernels.trees.obb`.
         box: written with the middle, three unit axes, and half the sizes along them [m], (5, 3).
     """
     u = np.float64(slab[3]), np.float64(slab[4]), np.float64(slab[5])

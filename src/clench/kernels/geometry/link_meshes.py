@@ -11,8 +11,8 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.closing.layout import Ints as Numbers
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import back, compose_inverse, put_point
+from clench.kernels.trees.bvh import STACK_SIZE, Ints, MeshTree
 
-from .bvh import STACK_SIZE, Ints, MeshTree
 from .mesh_clearance import PAIRS, boxes_apart, surfaces_apart
 from .mesh_distance import is_inside
 from .penetration import CROSSINGS, penetration

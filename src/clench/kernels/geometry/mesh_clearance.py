@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from clench.kernels.runtime.compiling import kernel
-
-from .bvh import STACK_SIZE, Floats, Ints, MeshTree
+from clench.kernels.trees.bvh import STACK_SIZE, Floats, Ints, MeshTree
 
 #: Pairs of nodes that wait at most: every level of either tree adds one.
 PAIRS = 2 * STACK_SIZE

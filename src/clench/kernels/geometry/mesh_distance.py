@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from clench.kernels.runtime.compiling import entry_kernel, kernel
-
-from .bvh import STACK_SIZE, Floats, Ints, MeshTree
+from clench.kernels.trees.bvh import STACK_SIZE, Floats, Ints, MeshTree
 
 Point = tuple[float, float, float]
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.trees.bvh import Floats, Ints, MeshTree
 
-from .bvh import Floats, Ints, MeshTree
 from .mesh_distance import Point, closest_within, corners, is_inside
 
 Masks = NDArray[np.uint8]

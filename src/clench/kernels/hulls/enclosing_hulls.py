@@ -133,7 +133,8 @@ def _cones(side: int) -> tuple[Floats, Floats]:
                 d[..., axis], d[..., (axis + 1) % 3], d[..., (axis + 2) % 3] = sign, a, b
                 out.append(d.reshape(-1, 3))
         found: Floats = np.concatenate(out)
-        return found / np.linalg.norm(found, axis=1)[:, None]
+        unit: Floats = found / np.linalg.norm(found, axis=1)[:, None]
+        return unit
 
     center = directions((0.0, 0.0))
     ends = [directions((x, y)) for x in (-half, half) for y in (-half, half)]

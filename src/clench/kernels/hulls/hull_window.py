@@ -13,10 +13,10 @@ from typing import Any
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.obb import slab_top
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.trees.obb import slab_top
 
 from .enclosing_hulls import HullArrays
 from .gjk import lowest_of

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from clench.kernels.closing.layout import Floats, Ints
-from clench.kernels.geometry.bvh import Ints as Stack
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, mesh_of
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import compose
 from clench.kernels.toi.toi_translation import PAIRS, first_contact
+from clench.kernels.trees.bvh import Ints as Stack
 
 
 class Placed(NamedTuple):

@@ -7,9 +7,9 @@ import math
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
-from clench.kernels.geometry.obb import slab_top
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.trees.obb import slab_top
 
 #: Directions that are tried at most.
 TRIES = 16

@@ -42,7 +42,6 @@ from clench.kernels.closing.solve_layout import (
 )
 from clench.kernels.closing.solve_poses import solve_poses
 from clench.kernels.closing.verdict import judge_pose
-from clench.kernels.geometry.bvh import MeshTree, build_tree
 from clench.kernels.geometry.link_frames import FrameArrays, place_links, relate_poses
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, measure_depths
 from clench.kernels.geometry.smallest_gap import smallest_gap
@@ -53,6 +52,7 @@ from clench.kernels.sections.plane_sections import cut_first_families
 from clench.kernels.toi.full_width import planes_only
 from clench.kernels.toi.toi_links import sweep_stage
 from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.trees.bvh import MeshTree, build_tree
 
 from .by_reference import handed, kept
 from .compiling import is_kept

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from clench.kernels.closing.layout import RUN, Floats, HandArrays, ItemArrays, RoundArrays, SectionArrays
-from clench.kernels.geometry.bvh import MeshTree
 from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.trees.bvh import MeshTree
 
 from .plane_pose import compose, compose_inverse
 from .round_section import CAPSULE, CYLINDER, ELLIPSOID, cut_capsule, cut_cylinder, cut_ellipsoid, cut_sphere

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.kernels.geometry.bvh import Floats, Ints, MeshTree, build_tree
 from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.trees.bvh import Floats, Ints, MeshTree, build_tree
 
 Row = tuple[float, float, float, float]
 Point = tuple[float, float, float]

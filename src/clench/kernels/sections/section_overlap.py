@@ -6,9 +6,9 @@ import math
 
 from clench.core.tolerances import TOUCH_FRACTION
 from clench.kernels.closing.layout import RUN, Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
-from clench.kernels.geometry.bvh import MeshTree
 from clench.kernels.geometry.mesh_distance import Point, is_inside
 from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.trees.bvh import MeshTree
 
 from .advance import place_joints, put_outline
 from .outline_gap import core_distance, point_segment, round_distance, side_ends

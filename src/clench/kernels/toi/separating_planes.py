@@ -7,8 +7,8 @@ import math
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
-from clench.kernels.geometry.obb import slab_top
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.trees.obb import slab_top
 
 from .core_motion import plane_offset
 from .toi_bounds import stays_above

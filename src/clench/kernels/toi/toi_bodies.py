@@ -7,8 +7,8 @@ import math
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.box_walk import put_box, walk_rectangle, walk_to_box
-from clench.kernels.geometry.obb import RECTANGLE, put_slab_face
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.trees.obb import RECTANGLE, put_slab_face
 
 from .pair_queue import take_first, take_in
 from .separating_planes import keep_plane, lay_plane, lies_within, passes_beside, stays_beyond

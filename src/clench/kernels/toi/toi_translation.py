@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clench.kernels.geometry.bvh import STACK_SIZE, Floats, Ints, MeshTree
 from clench.kernels.geometry.mesh_distance import Point, corners
 from clench.kernels.geometry.penetration import moved
 from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.trees.bvh import STACK_SIZE, Floats, Ints, MeshTree
 
 Masks = NDArray[np.uint8]
 Triple = tuple[Point, Point, Point]

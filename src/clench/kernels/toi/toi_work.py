@@ -11,9 +11,9 @@ from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import crosses, separation
 from clench.kernels.geometry.crossing import only_touch
-from clench.kernels.geometry.obb import put_slab_core, slab_misses, slab_slack
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
+from clench.kernels.trees.obb import put_slab_core, slab_misses, slab_slack
 
 from .core_motion import plane_gap
 from .spatial_motion import SPATIAL

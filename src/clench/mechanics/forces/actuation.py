@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.core.caching.deferring import LateFields, once
 from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
 from clench.core.showing.short_repr import short_repr
@@ -65,14 +66,14 @@ class HoldingForces:
 
 
 @dataclass(frozen=True)
-class Actuation:
+class Actuation(LateFields):
     """The effort of holding a set of loads.
 
     Args:
         worst_torque: largest torque of a joint over all loads [Nm]; None when some load cannot be held.
         worst_tension: largest tension of a tendon over all loads [N]; None also without tendons.
         plans: one per load, None if it cannot be held.
-        reason: which limit binds at the first load that cannot be held, else "".
+        reason: which limit binds at the first load that cannot be held, else ""; looked for when it is first read.
     """
 
     worst_torque: float | None
@@ -99,7 +100,8 @@ def actuation(held: HeldObject, loads: ArrayLike, least: Effort | str = Effort.T
     found = [plan for plan in plans if plan is not None]
     if len(found) < len(plans):
         first = next(load for load, plan in zip(rows, plans, strict=True) if plan is None)
-        return Actuation(None, None, plans, why_not(held, first))
+        reason = once(lambda: why_not(held, first))
+        return Actuation.with_late(lambda _: reason(), worst_torque=None, worst_tension=None, plans=plans)
     tensions = [plan.worst_tension for plan in found if plan.worst_tension is not None]
     return Actuation(max(p.worst_torque for p in found), max(tensions, default=None), plans, "")
 

@@ -7,13 +7,17 @@ programs or hulls are needed: for epsilon, volume and the fast bound.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from clench.core.pose import FloatArray
 from clench.mechanics.grasp.contacts import ContactSet
 from clench.mechanics.grasp.tendon_tensions import TendonDrive
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 #: Accuracy asked of the solver, relative and absolute [-].
 _ACCURACY = 1e-10
@@ -38,7 +42,7 @@ class ConeProgram:
     cost: FloatArray
     _equal: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     _most: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
-    _cones: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    _cones: list[tuple[FloatArray, FloatArray, int]] = field(default_factory=list)
 
     def equal(self, rows: FloatArray, values: FloatArray) -> None:
         """Demand `rows x = values`."""
@@ -50,29 +54,29 @@ class ConeProgram:
         if finite.any():
             self._most.append((rows[finite], values[finite]))
 
-    def inside_cone(self, rows: FloatArray, values: FloatArray) -> None:
-        """Demand that the first entry of `rows x + values` is at least the norm of the others."""
-        self._cones.append((rows, values))
+    def inside_cones(self, rows: FloatArray, values: FloatArray, width: int) -> None:
+        """Demand, of every `width` entries of `rows x + values`, that the first is at least the norm of the others."""
+        self._cones.append((rows, values, width))
 
     def solve(self) -> FloatArray | None:
         """Return the best x, or None where nothing satisfies the demands."""
         import clarabel
-        from scipy import sparse
 
         blocks = [
             *((rows, values) for rows, values in self._equal),
             *((rows, values) for rows, values in self._most),
-            *((-rows, values) for rows, values in self._cones),
+            *((-rows, values) for rows, values, _ in self._cones),
         ]
         cones: list[Any] = []
         if self._equal:
             cones.append(clarabel.ZeroConeT(sum(len(v) for _, v in self._equal)))
         if self._most:
             cones.append(clarabel.NonnegativeConeT(sum(len(v) for _, v in self._most)))
-        cones += [clarabel.SecondOrderConeT(len(v)) for _, v in self._cones]
-        A = sparse.csc_matrix(np.vstack([rows for rows, _ in blocks]))
+        for _, values, width in self._cones:
+            cones += [clarabel.SecondOrderConeT(width)] * (len(values) // width)
+        A = _columns(np.vstack([rows for rows, _ in blocks]))
         b = np.concatenate([values for _, values in blocks])
-        P = sparse.csc_matrix(np.eye(self.size) * _SMALLEST)
+        P = _small_squares(self.size)
         status = clarabel.SolverStatus
         for step in _STEPS:
             answer = clarabel.DefaultSolver(P, self.cost, A, b, cones, _settings(clarabel, step)).solve()
@@ -100,10 +104,9 @@ def demand_cones(
     scale[:, 2] = 1.0 - _INSIDE
     order = [2, 0, 1, 3][:width]
     constant = np.zeros(len(contacts) * width) if extra is None else extra
-    for c in range(len(contacts)):
-        own = slice(c * width, (c + 1) * width)
-        rows = (forces[own] * scale[c][:, None])[order]
-        program.inside_cone(rows, (constant[own] * scale[c])[order])
+    rows = (forces.reshape(len(contacts), width, -1) * scale[:, :, None])[:, order]
+    values = (constant.reshape(len(contacts), width) * scale)[:, order]
+    program.inside_cones(rows.reshape(-1, forces.shape[1]), values.reshape(-1), width)
 
 
 def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, extra: FloatArray | None = None) -> None:
@@ -131,9 +134,24 @@ def demand_tensions(program: ConeProgram, torques: FloatArray, drive: TendonDriv
 
 def balanced(G: FloatArray, forces: FloatArray, wrench: FloatArray) -> FloatArray:
     """Return the nearest forces with `G f = wrench` to rounding."""
+    answer = np.linalg.pinv(G)
     for _ in range(2):
-        forces = forces + np.linalg.pinv(G) @ (wrench - G @ forces)
+        forces = forces + answer @ (wrench - G @ forces)
     return forces
+
+
+def _columns(rows: FloatArray) -> csc_matrix:
+    """Return a matrix as sparse columns; SciPy's own way over coordinates takes twice as long."""
+    from scipy.sparse import csc_matrix
+
+    column, row = np.nonzero(rows.T)
+    ends = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=rows.shape[1]))])
+    return csc_matrix((rows[row, column], row.astype(np.int32), ends.astype(np.int32)), shape=rows.shape)
+
+
+@lru_cache(maxsize=32)
+def _small_squares(size: int) -> csc_matrix:
+    return _columns(np.eye(size) * _SMALLEST)
 
 
 def _settings(clarabel: Any, step: float) -> Any:

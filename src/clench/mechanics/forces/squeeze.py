@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.core.caching.deferring import LateFields, once
 from clench.core.defaults import LOAD_RESERVE
 from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
@@ -21,7 +22,7 @@ from clench.core.showing.short_repr import short_repr
 from clench.mechanics.grasp.held import HeldObject
 from clench.mechanics.grasp.loads import check_loads
 
-from .actuation import Effort, HoldingForces, HoldingProgram, solve_first
+from .actuation import Effort, HoldingForces, HoldingProgram, least_effort, solve_first
 from .binding import why_not
 from .joint_friction import loss_of_torques, pressed_harder
 
@@ -34,14 +35,14 @@ _TOTAL_FORCE: Final = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class SqueezeForces:
+class SqueezeForces(LateFields):
     """A squeeze.
 
     Args:
         plan: forces and torques that balance the nominal load; None when there are none.
         margin: the disturbances are resisted up to this multiple [-].
         unresisted: rows of the disturbance set that no contact forces can balance; the margin leaves them out.
-        reason: the binding limit if there is no plan, else "".
+        reason: the binding limit if there is no plan, else ""; looked for when it is first read.
         reserve: the plan counts on this part of the friction [-].
         loss: largest share of a finger's torques that joint friction takes [-].
     """
@@ -122,9 +123,14 @@ def squeeze_forces(
     ends = np.zeros((1, len(change))) if spread is None else np.outer([1.0, -1.0], K @ check_loads(spread)[0])
     task = SqueezeTask(held, nominal, unit, ends, change.T[~lost], enough, most_force)
     careful = _with_friction(task, reserve)
-    found, counted = _squeeze_of(task, careful, needed)
+    # Most grasps that hold nothing do not even hold the load itself, which a small program tells.
+    held_at_all = not nominal.any() or least_effort(held, nominal) is not None
+    found, counted = _squeeze_of(task, careful, needed) if held_at_all else (None, task)
     if found is None:
-        return SqueezeForces(None, 0.0, unresisted, why_not(held, nominal))
+        reason = once(lambda: why_not(held, nominal))
+        return SqueezeForces.with_late(
+            lambda _: reason(), plan=None, margin=0.0, unresisted=unresisted, reserve=1.0, loss=0.0
+        )
     plan = pressed_harder(
         counted.held, found[0], found[0].forces.reshape(-1) + K @ nominal, counted.cases(found[1]), most_force
     )
@@ -144,17 +150,17 @@ def _squeeze_of(
     task: SqueezeTask, careful: SqueezeTask, needed: float
 ) -> tuple[tuple[HoldingForces, float] | None, SqueezeTask]:
     """Return forces with their margin, and the task that they fulfil: the careful task if it is feasible."""
+    # Most squeezes reach all the margin that is asked for, or nearly.
+    found = _least_torque(careful, careful.enough * (1.0 if needed else 1.0 - _GIVEN_UP))
+    if found is not None:
+        return found, careful
     if needed == 0.0:
         for each in (careful, task):
             best = _largest_margin(each)
             if best is not None:
                 return _gentle(each, best), each
         return None, task
-    # Most squeezes reach all the margin that is asked for. For the others, only loads that full friction can hold are
-    # feasible.
-    found = _least_torque(careful, careful.enough)
-    if found is not None:
-        return found, careful
+    # For the others, only loads that full friction can hold are feasible.
     best = _largest_margin(task)
     if best is None:
         return None, task

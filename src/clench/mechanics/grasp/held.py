@@ -55,11 +55,18 @@ class HeldObject:
 
     def with_friction(self, friction: FloatArray) -> HeldObject:
         """Return the grasp with other friction, shape (C,)."""
-        return replace(self, contacts=replace(self.contacts, friction=friction))
+        contacts = replace(self.contacts, friction=friction)
+        # Frames and grasp map know nothing of friction.
+        contacts.__dict__["frames"] = self.contacts.frames
+        made = replace(self, contacts=contacts)
+        made.__dict__["grasp_map"] = self.grasp_map
+        return made
 
     def without_limits(self) -> HeldObject:
         """Return the grasp with joints of unlimited torque, and no tendons."""
-        return replace(self, dofs=replace(self.dofs, limits=np.full_like(self.dofs.limits, np.inf)), drive=None)
+        made = replace(self, dofs=replace(self.dofs, limits=np.full_like(self.dofs.limits, np.inf)), drive=None)
+        made.__dict__["grasp_map"] = self.grasp_map
+        return made
 
 
 def held_by_hand(hand: Hand, q: FloatArray, contacts: ContactSet, center: ArrayLike, length: float) -> HeldObject:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -40,15 +41,17 @@ def joint_arrays(hand: Hand) -> JointArrays:
     )
 
 
-def poses_at(hand: Hand, postures: FloatArray) -> FloatArray:
-    """Return `T_palm_link` of every link at several postures, shape (S, L, 4, 4).
+def poses_at(hand: Hand, postures: FloatArray, links: Sequence[int] | None = None) -> FloatArray:
+    """Return `T_palm_link` of links at several postures, shape (S, L, 4, 4).
 
     Args:
         hand: the hand. postures: angles of all its joints [rad], shape (S, J).
+        links: which links, in this order; None: all.
     """
     motions = _joint_motions(hand.joint_arrays, postures)
     poses = np.empty((len(postures), len(hand.links), 4, 4))
-    for i, link in enumerate(hand.links):
+    for i in range(len(hand.links)) if links is None else _with_parents(hand, links):
+        link = hand.links[i]
         local = link.T_parent_link if link.joint < 0 else link.T_parent_link @ motions[:, link.joint]
         poses[:, i] = poses[:, link.parent] @ local if link.parent >= 0 else local
     palm = poses[:, hand.palm]
@@ -56,8 +59,18 @@ def poses_at(hand: Hand, postures: FloatArray) -> FloatArray:
     back[:, 0, :3, :3] = palm[:, :3, :3].transpose(0, 2, 1)
     back[:, 0, :3, 3] = -np.einsum("sji,sj->si", palm[:, :3, :3], palm[:, :3, 3])
     back[:, 0, 3, 3] = 1.0
-    placed: FloatArray = back @ poses
+    placed: FloatArray = back @ (poses if links is None else poses[:, list(links)])
     return placed
+
+
+def _with_parents(hand: Hand, links: Sequence[int]) -> list[int]:
+    """Return links, the palm, and all links between them and the root, parents first."""
+    found = set[int]()
+    for i in (*links, hand.palm):
+        while i >= 0 and i not in found:
+            found.add(i)
+            i = hand.links[i].parent
+    return sorted(found)
 
 
 def base_pose(hand: Hand, q: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from clench.models.tessellation import shape_mesh
 from .hand import Hand
 
 if TYPE_CHECKING:
-    from clench.kernels.geometry.bvh import MeshTree
+    from clench.kernels.trees.bvh import MeshTree
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def _meshes(hand: Hand, source: CollisionSource) -> tuple[LinkMesh, ...]:
 
 
 def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:
-    from clench.kernels.geometry.bvh import build_tree, feature_owners
+    from clench.kernels.trees.bvh import build_tree, feature_owners
 
     meshes = [shape_mesh(shape, source) for shape in shapes]
     mesh = TriangleMesh.joined(meshes)
@@ -85,8 +85,8 @@ def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
     Args:
         a, b: the links. poses: of all links in the palm frame, shape (L, 4, 4).
     """
-    from clench.kernels.geometry.bvh import STACK_SIZE
     from clench.kernels.geometry.penetration import CROSSINGS, penetration
+    from clench.kernels.trees.bvh import STACK_SIZE
 
     centers = [poses[m.link][:3, :3] @ m.center + poses[m.link][:3, 3] for m in (a, b)]
     if np.linalg.norm(centers[0] - centers[1]) > a.radius + b.radius:

@@ -32,6 +32,9 @@ def edge_defects(faces: IntArray) -> EdgeDefects:
     sides = _sides(compact(faces)[1])
     sides.sort()
     edges = sides >> 1
+    if len(sides) % 2 == 0 and (sides[1::2] - sides[::2] == 1).all() and (edges[2::2] != edges[1:-1:2]).all():
+        # Every edge has two uses, upwards and downwards: the rule.
+        return EdgeDefects(0, 0, 0)
     first = np.flatnonzero(np.concatenate([[True], edges[1:] != edges[:-1]]))
     uses = np.diff(first, append=len(sides))
     pairs = first[uses == 2]
@@ -76,9 +79,10 @@ def parted(faces: IntArray, vertices: int) -> IntArray:
 
 def components(faces: IntArray, vertices: int) -> IntArray:
     """Return the number of the part each triangle belongs to, shape (T,); a part hangs together by its vertices."""
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    label = _connected(pairs, vertices)[faces[:, 0]]
-    return np.unique(label, return_inverse=True)[1].astype(np.int64)
+    number = _connected(faces, vertices)[faces[:, 0]]
+    named = np.zeros(vertices, dtype=bool)
+    named[number] = True
+    return np.cumsum(named)[number] - 1
 
 
 def winding_number(point: FloatArray, points: FloatArray, faces: IntArray) -> float:
@@ -96,7 +100,12 @@ def _sides(faces: IntArray) -> IntArray:
     size, keys = int(faces.max()) + 1, []
     for i in range(3):
         start, end = faces[:, i], faces[:, (i + 1) % 3]
-        keys.append(2 * (np.minimum(start, end) * size + np.maximum(start, end)) + (start < end))
+        key = np.minimum(start, end)
+        key *= size
+        key += np.maximum(start, end)
+        key <<= 1
+        key += start < end
+        keys.append(key)
     return np.concatenate(keys)
 
 
@@ -106,10 +115,10 @@ def _edges(faces: IntArray) -> tuple[IntArray, IntArray]:
     return edge.ravel(), uses
 
 
-def _connected(pairs: IntArray, count: int) -> IntArray:
-    """Return the component of each of `count` nodes, joined by pairs, shape (P, 2)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+def _connected(groups: IntArray, count: int) -> IntArray:
+    """Return the component of each of `count` nodes, which rows of a table connect; numbered by their first nodes."""
+    from clench.kernels.trees.connectivity import connected_parts
 
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    first = connected_parts(groups, count)
+    number: IntArray = np.cumsum(first == np.arange(count)) - 1
+    return number[first]

@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from clench.core.caching.deferring import LateFields, once
 from clench.core.defaults import MASS
 from clench.core.showing.short_repr import described
 from clench.mechanics.epsilon.epsilon_quality import EDGES, epsilon, epsilon_within_torques
@@ -22,8 +23,10 @@ from .holding import HeldSolution, hold
 
 
 @dataclass(frozen=True, eq=False)
-class GraspQuality:
+class GraspQuality(LateFields):
     """Numbers that say how good a grasp is, with the conventions that a comparison needs.
+
+    Volume and effort take much longer than the rest. They are computed when they are first read.
 
     Args:
         grasp: the contacts, friction, centre of mass and length scale that were used.
@@ -125,14 +128,16 @@ def grasp_quality(
     )
     held = grasp.held
     ball = epsilon(held, norm, edges)
-    least = Effort.TORQUE if held.drive is None else Effort.TENSION
-    return GraspQuality(
+    late = {
+        "volume": once(lambda: volume_l1(held.edge_wrenches(edges)) if len(held.contacts) else 0.0),
+        "effort": once(lambda: actuation(held, loads, Effort.TORQUE if held.drive is None else Effort.TENSION)),
+    }
+    return GraspQuality.with_late(
+        lambda name: late[name](),
         grasp=grasp,
         norm=WrenchNorm(norm),
         edges=edges,
         epsilon=ball,
-        volume=volume_l1(held.edge_wrenches(edges)) if len(held.contacts) else 0.0,
         within_torques=epsilon_within_torques(held, edges) if within_torques else None,
         mass=heaviest,
-        effort=actuation(held, loads, least),
     )

@@ -46,7 +46,7 @@ class SqueezePlan:
     """A plan of forces, torques and offsets that holds a mass, or the reason why there is none.
 
     Args:
-        feasible: whether every mass is held at all; text: sentences that say so, or which limit binds.
+        feasible: whether every mass is held at all.
         mass: the heaviest that is planned for [kg]. margin: disturbances are resisted up to this multiple [-].
         lightest: the lightest mass that is planned for [kg]. any_direction: gravity may point anywhere.
         forces: on the object, one per contact, in the world [N], shape (C, 3). twists: torques about the inward normals
@@ -60,7 +60,6 @@ class SqueezePlan:
     """
 
     feasible: bool
-    text: str
     mass: float
     margin: float
     forces: FloatArray
@@ -77,6 +76,11 @@ class SqueezePlan:
         return described(
             self, feasible=self.feasible, text=self.text, mass=self.mass, margin=self.margin, torques=self.torques
         )
+
+    @property
+    def text(self) -> str:
+        """Sentences that say what is held, or which limit binds; that limit is looked for when it is first read."""
+        return _sentence(self.found, (self.lightest, self.mass), self.feasible, self.any_direction)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, `squeeze` in schema `clench.solution/1`."""
@@ -168,7 +172,6 @@ def plan_squeeze(
     torques = np.zeros(0) if plan is None else plan.torques
     return SqueezePlan(
         feasible=feasible,
-        text=_sentence(found, masses, feasible, any_direction),
         mass=masses[1],
         margin=found.margin,
         forces=forces @ grasp.T_world_palm.rotation.T,

@@ -18,12 +18,14 @@ from clench.core.pose_arrays import pose_of_row
 from clench.models.command import GraspCommand
 from clench.scoring.calibration import calibration_of
 from clench.solver.alternatives import candidates_of
+from clench.solver.clock import Clock
 from clench.solver.pose_solver import PoseSolver, solve_posture
 from clench.solver.problem import check_calibration, make_problem
 from clench.solver.solution import FingerStatus, GraspSolution
 
 from .devices import CPU, CUDA
 from .grasp_batch import FINGER_STATUSES, STATUSES, BatchContacts, GraspBatch, Question
+from .kept_answers import KeptAnswers, KeptPart
 
 if TYPE_CHECKING:
     from clench.kernels.closing.solve_layout import Solved
@@ -78,9 +80,13 @@ class BatchSolver:
         if self.candidates is None:
             return self._one_by_one(hand_rows, object_rows, threads)
         palms = self._palms(hand_rows)
-        solved = self._run(palms, object_rows, threads, device == CUDA).solved
-        columns = self._columns(solved, hand_rows, object_rows)
-        return GraspBatch(**columns, contacts=_contacts_of(solved, palms))
+        answers = self._run(palms, object_rows, threads, device == CUDA)
+        columns = self._columns(answers.solved, hand_rows, object_rows)
+        batch = GraspBatch(**columns, contacts=_contacts_of(answers.solved, palms))
+        # Answers of a device differ from those of a solve in their last bits. Other choices are made pose by pose.
+        if device != CPU or not self.candidates.by_kernel:
+            return batch
+        return batch.keeping(KeptAnswers.of(KeptPart(self._read, answers, palms, object_rows)))
 
     def solve_one(self, hand_pose: Pose, object_pose: Pose) -> GraspBatch:
         """Return the answer for one pose; its contacts are made when they are first read."""
@@ -108,6 +114,15 @@ class BatchSolver:
             threads=threads,
             on_device=on_device,
         )
+
+    def _read(self, answers: Answers, palm: FloatArray, there: FloatArray) -> GraspSolution:
+        """Return the solution of answers for one pose of the palm and the object, (7,) each."""
+        assert self.candidates is not None
+        clock = Clock()
+        problem = self._start.at(pose_of_row(palm), pose_of_row(there))
+        solver = PoseSolver(problem, self._calibration, self.candidates)
+        clock.lap("read")
+        return solver.solution(answers, clock.stages())
 
     def _palms(self, hand_rows: FloatArray) -> FloatArray:
         """Return the poses of the palm, (N, 7)."""

@@ -19,6 +19,7 @@ from clench.core.pose_arrays import pose_of_row
 from clench.core.showing.short_repr import described, short_repr
 from clench.solver.solution import FingerStatus, GraspSolution, SolutionStatus
 
+from .kept_answers import MOST_KEPT, KeptAnswers
 from .saved_question import question_arrays
 
 if TYPE_CHECKING:
@@ -190,10 +191,25 @@ class GraspBatch(LateFields):
         return {**asked.command.angles, **given} if given else asked.command.preshape
 
     def solution(self, i: int) -> GraspSolution:
-        """Return the whole answer for one pose, by one ordinary solve; see `command`."""
+        """Return the whole answer for one pose, as `clench.solve` gives it for the command of the pose; see `command`.
+
+        Of about two thousand poses, what the kernels found stays with the batch. For others, and for a batch from a
+        file, the pose is solved again.
+        """
         from clench.solver.solve import solve
 
-        return solve(self.question.hand, self.question.obj, self.command(i))
+        kept = self._kept_answers
+        found = kept.solution(i) if kept is not None and -len(self) <= i < len(self) else None
+        return found if found is not None else solve(self.question.hand, self.question.obj, self.command(i))
+
+    def keeping(self, kept: KeptAnswers | None) -> GraspBatch:
+        """Return the same batch with answers from which `solution` reads; copies and files do not have them."""
+        return self.with_known(_answers=kept)
+
+    @property
+    def _kept_answers(self) -> KeptAnswers | None:
+        found: KeptAnswers | None = self.__dict__.get("_answers")
+        return found
 
     def save(self, path: str | Path) -> None:
         """Write all arrays and the request to a NumPy file (.npz), atomically; the names are columns of text.
@@ -217,12 +233,13 @@ class GraspBatch(LateFields):
         columns: dict[str, Any] = {n: np.concatenate([getattr(part, n) for part in parts]) for n in PER_POSE}
         preshapes = [part.question.preshapes for part in parts]
         merged = {name: np.concatenate([each[name] for each in preshapes]) for name in preshapes[0]}
+        kept = KeptAnswers.joined([part._kept_answers or KeptAnswers.none(len(part)) for part in parts])
         return replace(
             parts[0],
             question=replace(parts[0].question, preshapes=merged),
             contacts=BatchContacts.joined([part.contacts for part in parts]),
             **columns,
-        )
+        ).keeping(kept)
 
     def taken(self, order: Whole) -> GraspBatch:
         """Return the poses of some rows, in their order."""
@@ -237,4 +254,11 @@ class GraspBatch(LateFields):
             question=replace(asked, preshapes={name: a[order] for name, a in asked.preshapes.items()}),
             contacts=BatchContacts(first=first, **columns),
             **taken,
-        )
+        ).keeping(None if self._kept_answers is None else self._kept_answers.taken(order))
+
+
+def append_part(solved: list[GraspBatch], part: GraspBatch) -> None:
+    """Append a part of a batch; what its kernels found is dropped where all parts would keep too much."""
+    kept = [each._kept_answers for each in (*solved, part)]
+    too_much = sum(each.size for each in kept if each is not None) > MOST_KEPT
+    solved.append(part.keeping(None) if too_much else part)

@@ -14,11 +14,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clench.closing.threads import core_count
 from clench.core.argument_types import check_type
 from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.core.pose_arrays import pose_rows
+from clench.core.threads import core_count
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -28,7 +28,7 @@ from clench.solver.preshapes.postures import preshape_angles
 from .batch_parts import BatchParts
 from .batch_progress import shown
 from .devices import CPU, why_not
-from .grasp_batch import GraspBatch, Question
+from .grasp_batch import GraspBatch, Question, append_part
 
 #: Poses that are solved at a time: a few ten megabytes.
 CHUNK: Final = 1024
@@ -94,12 +94,13 @@ def solve_batch(
             for begin in range(0, max(len(where), 1), size):
                 some = where[begin : begin + size]
                 solve = partial(solver.solve, rows[some], None if there is None else there[some], count, device)
-                solved.append(solve() if parts is None else parts.part(len(solved), solver.names, rows[some], solve))
+                part = solve() if parts is None else parts.part(len(solved), solver.names, rows[some], solve)
+                append_part(solved, part)
                 advance(len(some))
     batch = GraspBatch.joined(solved)
     if len(groups) > 1:
         batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
-    batch = replace(batch, question=replace(question, options=batch.question.options))
+    batch = batch.with_known(question=replace(question, options=batch.question.options))
     if parts is not None:
         parts.finish(batch)
     return batch

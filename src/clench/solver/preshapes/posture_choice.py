@@ -17,16 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.closing.motion import open_posture
-from clench.closing.threads import core_count, share_out
 from clench.core.caching.deferring import DeferredMapping
 from clench.core.pose import FloatArray
 from clench.core.pose_arrays import pose_of_row
+from clench.core.threads import core_count, share_out
 from clench.models.command import GraspCommand
 from clench.scoring.calibration import calibration_of
 from clench.scoring.explaining import say_what_decided
 from clench.solver.batch.batch_solver import BatchSolver
 from clench.solver.batch.devices import CPU
-from clench.solver.batch.grasp_batch import GraspBatch, Question
+from clench.solver.batch.grasp_batch import GraspBatch, Question, append_part
 from clench.solver.pose_solver import solve_posture
 from clench.solver.solution import GraspSolution
 
@@ -104,10 +104,13 @@ class PostureSolver:
         self, hand_rows: FloatArray, object_rows: FloatArray | None, threads: int, device: str = CPU
     ) -> GraspBatch:
         """Return the answers, each from the posture that is best at its pose; see `BatchSolver.solve`."""
-        answers = GraspBatch.joined([s.solve(hand_rows, object_rows, threads, device) for s in self._solvers])
+        solved = list[GraspBatch]()
+        for solver in self._solvers:
+            append_part(solved, solver.solve(hand_rows, object_rows, threads, device))
+        answers = GraspBatch.joined(solved)
         _, order = self._compare(answers)
         best = answers.taken(order[:, 0] * len(hand_rows) + np.arange(len(hand_rows)))
-        return replace(best, question=self.names["question"], preshape_codes=order[:, 0].astype(np.int16))
+        return best.with_known(question=self.names["question"], preshape_codes=order[:, 0].astype(np.int16))
 
     def choose_one(self) -> tuple[PostureOption, Mapping[str, Any]]:
         """Return the best posture at the pose of the command, and the comparison as plain values."""

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand, JointRole
 from models.hand.hand_models import finger, hand, three_fingers, urdf_hand, written
 
@@ -129,3 +130,10 @@ def test_a_prismatic_joint_before_the_palm_is_held(tmp_path) -> None:
     )
     assert "slide" not in loaded.joint_names
     assert any("'slide'" in f.text and "held" in f.text for f in loaded.findings)
+
+
+def test_some_links_are_where_they_are_among_all():
+    loaded, rng = Hand.load("robonaut2"), np.random.default_rng(0)
+    postures = rng.uniform(-1.0, 1.0, (5, len(loaded.joints)))
+    links = [loaded.fingers[1].links[-1], 0, loaded.fingers[0].links[0]]
+    np.testing.assert_array_equal(poses_at(loaded, postures, links), poses_at(loaded, postures)[:, links])

@@ -48,8 +48,8 @@ def test_the_distance_is_that_of_many_points() -> None:
     corners = rng.normal(size=(40, 3, 3)) * 0.03
     mesh = TriangleMesh(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
     hull = convex_hull(mesh)
-    from clench.kernels.geometry.bvh import build_tree
     from clench.kernels.geometry.mesh_distance import closest_point
+    from clench.kernels.trees.bvh import build_tree
 
     tree = build_tree(mesh.vertices, mesh.triangles)
     weights = rng.dirichlet(np.ones(3), size=(len(hull.triangles), 200))

@@ -71,8 +71,8 @@ def largest_distance(hull: TriangleMesh, mesh: TriangleMesh) -> float:
     The distance from a point to a mesh changes by no more than the point moves. Thus one sample bounds it over a whole
     triangle. Triangles are halved until no bound is far above a distance that was seen, or until `_LOOKS` were taken.
     """
-    from clench.kernels.geometry.bvh import build_tree
     from clench.kernels.geometry.mesh_distance import closest_point
+    from clench.kernels.trees.bvh import build_tree
 
     tree = build_tree(mesh.vertices, mesh.triangles)
     facets = hull.vertices[hull.triangles]

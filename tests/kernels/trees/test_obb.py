@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.geometry import obb as slabs
 from clench.kernels.geometry.bodies import Elements, pack_bodies
 from clench.kernels.toi import toi_work as sweeping
+from clench.kernels.trees import obb as slabs
 from kernels.kernel_entries import entry
 from kernels.toi.test_toi_bodies import KINDS, patch, pose
 
@@ -135,3 +135,17 @@ def test_what_lies_just_inside_a_box_is_not_said_to_miss_it(size, grown):
             n = box[k : k + 3] / np.linalg.norm(box[k : k + 3])
             inside = box[:3] + box[k : k + 3] + (grown - 1e-13) * n
             assert not slab_misses(body.slab[0], T, np.tile(T[:, :3] @ inside, (3, 1)), 1, 0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_boxes_lie_along_the_principal_axes(kind):
+    """No box of a node is thicker than the one along the eigenvectors that LAPACK finds, single precision aside."""
+    body = pack_bodies([patch(np.random.default_rng(5), kind, 60)])
+    for node in range(len(body.first)):
+        points = body.vertices[body.elements[below(body, node)]].reshape(-1, 3)
+        values, axes = np.linalg.eigh(np.cov(points.T, bias=True))
+        if np.diff(values).min() < 1e-3 * values[-1]:
+            continue  # any directions will do
+        sizes = np.sort(0.5 * np.ptp(points @ axes, axis=0))[::-1]
+        edges = body.slab[node, 3:12].reshape(3, 3).astype(float)
+        np.testing.assert_allclose(np.linalg.norm(edges, axis=1), sizes, rtol=1e-5, atol=1e-7)

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from clench.kernels.geometry.bvh import LEAF_SIZE, STACK_SIZE, build_tree, feature_owners
+from clench.kernels.geometry.bodies import pack_triangles
+from clench.kernels.trees import bvh, node_boxes, tree_growth
+from clench.kernels.trees.bvh import LEAF_SIZE, STACK_SIZE, build_tree, feature_owners
+from clench.kernels.trees.connectivity import connected_parts, owned_features
 from kernels.kernel_solids import ball, torus
 
 
@@ -114,3 +119,47 @@ def test_every_feature_has_one_owner():
 def test_bad_input_is_refused(vertices, triangles, body, message):
     with pytest.raises(ValueError, match=message):
         build_tree(vertices, triangles, body)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_tree_has_the_same_bits_for_any_number_of_threads(monkeypatch, threads):
+    """A large mesh is parted into works for threads; the result is that of parting it in one."""
+    rng = np.random.default_rng(7)
+    count = 2000
+    vertices = np.cumsum(rng.normal(size=(count + 2, 3)), axis=0)
+    triangles = rng.permutation(np.arange(count)[:, None] + np.arange(3))
+    whole = pack_triangles(build_tree(vertices, triangles))
+    monkeypatch.setattr(tree_growth, "_PART", 100)
+    monkeypatch.setattr(tree_growth, "ROWS", 300)
+    monkeypatch.setattr(node_boxes, "_NODES", 50)
+    for module in (tree_growth, node_boxes, bvh):
+        monkeypatch.setattr(module, "core_count", lambda: threads)
+    tree = build_tree(vertices, triangles)
+    check(tree, vertices, triangles)
+    parted = pack_triangles(tree)
+    for name, mine, other in zip(parted._fields, parted, whole, strict=True):
+        np.testing.assert_array_equal(mine, other, err_msg=name)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 60), st.integers(3, 40), st.integers(0, 2**31))
+def test_parts_are_those_that_common_vertices_connect(size, count, seed):
+    triangles = np.random.default_rng(seed).integers(0, count, (size, 3))
+    pairs = np.concatenate([triangles[:, :2], triangles[:, 1:]])
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    label = connected_components(graph, directed=False)[1]
+    assert connected_parts(triangles, count).tolist() == [int(np.argmax(label == each)) for each in label]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 60), st.integers(3, 12), st.integers(0, 2**31))
+def test_the_first_triangle_with_a_feature_owns_it(size, count, seed):
+    triangles = np.random.default_rng(seed).integers(0, count, (size, 3)).astype(np.int32)
+    seen, masks = set(), np.zeros(size, dtype=np.uint8)
+    for t, triangle in enumerate(triangles.tolist()):
+        sides = [(triangle[k], triangle[(k + 1) % 3]) for k in range(3)]
+        features = [*((v,) for v in triangle), *((*sorted(side), "edge") for side in sides)]
+        for bit, feature in enumerate(features):
+            masks[t] |= 0 if feature in seen else 1 << bit
+            seen.add(feature)
+    np.testing.assert_array_equal(owned_features(triangles, count), masks)
