@@ -109,7 +109,7 @@ class Stepper:
 
 
 def _trees(solids: Sequence[Sequence[Shape]], source: CollisionSource) -> BoxTrees:
-    """Return solids, each of several shapes, as exact sweeps take them: round shapes are cores with a radius."""
+    """Return solids, each of several shapes, as sweeps take them: round shapes are cores with a radius."""
     from clench.kernels.geometry.bodies import join_elements
 
     from .kernels.box_query import box_trees

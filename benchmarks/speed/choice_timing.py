@@ -15,7 +15,7 @@ from clench.scoring.calibration import Calibration
 from clench.scoring.choice import HandChoice, choose
 from clench.scoring.criterion_types import ScoringContext
 from clench.solver.alternatives import finger_sets
-from clench.solver.problem import make_problem, make_setting
+from clench.solver.problem import make_context, make_problem
 
 from ..bench_options import Case, Runs
 from ..bench_report import BenchReport, describe_place
@@ -59,24 +59,24 @@ def bench_choice(case: Case, runs: Runs, alternatives: int, seed: int) -> BenchR
     }
     for i, (groups, problem) in enumerate(cases[:CHECKED_POSES]):
         few = [group[:CHECKED_SETS] for group in groups]
-        report.errors += [f"pose {i}: {e}" for e in _wrong(few, make_setting(problem, STEADY))]
+        report.errors += [f"pose {i}: {e}" for e in _wrong(few, make_context(problem, STEADY))]
     report.values["answers_right"] = not report.errors
     if not report.errors:
         for calibration in (ADDITIVE, STEADY):
-            made = [(groups, make_setting(p, calibration)) for groups, p in cases]
+            made = [(groups, make_context(p, calibration)) for groups, p in cases]
             _time(report, made, calibration, runs.passes)
     return report
 
 
-def _wrong(groups: Groups, setting: ScoringContext) -> list[str]:
+def _wrong(groups: Groups, context: ScoringContext) -> list[str]:
     """Return a sentence for every calibration whose choice is not the best of all combinations."""
     found = []
     for calibration in (ADDITIVE, STEADY):
-        choice = choose(groups, calibration, setting)
+        choice = choose(groups, calibration, context)
         totals = []
         for sets in itertools.product(*(finger.equals for finger in choice.fingers)):
             one = [[group[i]] for group, i in zip(groups, sets, strict=True)]
-            totals.append(choose(one, calibration, setting).total)
+            totals.append(choose(one, calibration, context).total)
         if max(totals) > choice.total + 1e-9:
             found.append(f"{calibration.name}: chose {choice.total:.9g}, the best is {max(totals):.9g}.")
     return found
@@ -86,10 +86,10 @@ def _time(
     report: BenchReport, made: Sequence[tuple[Groups, ScoringContext]], calibration: Calibration, passes: int
 ) -> None:
     seconds, tried, proved = [], [], []
-    for groups, setting in [case for _ in range(passes) for case in made]:
-        setting.kept.clear()
+    for groups, context in [case for _ in range(passes) for case in made]:
+        context.kept.clear()
         start = time.perf_counter()
-        choice: HandChoice = choose(groups, calibration, setting)
+        choice: HandChoice = choose(groups, calibration, context)
         seconds.append(time.perf_counter() - start)
         tried.append(choice.tried)
         proved.append(choice.proved)

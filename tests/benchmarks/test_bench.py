@@ -21,7 +21,7 @@ from clench.kernels.closing.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.scoring.calibration import calibration_of
 from clench.solver.alternatives import candidates_of, finger_sets
-from clench.solver.problem import make_problem, make_setting
+from clench.solver.problem import make_context, make_problem
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
 
@@ -208,16 +208,16 @@ def test_the_check_of_choices_sees_one_that_is_not_the_best(monkeypatch: pytest.
     command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1), preshape="open")
     problem = make_problem(hand, obj, command)
     groups = [[c for c in g if c.plane is None] for g in finger_sets(problem)]
-    setting = make_setting(problem, choice_timing.ADDITIVE)
-    assert choice_timing._wrong(groups, setting) == []
+    context = make_context(problem, choice_timing.ADDITIVE)
+    assert choice_timing._wrong(groups, context) == []
     real = choice_timing.choose
 
-    def worst(given: Any, calibration: Any, setting: Any) -> Any:
-        choice = real(given, calibration, setting)
+    def worst(given: Any, calibration: Any, context: Any) -> Any:
+        choice = real(given, calibration, context)
         return replace(choice, total=choice.total - 1.0) if len(given[0]) > 1 else choice
 
     monkeypatch.setattr(choice_timing, "choose", worst)
-    assert len(choice_timing._wrong(groups, setting)) == 2
+    assert len(choice_timing._wrong(groups, context)) == 2
 
 
 def test_packing_checks_times_and_weighs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

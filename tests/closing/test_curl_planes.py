@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from clench.closing.curl_planes import family_frame, plane_offsets, refined
+from clench.closing.curl_planes import axis_group_frame, plane_offsets, refined
 from clench.core.tolerances import EDGE_INSET
 
 extents = st.lists(
@@ -71,7 +71,7 @@ def test_refining_keeps_the_planes_and_the_mirror_image(spans, count, more):
 def test_the_frame_is_right_handed_with_y_against_the_axis(axis, towards):
     axis = np.array(axis) / np.linalg.norm(axis)
     origin = np.array([0.1, -0.2, 0.3])
-    T = family_frame(axis, origin, origin + towards)
+    T = axis_group_frame(axis, origin, origin + towards)
     np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
     assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
     np.testing.assert_allclose(T[:3, 1], -axis, atol=1e-15)

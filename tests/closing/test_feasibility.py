@@ -109,7 +109,7 @@ def test_a_path_is_looked_at_at_the_speeds_of_its_joints():
 
 
 def test_a_set_that_was_swept_over_the_whole_width_needs_no_measuring():
-    (judged,) = judge([replace(at(1.9), exact=True)], measure=True)
+    (judged,) = judge([replace(at(1.9), swept=True)], measure=True)
     assert (judged.clear, judged.feasible, judged.penetration) == (True, True, 0.0)
 
 

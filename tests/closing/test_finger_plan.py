@@ -1,4 +1,4 @@
-"""Plans of a finger: groups, families of parallel planes, travel, and outlines that move as the links do."""
+"""Plans of a finger: degrees of freedom, axis groups, travel, and outlines that move as the links do."""
 
 from dataclasses import replace
 
@@ -22,23 +22,23 @@ def plan(hand, q=None, planes=3):
     return plan_finger(hand, hand.fingers[0], hand.coupled(posture), planes, ENGINE)
 
 
-def test_parallel_joints_share_one_family():
+def test_parallel_joints_share_one_axis_group():
     found = plan(chain([POSTURE, CLOSING, CLOSING, CLOSING]))
-    assert [p.family for p in found.joints] == [0, 0, 0]
-    assert [p.group for p in found.joints] == [0, 1, 2]
+    assert [p.axis_group for p in found.joints] == [0, 0, 0]
+    assert [p.dof for p in found.joints] == [0, 1, 2]
     assert found.lengths == (1.5, 1.5, 1.5)
     np.testing.assert_allclose([p.pivot for p in found.joints], [[0, 0], [LENGTH, 0], [2 * LENGTH, 0]], atol=1e-15)
 
 
-@pytest.mark.parametrize(("yaw", "families"), [(0.0, [0, 0]), (1e-10, [0, 0]), (1e-7, [0, 1]), (0.4, [0, 1])])
-def test_a_turned_axis_starts_a_family_of_its_own(yaw, families):
+@pytest.mark.parametrize(("yaw", "axis_groups"), [(0.0, [0, 0]), (1e-10, [0, 0]), (1e-7, [0, 1]), (0.4, [0, 1])])
+def test_a_turned_axis_starts_an_axis_group_of_its_own(yaw, axis_groups):
     found = plan(chain([CLOSING, POSTURE, CLOSING]), [0.0, yaw, 0.0])
-    assert [p.family for p in found.joints] == families
+    assert [p.axis_group for p in found.joints] == axis_groups
 
 
-def test_every_family_of_a_finger_has_as_many_planes():
+def test_every_axis_group_of_a_finger_has_as_many_planes():
     found = plan(chain([CLOSING, POSTURE, CLOSING]), [0.0, 0.4, 0.0], planes=5)
-    assert len({len(f.offsets) for f in found.families}) == 1
+    assert len({len(f.offsets) for f in found.axis_groups}) == 1
 
 
 def test_a_joint_of_negative_direction_travels_to_its_lower_limit():
@@ -80,10 +80,10 @@ def test_coupling_between_fingers_is_refused_by_name():
 @settings(max_examples=30, deadline=None)
 @given(st.tuples(*[st.floats(-0.4, 0.4)] * 3), st.tuples(*[st.floats(0.0, 1.0)] * 3), st.integers(1, 5))
 def test_the_planar_chain_moves_as_the_hand_does(open_angles, travel, planes):
-    """Turning pivots in the family's plane gives the places of the link frames that forward kinematics gives."""
+    """Turning pivots in the axis group's plane gives the places of the link frames that forward kinematics gives."""
     hand = chain([CLOSING, CLOSING, CLOSING])
     found = plan(hand, open_angles, planes)
-    T = found.families[0].T_palm_family
+    T = found.axis_groups[0].T_palm_axis_group
     q = found.angles(hand, np.array(travel))
     poses = hand.link_poses(q)
     place, angle, before = np.zeros(2), 0.0, np.zeros(2)
@@ -103,7 +103,7 @@ def test_the_planar_chain_moves_as_the_hand_does(open_angles, travel, planes):
 def test_the_frame_turns_x_towards_z(open_angle, turn):
     hand = chain([CLOSING])
     found = plan(hand, [open_angle])
-    T = found.families[0].T_palm_family
+    T = found.axis_groups[0].T_palm_axis_group
     axis = -T[:3, 1]
     np.testing.assert_allclose(rotation_about(axis, np.pi / 2) @ T[:3, 0], T[:3, 2], atol=1e-12)
     assert found.joints[0].rate == pytest.approx(1.0)
@@ -113,18 +113,18 @@ def test_the_frame_turns_x_towards_z(open_angle, turn):
 def test_nothing_that_moves_gets_farther_than_the_reach():
     hand = chain([CLOSING, CLOSING])
     found = plan(hand, [0.3, -0.2])
-    family = found.families[0]
-    origin = family.T_palm_family[:3, 3]
+    axis_group = found.axis_groups[0]
+    origin = axis_group.T_palm_axis_group[:3, 3]
     for q in np.random.default_rng(0).uniform(-0.5, 1.5, (50, 2)):
         for link, pose in list(zip(hand.links, hand.link_poses(q), strict=True))[1:]:
             points = link.shapes[ENGINE][0].to_mesh(1e-4).vertices @ pose[:3, :3].T + pose[:3, 3]
-            away = (points - origin) @ family.T_palm_family[:3, [0, 2]]
-            assert np.linalg.norm(away, axis=1).max() <= family.reach + 1e-12
+            away = (points - origin) @ axis_group.T_palm_axis_group[:3, [0, 2]]
+            assert np.linalg.norm(away, axis=1).max() <= axis_group.reach + 1e-12
 
 
 def test_outlines_belong_to_the_joint_that_moves_their_link_last():
     found = plan(chain([CLOSING, POSTURE, CLOSING]), [0.0, 0.4, 0.0])
-    first, second = found.families
+    first, second = found.axis_groups
     assert {(o.link, o.joint) for row in first.outlines for o in row} == {(1, 0), (2, 0), (3, 0)}
     assert {(o.link, o.joint) for row in second.outlines for o in row} == {(3, 1)}
 
@@ -134,6 +134,6 @@ def test_the_length_of_a_finger_bounds_its_cuts_and_ignores_their_number(planes)
     hand = chain([CLOSING, POSTURE, CLOSING])
     found = plan(hand, [0.0, 0.4, 0.0], planes)
     assert found.length == plan(hand, [0.0, 0.4, 0.0], 5).length
-    reach = max(f.reach for f in found.families)
+    reach = max(f.reach for f in found.axis_groups)
     assert reach <= found.length * (1.0 + 1e-3)
     assert found.length <= 1.5 * reach

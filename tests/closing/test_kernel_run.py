@@ -1,4 +1,4 @@
-"""All candidates of all fingers in one call: items, arenas that grow, and independence of each other."""
+"""All candidates of all fingers in one call: what they are, arenas that grow, and independence of each other."""
 
 import threading
 from dataclasses import replace
@@ -9,8 +9,8 @@ import pytest
 from clench.closing.collision.packed_object import pack_object
 from clench.closing.finger_plan import plan_finger
 from clench.closing.hand_plan import make_hand_plan
-from clench.closing.kernel_run import close_items, row_of
-from clench.closing.packed_problem import capacity_of, items_around, pack_problem, planes_tell
+from clench.closing.kernel_run import close_candidates, row_of
+from clench.closing.packed_problem import candidates_around, capacity_of, pack_problem, planes_tell
 from clench.core.pose import Pose
 from clench.core.threads import kernel_threads, share_out
 from clench.kernels.closing.start_overlap import CROSSED, FREE
@@ -23,28 +23,30 @@ def planned(hand, count=3, q=None, fingers=None, full_width=True):
     """Return the plan of some fingers of a hand, without sweeps of their width."""
     posture = np.zeros(len(hand.joints)) if q is None else np.array(q)
     some = [hand.fingers[k] for k in (range(len(hand.fingers)) if fingers is None else fingers)]
-    entries = [(plan_finger(hand, f, posture, count, CollisionSource.ENGINE), k, 0) for k, f in enumerate(some)]
-    plan = make_hand_plan(hand, posture, CollisionSource.ENGINE, entries, full_width=full_width)
-    return replace(plan, exact=plan.exact._replace(wanted=np.zeros(len(plan.whole), np.int64)))
+    finger_postures = [(plan_finger(hand, f, posture, count, CollisionSource.ENGINE), k, 0) for k, f in enumerate(some)]
+    plan = make_hand_plan(hand, posture, CollisionSource.ENGINE, finger_postures, full_width=full_width)
+    return replace(
+        plan, full_width_arrays=plan.full_width_arrays._replace(requested=np.zeros(len(plan.is_full_width), np.int64))
+    )
 
 
 def close(plan, obj):
-    """Return the closed items of a plan, with planes for the full width, too."""
+    """Return the closed candidates of a plan, with planes for the full width, too."""
     problem = pack_problem(plan, pack_object(obj), (), False)
-    every = problem.arrays._replace(items=plan.items)
-    return row_of(close_items(replace(problem, arrays=every), obj.pose.matrix[:3]).free, 0)
+    every = problem.arrays._replace(candidates=plan.candidates)
+    return row_of(close_candidates(replace(problem, arrays=every), obj.pose.matrix[:3]).free, 0)
 
 
 BALL = GraspObject.load("sphere:r=0.02", pose=Pose([0.04, 0.001, 0.04]))
 
 
-def test_one_item_per_plane_and_one_for_the_full_width():
+def test_one_candidate_per_plane_and_one_for_the_full_width():
     hand = chain([CLOSING, CLOSING], names=("a", "b"))
     plan = planned(hand)
-    assert plan.items.entry.tolist() == [0] * 4 + [1] * 4
-    assert plan.whole == (False, False, False, True) * 2
-    assert plan.items.high.tolist() == [1, 2, 3, 3] * 2
-    assert not any(planned(hand, full_width=False).whole)
+    assert plan.candidates.finger_posture.tolist() == [0] * 4 + [1] * 4
+    assert plan.is_full_width == (False, False, False, True) * 2
+    assert plan.candidates.high.tolist() == [1, 2, 3, 3] * 2
+    assert not any(planned(hand, full_width=False).is_full_width)
 
 
 def test_fingers_close_as_they_would_alone():
@@ -86,9 +88,9 @@ def test_overlap_at_the_start_is_noted_on_planes_for_the_finger_it_concerns():
     plan = planned(chain([CLOSING], names=("a", "b")), full_width=False)
     packed = pack_object(BALL)
     problem = pack_problem(plan, packed, (), False)
-    free = close_items(problem, BALL.pose.matrix[:3])
+    free = close_candidates(problem, BALL.pose.matrix[:3])
     assert free.blocked.tolist() == [[FREE, FREE]]
-    inside = close_items(problem, Pose([0.02, 0.0, 0.02]).matrix[:3])
+    inside = close_candidates(problem, Pose([0.02, 0.0, 0.02]).matrix[:3])
     assert inside.blocked.tolist() == [[CROSSED + 1, CROSSED + 2]]
     assert not inside.free.travel.any()
 
@@ -99,12 +101,12 @@ def test_the_full_width_has_planes_around_what_is_swept_as_a_polyhedron_alone(mo
     curved = model.startswith("cylinder")
     packed = pack_object(GraspObject.load(model))
     plan, alone = planned(hand), planned(hand, full_width=False)
-    items, single = items_around(plan, packed), items_around(alone, packed)
-    assert (items.high - items.low).tolist() == [1, 1, 1, 3 if curved else 0]
+    candidates, single = candidates_around(plan, packed), candidates_around(alone, packed)
+    assert (candidates.high - candidates.low).tolist() == [1, 1, 1, 3 if curved else 0]
     assert single.high.tolist() == [1, 2, 3]
-    assert planes_tell(plan, items) == curved
+    assert planes_tell(plan, candidates) == curved
     assert planes_tell(alone, single)
-    assert not planes_tell(plan.planes, items_around(plan.planes, packed))
+    assert not planes_tell(plan.planes, candidates_around(plan.planes, packed))
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

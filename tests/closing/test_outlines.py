@@ -57,9 +57,9 @@ def placed(seed):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(4))
 def test_borders_lie_on_the_shape(kind, seed):
-    T_family_link, T_link_shape = placed(seed)
+    T_axis_group_link, T_link_shape = placed(seed)
     shape = Shape(kind, SIZE, T_link_shape)
-    T = T_family_link.matrix
+    T = T_axis_group_link.matrix
     low, high = extent(shape, T)
     seen = 0
     for offset in np.linspace(low, high, 9)[1:-1]:
@@ -67,8 +67,8 @@ def test_borders_lie_on_the_shape(kind, seed):
         assert outline is not None
         assert outline.deviation <= OUTLINE_DEVIATION
         points = border(outline)
-        in_family = np.column_stack([points[:, 0], np.full(len(points), offset), points[:, 1]])
-        local = (T_family_link @ T_link_shape).inverse().apply(in_family)
+        in_axis_group = np.column_stack([points[:, 0], np.full(len(points), offset), points[:, 1]])
+        local = (T_axis_group_link @ T_link_shape).inverse().apply(in_axis_group)
         values = signed(kind, local)
         assert values.max() <= 1e-12
         # Inside by the deviation in the plane: never by more in space.
@@ -79,15 +79,15 @@ def test_borders_lie_on_the_shape(kind, seed):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_section_beyond_the_extent(kind):
-    T_family_link, T_link_shape = placed(9)
+    T_axis_group_link, T_link_shape = placed(9)
     shape = Shape(kind, SIZE, T_link_shape)
-    low, high = extent(shape, T_family_link.matrix)
+    low, high = extent(shape, T_axis_group_link.matrix)
     mesh = shape.to_mesh(1e-6)
-    heights = T_family_link.apply(mesh.vertices)[:, 1]
+    heights = T_axis_group_link.apply(mesh.vertices)[:, 1]
     assert heights.min() == pytest.approx(low, abs=2e-6)
     assert heights.max() == pytest.approx(high, abs=2e-6)
     for outside in (low - 1e-9, high + 1e-9):
-        assert cut_shape(shape, T_family_link.matrix, float(outside)) is None
+        assert cut_shape(shape, T_axis_group_link.matrix, float(outside)) is None
 
 
 def test_a_capsule_in_the_plane_is_two_points_and_a_radius():

@@ -1,4 +1,4 @@
-"""Call the kernels of the closing item by item, as `clench.kernels.closing.free_closing` does."""
+"""Call the kernels of the closing candidate by candidate, as `clench.kernels.closing.free_closing` does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import clench.kernels.sections.advance as on_planes
 import clench.kernels.toi.toi_work as toi_work
-from clench.kernels.closing.close_item import close_item
+from clench.kernels.closing.close_candidate import close_candidate
 from clench.kernels.closing.solve_layout import ObjectArrays
 from clench.kernels.sections.section_overlap import look_for_overlaps
 
@@ -21,13 +21,21 @@ def scratch(hand: Any) -> Any:
     return plain(on_planes.make_work)(hand.chain.rate.shape[0], hand.outlines)
 
 
-def close_items(
-    hand: Any, exact: Any, obj: ObjectArrays, T: Any, sections: Any, items: Any, answer: Any, *, together: bool = False
+def close_candidates(
+    hand: Any,
+    full_width: Any,
+    obj: ObjectArrays,
+    T: Any,
+    sections: Any,
+    candidates: Any,
+    answer: Any,
+    *,
+    together: bool = False,
 ) -> None:
-    """Close every item once; `sections` are those of the first families, and the arena for later ones."""
-    sweep = plain(toi_work.make_sweep_work)(hand.chain.rate.shape[0], exact.checked.shape[0])
-    for i in range(len(items.entry)):
-        close_item(hand, exact, obj, T, *sections, items, i, 1, together, scratch(hand), sweep, answer)
+    """Close every candidate once; `sections` are those of the first axis groups, and the arena for later ones."""
+    sweep = plain(toi_work.make_sweep_work)(hand.chain.rate.shape[0], full_width.checked.shape[0])
+    for i in range(len(candidates.finger_posture)):
+        close_candidate(hand, full_width, obj, T, *sections, candidates, i, 1, together, scratch(hand), sweep, answer)
 
 
 def find_overlaps(hand: Any, tree: Any, rounds: Any, closed: bool, T: Any, sections: Any, overlaps: Any) -> None:

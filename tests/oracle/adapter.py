@@ -6,29 +6,29 @@ import numpy.typing as npt
 from clench.closing.outlines import RoundedOutline
 from clench.closing.plan_packing import enclosing
 from clench.kernels.closing.layout import (
-    HIT_INTEGERS,
+    CONTACT_INTEGERS,
+    CandidateArrays,
     ChainArrays,
     ClosingArrays,
     HandArrays,
-    ItemArrays,
     OutlineArrays,
     SectionArrays,
     no_rounds,
 )
 from clench.kernels.closing.solve_layout import ObjectArrays
 from clench.kernels.geometry.bodies import no_body
-from clench.kernels.sections import plane_sections as family_section
+from clench.kernels.sections import plane_sections
 from clench.kernels.sections.plane_sections import make_sections
 from clench.kernels.toi.full_width import planes_only
 from clench.kernels.trees.bvh import build_tree
 from kernels.kernel_entries import entry
-from kernels.plain_closing import close_items
+from kernels.plain_closing import close_candidates
 
 from .compiled import Floats, Ints
 from .planar import StageAnswer
 from .scene import PlanarCurve, PlanarFinger, PlanarOutline
 
-put_circles = entry(family_section.put_circles)
+put_circles = entry(plane_sections.put_circles)
 EMPTY_TREE = build_tree(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
 
 
@@ -54,23 +54,23 @@ def side_rows(outline: PlanarOutline) -> Floats:
 def pack_finger(finger: PlanarFinger) -> HandArrays:
     """Return the kernel's arrays for one finger with one plane."""
     joints = len(finger.rates)
-    groups = finger.groups
+    dofs = finger.dofs
     stop = np.array([finger.limits[j] / abs(finger.rates[j]) for j in range(joints)])
-    length = np.array([finger.travel(g) for g in range(groups)])
-    for g in range(groups):
+    length = np.array([finger.travel(g) for g in range(dofs)])
+    for g in range(dofs):
         stop[finger.leader(g)] = length[g]
     sides = [side_rows(o) for o in finger.outlines]
     stadiums = [enclosing(RoundedOutline(o.vertices, s, o.radius)) for o, s in zip(finger.outlines, sides, strict=True)]
     chain = ChainArrays(
-        joint_family=_ints(np.zeros(joints)),
-        joint_group=_ints(finger.group),
+        joint_axis_group=_ints(np.zeros(joints)),
+        joint_dof=_ints(finger.dof),
         pivot=np.ascontiguousarray(finger.pivots, dtype=np.float64),
         rate=np.ascontiguousarray(finger.rates, dtype=np.float64),
         start=np.zeros(joints),
         stop=stop,
-        group_length=length,
-        speed=np.ones(groups),
-        breaks=_ints(np.zeros(groups)),
+        dof_length=length,
+        speed=np.ones(dofs),
+        breaks=_ints(np.zeros(dofs)),
     )
     outlines = OutlineArrays(
         joint=_ints([o.joint for o in finger.outlines]),
@@ -84,15 +84,15 @@ def pack_finger(finger: PlanarFinger) -> HandArrays:
         side=np.ascontiguousarray(np.vstack(sides)),
     )
     return HandArrays(
-        entry_group=_ints([0, groups]),
-        entry_family=_ints([0, 1]),
+        first_dof=_ints([0, dofs]),
+        first_axis_group=_ints([0, 1]),
         chain=chain,
         outlines=outlines,
-        family_pose=np.eye(4)[None, :3].copy(),
-        family_plane=_ints([0, 1]),
+        axis_group_pose=np.eye(4)[None, :3].copy(),
+        axis_group_plane=_ints([0, 1]),
         plane_offset=np.zeros(1),
-        family_reach=np.array([10 * finger.length]),
-        family_length=np.array([finger.length]),
+        axis_group_reach=np.array([10 * finger.length]),
+        axis_group_length=np.array([finger.length]),
         plane_outline=_ints([0, len(finger.outlines)]),
     )
 
@@ -112,19 +112,19 @@ def pack_curve(curve: PlanarCurve) -> SectionArrays:
     return sections
 
 
-def empty_answer(hand: HandArrays, items: int, contacts: int) -> ClosingArrays:
+def empty_answer(hand: HandArrays, candidates: int, contacts: int) -> ClosingArrays:
     """Return an answer to be written."""
-    groups, joints, families = len(hand.chain.group_length), len(hand.chain.rate), len(hand.family_pose)
+    dofs, joints, axis_groups = len(hand.chain.dof_length), len(hand.chain.rate), len(hand.axis_group_pose)
     return ClosingArrays(
-        np.zeros((items, groups)),
-        np.zeros((items, joints)),
-        np.zeros(items, np.int64),
-        np.zeros((items, contacts, HIT_INTEGERS), np.int64),
-        np.zeros((items, contacts, 7)),
-        np.zeros((items, families, 3, 4)),
-        np.zeros(items, np.int64),
-        np.full(items, -1, np.int64),
-        np.zeros(items, np.int64),
+        np.zeros((candidates, dofs)),
+        np.zeros((candidates, joints)),
+        np.zeros(candidates, np.int64),
+        np.zeros((candidates, contacts, CONTACT_INTEGERS), np.int64),
+        np.zeros((candidates, contacts, 7)),
+        np.zeros((candidates, axis_groups, 3, 4)),
+        np.zeros(candidates, np.int64),
+        np.full(candidates, -1, np.int64),
+        np.zeros(candidates, np.int64),
     )
 
 
@@ -140,18 +140,18 @@ def solve_planar(
 
     Args:
         finger, curve: the case. hand, sections: the same, packed in a way of their own.
-        together: all groups move at once.
+        together: all degrees of freedom move at once.
     """
     hand = pack_finger(finger) if hand is None else hand
     sections = pack_curve(curve) if sections is None else sections
-    items = ItemArrays(_ints([0]), _ints([0]), _ints([1]), np.full((1, len(finger.rates)), np.inf))
-    answer = empty_answer(hand, 1, finger.groups)
+    candidates = CandidateArrays(_ints([0]), _ints([0]), _ints([1]), np.full((1, len(finger.rates)), np.inf))
+    answer = empty_answer(hand, 1, finger.dofs)
     obj = ObjectArrays(EMPTY_TREE, no_rounds(), not curve.two_sided, no_body())
     T = np.eye(4)[:3].copy()
-    own = make_sections(1, 1, 0)  # for later families, of which there are none
-    close_items(hand, planes_only(1, 1), obj, T, (sections, own), items, answer, together=together)
-    stopped = {int(h[4]) for h in answer.hit[0, : answer.contacts[0]]}
+    own = make_sections(1, 1, 0)  # for later axis groups, of which there are none
+    close_candidates(hand, planes_only(1, 1), obj, T, (sections, own), candidates, answer, together=together)
+    stopped = {int(h[4]) for h in answer.contact[0, : answer.contacts[0]]}
     stages = tuple(
-        StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.groups)
+        StageAnswer(g, float(answer.travel[0, g]), "contact" if g in stopped else "limit") for g in range(finger.dofs)
     )
     return stages, answer

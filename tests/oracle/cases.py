@@ -50,7 +50,7 @@ def mirrored(finger: PlanarFinger, curve: PlanarCurve) -> tuple[PlanarFinger, Pl
     outlines = tuple(
         PlanarOutline(o.joint, o.vertices * flip, o.sides[:, ::-1].copy(), o.radius) for o in finger.outlines
     )
-    image = PlanarFinger(finger.pivots * flip, -finger.rates, finger.group, finger.limits, outlines)
+    image = PlanarFinger(finger.pivots * flip, -finger.rates, finger.dof, finger.limits, outlines)
     loops = tuple((loop * flip)[::-1].copy() for loop in curve.loops)
     lines = tuple(line * flip for line in curve.lines)
     return image, PlanarCurve(loops, lines, curve.disks * np.array([1.0, -1.0, 1.0]), curve.two_sided)
@@ -59,23 +59,25 @@ def mirrored(finger: PlanarFinger, curve: PlanarCurve) -> tuple[PlanarFinger, Pl
 def scaled(finger: PlanarFinger, curve: PlanarCurve, factor: float) -> tuple[PlanarFinger, PlanarCurve]:
     """Return the scene with all lengths multiplied."""
     outlines = tuple(PlanarOutline(o.joint, o.vertices * factor, o.sides, o.radius * factor) for o in finger.outlines)
-    grown = PlanarFinger(finger.pivots * factor, finger.rates, finger.group, finger.limits, outlines)
+    grown = PlanarFinger(finger.pivots * factor, finger.rates, finger.dof, finger.limits, outlines)
     loops, lines = tuple(p * factor for p in curve.loops), tuple(p * factor for p in curve.lines)
     return grown, PlanarCurve(loops, lines, curve.disks * factor, curve.two_sided)
 
 
-def random_groups(count: int, rng: Rng) -> tuple[Ints, Floats]:
-    """Return group and rate of each joint: mostly one each; some follow an earlier joint, a few of them backwards."""
-    group, rates = np.zeros(count, dtype=np.int64), np.ones(count)
+def random_dofs(count: int, rng: Rng) -> tuple[Ints, Floats]:
+    """Return degree of freedom and rate of each joint: mostly one each; some follow an earlier joint, a few of them
+    backwards.
+    """
+    dof, rates = np.zeros(count, dtype=np.int64), np.ones(count)
     coupled = rng.choice([0.0, 0.5])
     for j in range(1, count):
         if rng.random() < coupled:
-            group[j] = group[j - 1] if rng.random() < 0.7 else rng.integers(0, group[:j].max() + 1)
+            dof[j] = dof[j - 1] if rng.random() < 0.7 else rng.integers(0, dof[:j].max() + 1)
             rates[j] = rng.choice([1.0, 0.7, 1.3, rng.uniform(0.2, 1.5), -0.6])
         else:
-            group[j] = group[:j].max() + 1
+            dof[j] = dof[:j].max() + 1
             rates[j] = rng.choice([1.0, 1.0, 1.0, 1.0, -1.0])
-    return group, rates
+    return dof, rates
 
 
 def random_finger(rng: Rng, kinds: tuple[str, ...] = OUTLINE_KINDS, joints: int = 0) -> PlanarFinger:
@@ -90,9 +92,9 @@ def random_finger(rng: Rng, kinds: tuple[str, ...] = OUTLINE_KINDS, joints: int 
     for j in range(count):
         for _ in range(int(rng.choice([1, 1, 1, 2])) if j < count - 1 or outlines else 1):
             outlines.append(outline(kinds[int(rng.integers(len(kinds)))], j, lengths[j], heading[j], rng))
-    group, rates = random_groups(count, rng)
+    dof, rates = random_dofs(count, rng)
     limits = np.where(rng.random(count) < 0.1, rng.uniform(2.2, 6.2, count), rng.uniform(0.3, 2.2, count))
-    return PlanarFinger(pivots, rates, group, limits, tuple(outlines))
+    return PlanarFinger(pivots, rates, dof, limits, tuple(outlines))
 
 
 def random_curve(rng: Rng) -> PlanarCurve:
@@ -103,22 +105,22 @@ def random_curve(rng: Rng) -> PlanarCurve:
 
 def is_open(finger: PlanarFinger, curve: PlanarCurve) -> bool:
     """Tell whether the open finger is clear of the curve."""
-    return gap_at(finger, curve, np.zeros(finger.groups)) >= 0.0
+    return gap_at(finger, curve, np.zeros(finger.dofs)) >= 0.0
 
 
 def placed_vertices(finger: PlanarFinger, parameters: Floats, index: int) -> Floats:
-    """Return the core vertices (n, 2) of an outline, in the plane, at group parameters."""
+    """Return the core vertices (n, 2) of an outline, in the plane, at degree of freedom parameters."""
     return place(finger.packed, index, finger.angles(parameters))[1]
 
 
 def pushed_against(finger: PlanarFinger, curve: PlanarCurve, angle: float, rng: Rng) -> PlanarCurve:
     """Return the curve moved in from outside, from the side at ``angle``, to touch the open finger to about 1e-15."""
     o = int(rng.integers(len(finger.outlines)))
-    target = placed_vertices(finger, np.zeros(finger.groups), o).mean(axis=0)
+    target = placed_vertices(finger, np.zeros(finger.dofs), o).mean(axis=0)
     inward = -np.array([np.cos(angle), np.sin(angle)])
     curve = curve.moved(target - 4.0 * (finger.length + 0.1) * inward)
     for _ in range(400):
-        gap = gap_at(finger, curve, np.zeros(finger.groups))
+        gap = gap_at(finger, curve, np.zeros(finger.dofs))
         if gap <= 1e-15 or gap > 1.0:
             break
         curve = curve.moved(gap * inward)
@@ -129,7 +131,7 @@ def _anywhere(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
     finger = random_finger(rng)
     for _ in range(TRIES):
         curve = random_curve(rng)
-        parameters = np.array([finger.travel(g) * rng.uniform(0.0, 1.0) for g in range(finger.groups)])
+        parameters = np.array([finger.travel(g) * rng.uniform(0.0, 1.0) for g in range(finger.dofs)])
         goal = placed_vertices(finger, parameters, int(rng.integers(len(finger.outlines))))[0]
         curve = curve.moved(goal + rng.normal(0.0, 0.01, 2))
         if is_open(finger, curve):
@@ -148,7 +150,7 @@ def _grazing(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
     finger = random_finger(rng, joints=int(rng.choice([1, 1, 2])))
     reach = 0.0
     for o in range(len(finger.outlines)):
-        away = placed_vertices(finger, np.zeros(finger.groups), o) - finger.pivots[0]
+        away = placed_vertices(finger, np.zeros(finger.dofs), o) - finger.pivots[0]
         reach = max(reach, float(np.max(np.hypot(away[:, 0], away[:, 1]))) + finger.outlines[o].radius)
     swept = PlanarOutline(0, np.zeros((1, 2)), ring_of_sides(1), reach)
     one = np.ones(1)
@@ -163,7 +165,7 @@ def _vertex_on_vertex(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
     finger = random_finger(rng, ("box", "convex", "nonconvex", "blade"), joints=int(rng.choice([1, 2])))
     for _ in range(TRIES):
         loop = CURVES[str(rng.choice(["box", "star", "needle", "blade"]))](0.02, rng).loops[0]
-        parameters = np.zeros(finger.groups)
+        parameters = np.zeros(finger.dofs)
         parameters[0] = finger.travel(0) * rng.uniform(0.1, 0.9)
         core = placed_vertices(finger, parameters, 0)
         curve = PlanarCurve((loop - loop[int(rng.integers(len(loop)))] + core[int(rng.integers(len(core)))],))
@@ -191,7 +193,7 @@ def _flush(rng: Rng) -> tuple[PlanarFinger, PlanarCurve]:
     core[:, 1] = np.where(core[:, 1] > core[:, 1].mean(), core[:, 1].max(), core[:, 1].min())
     top = float(core[:, 1].max() + radius)
     link = PlanarOutline(0, core, ring_of_sides(len(core)), float(radius))
-    finger = PlanarFinger(finger.pivots, np.ones(1), finger.group, np.array([1.5]), (link,))
+    finger = PlanarFinger(finger.pivots, np.ones(1), finger.dof, np.array([1.5]), (link,))
     ends = np.sort(rng.choice([0.0, 0.3 * length, length, 1.4 * length, *core[:2, 0]], 2, replace=False))
     face = rectangle(ends[0], max(ends[1], ends[0] + 1e-3), top, top + rng.choice([0.01, 1e-4]))
     return finger, PlanarCurve((turned(face, float(rng.choice([0.0, rng.uniform(0.1, 1.4)]))) + finger.pivots[0],))

@@ -22,7 +22,7 @@ class StageVerdict:
     deeper than the tolerance: neither right nor wrong. ``unresolved``: the walk gave up before it proved the path.
     """
 
-    group: int
+    dof: int
     failures: tuple[str, ...]
     grazing: bool
     unresolved: bool
@@ -46,7 +46,7 @@ class Verdict:
     @property
     def failures(self) -> tuple[str, ...]:
         """Return all sentences."""
-        return tuple(f"stage {s.group}: {f}" for s in self.stages for f in s.failures)
+        return tuple(f"stage {s.dof}: {f}" for s in self.stages for f in s.failures)
 
     @property
     def grazing(self) -> int:
@@ -60,32 +60,32 @@ class Verdict:
 
 
 def check_answer(finger: PlanarFinger, curve: PlanarCurve, stages: Sequence[StageAnswer]) -> Verdict:
-    """Judge an answer, one entry per group in order; see ``StageVerdict``."""
+    """Judge an answer, one entry per degree of freedom in order; see ``StageVerdict``."""
     if overlaps_at_start(finger, curve):
         return Verdict((), True)
-    if [stage.group for stage in stages] != list(range(finger.groups)):
+    if [stage.dof for stage in stages] != list(range(finger.dofs)):
         return Verdict((_refused(0, "the answer has not exactly one stage per group, in order"),), False)
-    parameters = np.zeros(finger.groups)
+    parameters = np.zeros(finger.dofs)
     verdicts = []
     for stage in stages:
         verdicts.append(_check_stage(finger, curve, parameters, stage))
-        parameters[stage.group] = stage.parameter
+        parameters[stage.dof] = stage.parameter
     return Verdict(tuple(verdicts), False)
 
 
-def _refused(group: int, sentence: str) -> StageVerdict:
-    return StageVerdict(group, (sentence,), False, False, np.nan, np.nan, 0)
+def _refused(dof: int, sentence: str) -> StageVerdict:
+    return StageVerdict(dof, (sentence,), False, False, np.nan, np.nan, 0)
 
 
 def _check_stage(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, stage: StageAnswer) -> StageVerdict:
-    travel = finger.travel(stage.group)
+    travel = finger.travel(stage.dof)
     if not -1e-12 <= stage.parameter <= travel * (1 + 1e-12):
-        return _refused(stage.group, f"parameter {stage.parameter} is outside 0 .. {travel}")
+        return _refused(stage.dof, f"parameter {stage.parameter} is outside 0 .. {travel}")
     tolerance = finger.tolerance
-    walk = walk_stage(finger, curve, parameters, stage.group, 0.0, stage.parameter)
+    walk = walk_stage(finger, curve, parameters, stage.dof, 0.0, stage.parameter)
     end = parameters.copy()
-    end[stage.group] = stage.parameter
-    gap = gap_at(finger, curve, end, finger.leader(stage.group))
+    end[stage.dof] = stage.parameter
+    gap = gap_at(finger, curve, end, finger.leader(stage.dof))
     failures = []
     unresolved = walk.violation is not None and not walk.violation.proven
     if walk.violation is not None and walk.violation.proven:
@@ -104,7 +104,7 @@ def _check_stage(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, s
         grazing = stop == "grazing"
         if stop == "free":
             failures.append("ended by contact at 0, but going on only opens the gap")
-    return StageVerdict(stage.group, tuple(failures), grazing, unresolved, gap, walk.least_gap, walk.looks)
+    return StageVerdict(stage.dof, tuple(failures), grazing, unresolved, gap, walk.least_gap, walk.looks)
 
 
 def _kind_of_stop(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, stage: StageAnswer) -> str:
@@ -113,18 +113,18 @@ def _kind_of_stop(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, 
     True: going on by at most 1e-3 violates, or only the limit is left. Free: the stage never moved, though from its
     start the gap never shrinks and soon is open. All else is a touch too shallow to judge.
     """
-    far = min(stage.parameter + BEYOND / abs(finger.rates[finger.leader(stage.group)]), finger.travel(stage.group))
+    far = min(stage.parameter + BEYOND / abs(finger.rates[finger.leader(stage.dof)]), finger.travel(stage.dof))
     if far <= stage.parameter * (1 + 1e-12):
         return "stop"
-    if walk_stage(finger, curve, parameters, stage.group, stage.parameter, far).violation is not None:
+    if walk_stage(finger, curve, parameters, stage.dof, stage.parameter, far).violation is not None:
         return "stop"
     if stage.parameter > 0.0:
         return "grazing"
     gaps = []
     for probe in np.concatenate([[0.0], PROBES[far >= PROBES]]):
         trial = parameters.copy()
-        trial[stage.group] = probe
-        gaps.append(gap_at(finger, curve, trial, finger.leader(stage.group)))
+        trial[stage.dof] = probe
+        gaps.append(gap_at(finger, curve, trial, finger.leader(stage.dof)))
     noise = 1e-6 * finger.tolerance
     opens = max(gaps) > gaps[0] + finger.tolerance
     return "free" if opens and min(gaps) >= gaps[0] - noise else "grazing"

@@ -35,9 +35,11 @@ BUDGET_PER_OUTLINE = 300_000
 
 @dataclass(frozen=True)
 class StageAnswer:
-    """How one stage ended: the group's parameter there (at least 0), and by what. Blocked at once: ``contact`` at 0."""
+    """How one stage ended: the degree of freedom's parameter there (at least 0), and by what. Blocked at once:
+    ``contact`` at 0.
+    """
 
-    group: int
+    dof: int
     parameter: float
     ended: Ended
 
@@ -46,7 +48,7 @@ class StageAnswer:
 class Violation:
     """The first place on a path with a gap of ``-tolerance`` or less; not ``proven``: the walk gave up there."""
 
-    group: int
+    dof: int
     parameter: float
     outline: int
     last_open: float
@@ -63,22 +65,24 @@ class Walk:
 
 
 def gap_at(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, first_joint: int = 0) -> float:
-    """Return the least signed gap [m] of the outlines from ``first_joint`` outwards at group parameters (G,)."""
+    """Return the least signed gap [m] of the outlines from ``first_joint`` outwards at degree of freedom parameters
+    (G,).
+    """
     return float(finger_gap(finger.packed, curve.packed, finger.angles(parameters), first_joint)[0])
 
 
 def overlaps_at_start(finger: PlanarFinger, curve: PlanarCurve) -> bool:
     """Tell whether the open finger is already deeper in the curve than the tolerance."""
-    return gap_at(finger, curve, np.zeros(finger.groups)) < -finger.tolerance
+    return gap_at(finger, curve, np.zeros(finger.dofs)) < -finger.tolerance
 
 
 def pieces(
-    finger: PlanarFinger, parameters: Floats, group: int, start: float, end: float
+    finger: PlanarFinger, parameters: Floats, dof: int, start: float, end: float
 ) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Yield (base, rates, span) of a stage, cut where a follower reaches its limit; angles are base + rates * s."""
-    members = finger.group == group
+    members = finger.dof == dof
     arrests = np.where(members, finger.limits / np.abs(finger.rates), np.inf)
-    arrests[finger.leader(group)] = np.inf
+    arrests[finger.leader(dof)] = np.inf
     cuts = [start, *sorted({float(a) for a in arrests if start < a < end}), end]
     held = finger.angles(parameters)
     for a, b in pairwise(cuts):
@@ -88,39 +92,42 @@ def pieces(
 
 
 def walk_stage(
-    finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, group: int, start: float, end: float
+    finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, dof: int, start: float, end: float
 ) -> Walk:
-    """Walk a stage from ``start`` to ``end``, the other groups at ``parameters``, and report the first violation."""
-    leader = finger.leader(group)
+    """Walk a stage from ``start`` to ``end``, the other degrees of freedom at ``parameters``, and report the first
+    violation.
+    """
+    leader = finger.leader(dof)
     least, looks, last_open = np.inf, 0, np.nan
-    for base, rate, span in pieces(finger, parameters, group, start, end):
+    for base, rate, span in pieces(finger, parameters, dof, start, end):
         status, s, open_at, low, outline, count = march_all(
             finger.packed, curve.packed, base, rate, span, leader, finger.tolerance, BUDGET_PER_OUTLINE
         )
         least, looks = min(least, low), looks + count
         last_open = last_open if np.isnan(open_at) else open_at
         if status in (VIOLATED, BUDGET):
-            return Walk(Violation(group, s, outline, last_open, status == VIOLATED), least, looks)
+            return Walk(Violation(dof, s, outline, last_open, status == VIOLATED), least, looks)
     return Walk(None, least, looks)
 
 
-def oracle_stage(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, group: int) -> StageAnswer:
-    """Advance one group from 0, the others at ``parameters`` (G,), to its first contact or its leader's limit.
+def oracle_stage(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, dof: int) -> StageAnswer:
+    """Advance one degree of freedom from 0, the others at ``parameters`` (G,), to its first contact or its leader's
+    limit.
 
     Raises ``ArithmeticError`` where the walk takes too many steps to prove anything.
     """
-    travel = finger.travel(group)
-    violation = walk_stage(finger, curve, parameters, group, 0.0, travel).violation
+    travel = finger.travel(dof)
+    violation = walk_stage(finger, curve, parameters, dof, 0.0, travel).violation
     if violation is None:
-        return StageAnswer(group, travel, "limit")
+        return StageAnswer(dof, travel, "limit")
     if not violation.proven:
-        raise ArithmeticError(f"group {group} could not be walked past {violation.parameter}")
-    return StageAnswer(group, _last_touch(finger, curve, parameters, violation), "contact")
+        raise ArithmeticError(f"group {dof} could not be walked past {violation.parameter}")
+    return StageAnswer(dof, _last_touch(finger, curve, parameters, violation), "contact")
 
 
 def _last_touch(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, violation: Violation) -> float:
     """Return the parameter of gap 0 next before a violation, by bisection; 0 if the gap was never open."""
-    leader = finger.leader(violation.group)
+    leader = finger.leader(violation.dof)
     open_at, shut_at = violation.last_open, violation.parameter
     if np.isnan(open_at):
         return 0.0
@@ -129,7 +136,7 @@ def _last_touch(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, vi
         middle = 0.5 * (open_at + shut_at)
         if middle in (open_at, shut_at):
             break
-        trial[violation.group] = middle
+        trial[violation.dof] = middle
         if gap_at(finger, curve, trial, leader) >= 0.0:
             open_at = middle
         else:
@@ -138,12 +145,12 @@ def _last_touch(finger: PlanarFinger, curve: PlanarCurve, parameters: Floats, vi
 
 
 def oracle_close(finger: PlanarFinger, curve: PlanarCurve) -> tuple[StageAnswer, ...]:
-    """Close proximal first: one stage per group, each from the posture where the ones before it ended."""
-    parameters = np.zeros(finger.groups)
+    """Close proximal first: one stage per degree of freedom, each from the posture where the ones before it ended."""
+    parameters = np.zeros(finger.dofs)
     answers = []
-    for group in range(finger.groups):
-        answers.append(oracle_stage(finger, curve, parameters, group))
-        parameters[group] = answers[-1].parameter
+    for dof in range(finger.dofs):
+        answers.append(oracle_stage(finger, curve, parameters, dof))
+        parameters[dof] = answers[-1].parameter
     return tuple(answers)
 
 
@@ -152,10 +159,10 @@ def earliest_violation(finger: PlanarFinger, curve: PlanarCurve, stages: Sequenc
 
     Not a sampling: the steps are bounded such that nothing between two evaluations can be deeper.
     """
-    parameters = np.zeros(finger.groups)
+    parameters = np.zeros(finger.dofs)
     for stage in stages:
-        walk = walk_stage(finger, curve, parameters, stage.group, 0.0, stage.parameter)
+        walk = walk_stage(finger, curve, parameters, stage.dof, 0.0, stage.parameter)
         if walk.violation is not None:
             return walk.violation
-        parameters[stage.group] = stage.parameter
+        parameters[stage.dof] = stage.parameter
     return None

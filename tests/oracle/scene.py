@@ -29,16 +29,18 @@ class PlanarOutline:
 
 @dataclass(frozen=True, eq=False)
 class PlanarFinger:
-    """A planar chain that closes in stages, one per group, groups ordered by their most proximal joint (the leader).
+    """A planar chain that closes in stages, one per degree of freedom, degrees of freedom ordered by their most
+    proximal joint (the leader).
 
     ``pivots`` (J, 2): offset of a joint's pivot from the one before at the open posture, the first from the origin.
-    ``rates`` (J,): turning of a joint per unit of its group's parameter. ``group`` (J,): index of its group.
-    ``limits`` (J,): largest travel ``|angle|`` from open; a follower stays at its limit while the leader goes on.
+    ``rates`` (J,): turning of a joint per unit of its degree of freedom's parameter. ``degree of freedom`` (J,): index
+    of its degree of freedom. ``limits`` (J,): largest travel ``|angle|`` from open; a follower stays at its limit while
+    the leader goes on.
     """
 
     pivots: Floats
     rates: Floats
-    group: Ints
+    dof: Ints
     limits: Floats
     outlines: tuple[PlanarOutline, ...]
 
@@ -54,22 +56,22 @@ class PlanarFinger:
         return 1e-8 * self.length
 
     @property
-    def groups(self) -> int:
-        """Return the number of groups, which is the number of stages."""
-        return int(self.group.max()) + 1
+    def dofs(self) -> int:
+        """Return the number of degrees of freedom, which is the number of stages."""
+        return int(self.dof.max()) + 1
 
-    def leader(self, group: int) -> int:
-        """Return the most proximal joint of a group."""
-        return int(np.flatnonzero(self.group == group)[0])
+    def leader(self, dof: int) -> int:
+        """Return the most proximal joint of a degree of freedom."""
+        return int(np.flatnonzero(self.dof == dof)[0])
 
-    def travel(self, group: int) -> float:
-        """Return the parameter at which the group's leader reaches its limit."""
-        leader = self.leader(group)
+    def travel(self, dof: int) -> float:
+        """Return the parameter at which the degree of freedom's leader reaches its limit."""
+        leader = self.leader(dof)
         return float(self.limits[leader] / abs(self.rates[leader]))
 
     def angles(self, parameters: Floats) -> Floats:
-        """Return the joint angles (J,) for group parameters (G,), followers held at their limits."""
-        free = self.rates * parameters[self.group]
+        """Return the joint angles (J,) for degree of freedom parameters (G,), followers held at their limits."""
+        free = self.rates * parameters[self.dof]
         return np.clip(free, -self.limits, self.limits)
 
     @cached_property

@@ -37,7 +37,7 @@ def judge(seed: int, count: int, start: int = 0) -> tuple[Counter[str], list[str
         counted["overlap"] += verdict.overlaps_at_start
         counted["stages"] += len(verdict.stages)
         counted["contacts"] += sum(s.ended == "contact" for s in stages) if verdict.stages else 0
-        counted["coupled"] += len(case.finger.rates) > case.finger.groups
+        counted["coupled"] += len(case.finger.rates) > case.finger.dofs
         counted["grazing"] += verdict.grazing
         counted["unresolved"] += verdict.unresolved
         if not verdict.ok:

@@ -215,7 +215,7 @@ def boundary(points: Floats, closed: bool, count: int = 400) -> Floats:
 @pytest.mark.parametrize("index", range(40))
 def test_a_positive_gap_is_the_distance_that_sampling_finds(index: int) -> None:
     case = make_case(11, index)
-    start = np.zeros(case.finger.groups)
+    start = np.zeros(case.finger.dofs)
     gap = gap_at(case.finger, case.curve, start)
     if gap <= 0.0:
         assert overlaps_at_start(case.finger, case.curve) or gap > -case.finger.tolerance
@@ -255,11 +255,11 @@ def test_the_oracle_passes_its_own_check_on_every_kind_of_scene() -> None:
 
 def test_sampling_finds_nothing_before_the_oracles_stop() -> None:
     for case, answer in solved(4, 120):
-        finger, parameters = case.finger, np.zeros(case.finger.groups)
+        finger, parameters = case.finger, np.zeros(case.finger.dofs)
         for stage in answer:
             for share in np.linspace(0, 1, 60):
-                parameters[stage.group] = share * stage.parameter
-                gap = gap_at(finger, case.curve, parameters, finger.leader(stage.group))
+                parameters[stage.dof] = share * stage.parameter
+                gap = gap_at(finger, case.curve, parameters, finger.leader(stage.dof))
                 assert gap >= -finger.tolerance * (1 + 1e-6), (case.name, case.index)
 
 
@@ -284,8 +284,8 @@ def test_wrong_answers_are_refused() -> None:
 
 
 def early(case: PlanarCase, first: StageAnswer) -> Floats:
-    """Return the parameters with the first group a little short of its stop."""
-    parameters = np.zeros(case.finger.groups)
+    """Return the parameters with the first degree of freedom a little short of its stop."""
+    parameters = np.zeros(case.finger.dofs)
     parameters[0] = first.parameter - 1e-3
     return parameters
 

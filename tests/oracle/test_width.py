@@ -1,4 +1,4 @@
-"""The exact width against another engine: random fingers and objects, blades and needles between the planes."""
+"""The full width against another engine: random fingers and objects, blades and needles between the planes."""
 
 from collections import Counter
 

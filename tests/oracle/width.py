@@ -1,4 +1,4 @@
-"""An oracle for the exact width: python-fcl's distances along the closing path (docs/method.md sections 5 and 8).
+"""An oracle for the full width: python-fcl's distances along the closing path (docs/method.md sections 5 and 8).
 
 Nothing of the project's kernels: where the links are is forward kinematics of the hand, how far they are is the other
 engine's. Advancing by distance over speed passes nothing that is thicker than the smallest step.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from clench.closing.candidates import FingerCandidate, Touch
+from clench.closing.candidates import FingerCandidate, LinkContact
 from clench.closing.finger_plan import plan_finger
 from clench.models.shapes import CollisionSource
 from small_chain import CLOSING, chain
@@ -26,7 +26,7 @@ def touch(**changes):
         "curve_angle": 0.0,
         "link_angle": 0.0,
     }
-    return Touch(**{**values, **changes})
+    return LinkContact(**{**values, **changes})
 
 
 def candidate(travel=(0.3, 0.4), **changes):

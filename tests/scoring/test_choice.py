@@ -16,7 +16,7 @@ from clench.scoring.choice import choose
 from clench.scoring.criterion_types import ScoringContext
 from clench.scoring.explaining import explain_choice
 
-SETTING = ScoringContext(HAND, np.zeros(2))
+CONTEXT = ScoringContext(HAND, np.zeros(2))
 CALIBRATION = Calibration(weights={"range_of_motion": 1.0})
 
 
@@ -26,7 +26,7 @@ def moved(value, **changes):
 
 
 def chosen(sets, calibration=CALIBRATION):
-    return choose([sets], calibration, SETTING).chosen[0]
+    return choose([sets], calibration, CONTEXT).chosen[0]
 
 
 def test_the_best_score_wins_and_ties_go_to_the_full_width_then_to_the_first():
@@ -56,7 +56,7 @@ def test_where_only_fingertips_count_one_that_touches_with_another_link_first_co
     second = candidate((0.9, 0.9), touches=(touch(link=tip), touch(link=1)))
     assert tip != 1
     assert chosen([first, second]) == 0
-    assert choose([[first, second]], CALIBRATION, replace(SETTING, tip_only=True)).chosen == [1]
+    assert choose([[first, second]], CALIBRATION, replace(CONTEXT, tip_only=True)).chosen == [1]
 
 
 def test_one_that_passes_through_nothing_goes_before_one_that_does():
@@ -73,7 +73,7 @@ def test_one_outside_a_limit_comes_after_those_inside():
 def test_sets_that_a_criterion_says_nothing_about_come_after_those_it_does():
     calibration = Calibration(weights={"pad_indentation": 1.0, "range_of_motion": 1.0})
     assert chosen([moved(0.0), moved(1.0, penetration=1e-4)], calibration) == 1
-    choice = choose([[moved(0.0), moved(1.0)]], calibration, SETTING)
+    choice = choose([[moved(0.0), moved(1.0)]], calibration, CONTEXT)
     assert choice.chosen == [0]
     assert choice.used == ("range_of_motion",)
     assert choice.unused == ("pad_indentation",)
@@ -113,7 +113,7 @@ def test_more_weight_never_worsens_what_it_is_given_to(pairs, less, more):
 def test_additive_criteria_choose_as_exhaustive_search_does(groups):
     calibration = Calibration(weights={"range_of_motion": 0.7, "limit_distance": 2.0})
     sets = [[candidate(pair) for pair in pairs] for pairs in groups]
-    choice = choose(sets, calibration, SETTING)
+    choice = choose(sets, calibration, CONTEXT)
 
     def total(places):
         return sum(
@@ -138,7 +138,7 @@ class Together:
     scale: ClassVar[float] = 1.0
     larger_is_better: ClassVar[bool] = False
 
-    def score_hand(self, chosen, setting):
+    def score_hand(self, chosen, context):
         moved = [c.travel[0] for c in chosen]
         return float(max(moved) - min(moved))
 
@@ -151,9 +151,9 @@ def together(monkeypatch):
 def test_a_criterion_of_the_hand_outweighs_the_fingers_own(together):
     sets = [[moved(0.1), moved(0.5)], [moved(0.5), moved(0.6)]]
     weights = {"range_of_motion": 1.0, "together": 0.5}
-    alone = choose(sets, Calibration(weights=weights), SETTING)
+    alone = choose(sets, Calibration(weights=weights), CONTEXT)
     assert alone.chosen == [0, 0]
-    choice = choose(sets, Calibration(weights={**weights, "together": 2.0}), SETTING)
+    choice = choose(sets, Calibration(weights={**weights, "together": 2.0}), CONTEXT)
     assert choice.chosen == [1, 0]
     assert choice.hand_scores == {"together": 0.0}
     assert choice.used == ("range_of_motion", "together")
@@ -163,14 +163,14 @@ def test_a_criterion_of_the_hand_outweighs_the_fingers_own(together):
 def test_a_limit_on_a_criterion_of_the_hand_holds(together):
     sets = [[moved(0.1), moved(0.5)], [moved(0.5), moved(0.6)]]
     limited = Calibration(weights={"range_of_motion": 1.0}, limits={"together": 0.15})
-    assert choose(sets, limited, SETTING).chosen == [1, 0]
+    assert choose(sets, limited, CONTEXT).chosen == [1, 0]
 
 
 def test_a_search_that_ends_without_a_proof_says_so(together):
     """Nothing bounds this criterion, and 8³ combinations are more than are all tried."""
     weights = Calibration(weights={"range_of_motion": 1.0, "together": 0.5})
     sets = [[moved(0.1 * k + 0.01 * n) for k in range(8)] for n in range(3)]
-    many, few = choose(sets, weights, SETTING), choose([group[:3] for group in sets], weights, SETTING)
+    many, few = choose(sets, weights, CONTEXT), choose([group[:3] for group in sets], weights, CONTEXT)
     assert (many.proved, few.proved) == (False, True)
     assert few.tried == 27
     assert explain_choice(many, sets)["text"].endswith(

@@ -18,7 +18,7 @@ from clench.scoring.criterion_registry import (
 )
 from clench.scoring.criterion_types import ScoringContext
 
-SETTING = ScoringContext(HAND, np.array([0.1, 0.0]))
+CONTEXT = ScoringContext(HAND, np.array([0.1, 0.0]))
 
 
 class Gentle:
@@ -28,7 +28,7 @@ class Gentle:
     scale: ClassVar[float] = 2.0
     larger_is_better: ClassVar[bool] = False
 
-    def score(self, candidate, setting):
+    def score(self, candidate, context):
         return float(candidate.travel.max())
 
 
@@ -42,9 +42,9 @@ def test_a_users_criterion_is_scored_where_it_is_asked_for():
     register_criterion(Gentle())
     assert "gentle" in criterion_names()
     c = candidate((0.3, 0.4))
-    score_sets([c], [], SETTING)
+    score_sets([c], [], CONTEXT)
     assert "gentle" not in c.scores
-    score_sets([c], ["gentle"], SETTING)
+    score_sets([c], ["gentle"], CONTEXT)
     assert c.scores["gentle"] == 0.4
     assert c.scores["range_of_motion"] == pytest.approx(0.6)
 
@@ -88,9 +88,9 @@ def test_a_scale_must_be_above_zero(scale):
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_a_value_that_is_no_number_is_refused_with_the_criterions_name(value):
-    register_criterion(type("Odd", (Gentle,), {"score": lambda self, candidate, setting: value})())
+    register_criterion(type("Odd", (Gentle,), {"score": lambda self, candidate, context: value})())
     with pytest.raises(CommandError, match=r"'gentle'.*finite number"):
-        score_sets([candidate()], ["gentle"], SETTING)
+        score_sets([candidate()], ["gentle"], CONTEXT)
 
 
 @pytest.mark.parametrize("weight", [-1.0, float("nan"), float("inf")])
@@ -132,4 +132,4 @@ def test_values_that_are_no_numbers_to_sum_are_refused(value, monkeypatch):
     monkeypatch.setattr(Gentle, "score", lambda *_: value)
     register_criterion(Gentle())
     with pytest.raises(CommandError, match=r"criterion 'gentle': gave .*; expected "):
-        score_sets([candidate((0.3, 0.4))], ["gentle"], SETTING)
+        score_sets([candidate((0.3, 0.4))], ["gentle"], CONTEXT)

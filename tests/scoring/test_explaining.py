@@ -15,12 +15,12 @@ from clench.scoring.choice import choose
 from clench.scoring.criterion_types import ScoringContext
 from clench.scoring.explaining import explain_choice, pareto_front
 
-SETTING = ScoringContext(HAND, np.zeros(2))
+CONTEXT = ScoringContext(HAND, np.zeros(2))
 CALIBRATION = Calibration(weights={"range_of_motion": 1.0, "limit_distance": 0.5})
 
 
 def explained(groups, calibration=CALIBRATION):
-    return explain_choice(choose(groups, calibration, SETTING), groups)
+    return explain_choice(choose(groups, calibration, CONTEXT), groups)
 
 
 @settings(deadline=None)
@@ -97,7 +97,7 @@ def test_a_criterion_of_the_hand_that_overrules_a_finger_is_said(monkeypatch):
         scale: ClassVar[float] = 1.0
         larger_is_better: ClassVar[bool] = True
 
-        def score_hand(self, chosen, setting):
+        def score_hand(self, chosen, context):
             return float(chosen[0].travel[0])
 
     monkeypatch.setattr(criterion_registry, "_registry", {**criterion_registry._registry, "far": Far()})

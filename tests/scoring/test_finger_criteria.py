@@ -51,11 +51,11 @@ def test_limit_distance_is_the_nearest_as_a_fraction_of_the_range():
 def test_the_next_step_takes_the_time_of_the_slowest_joint():
     fast = replace(HAND, joints=(replace(HAND.joints[0], velocity=10.0), HAND.joints[1]))
     c = candidate((0.3, 0.4))
-    setting = ScoringContext(fast, START, steps=(np.array([1.3, 0.2]),))
-    assert find_criterion("next_step_time", "test").score(c, setting) == pytest.approx(
+    context = ScoringContext(fast, START, steps=(np.array([1.3, 0.2]),))
+    assert find_criterion("next_step_time", "test").score(c, context) == pytest.approx(
         max(1.0 / 10.0, 0.2 / DEFAULT_SPEED)
     )
-    assert find_criterion("next_step_distance", "test").score(c, setting) == pytest.approx(1.2)
+    assert find_criterion("next_step_distance", "test").score(c, context) == pytest.approx(1.2)
 
 
 def test_steps_follow_each_other_and_leave_joints_alone_that_they_do_not_name():

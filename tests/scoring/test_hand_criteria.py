@@ -24,7 +24,7 @@ from clench.scoring.choice import choose
 from clench.scoring.criterion_registry import find_criterion
 from clench.scoring.criterion_types import ScoringContext
 from clench.solver.alternatives import finger_sets
-from clench.solver.problem import make_problem, make_setting
+from clench.solver.problem import make_context, make_problem
 
 MUG = clench.GraspObject.load("mug")
 SEEN = {}
@@ -35,20 +35,20 @@ class Spy:
 
     name, unit, source, scale, larger_is_better = "spy", "-", "test", 1.0, True
 
-    def score_hand(self, chosen, setting):
-        SEEN.update(chosen=list(chosen), setting=setting)
+    def score_hand(self, chosen, context):
+        SEEN.update(chosen=list(chosen), context=context)
         return 0.0
 
 
 @pytest.fixture
 def chosen(monkeypatch):
-    """Return the chosen sets of a solve, and their setting."""
+    """Return the chosen sets of a solve, and their context."""
 
     def solve(hand, obj, command):
         with monkeypatch.context() as patch:
             patch.setattr(criterion_registry, "_registry", {**criterion_registry._registry, "spy": Spy()})
             solution = clench.solve(hand, obj, command)
-        return SEEN["chosen"], SEEN["setting"], solution
+        return SEEN["chosen"], SEEN["context"], solution
 
     return solve
 
@@ -58,34 +58,34 @@ def mug_command(**changes):
     return clench.GraspCommand(hand_pose=pose, criteria={"spy": 1.0}, **{"preshape": "open", **changes})
 
 
-def score(name, sets, setting):
-    return find_criterion(name, "test").score_hand(sets, setting)
+def score(name, sets, context):
+    return find_criterion(name, "test").score_hand(sets, context)
 
 
 def test_steadiness_is_epsilon_of_all_contacts(chosen):
     hand = clench.Hand.load("robonaut2")
-    sets, setting, _ = chosen(hand, MUG, mug_command())
+    sets, context, _ = chosen(hand, MUG, mug_command())
     touches = [t for c in sets for t in c.holding]
     friction = [pair_friction(hand, t.link, MUG.bodies[t.body]) for t in touches]
     contacts = make_contacts([t.position for t in touches], [-t.normal for t in touches], friction)
     mass = mass_properties(MUG)
-    T = setting.T_palm_object
+    T = context.T_palm_object
     held = held_by_contacts(contacts, T[:3, :3] @ mass.center + T[:3, 3], mass.length)
-    found = score("steadiness", sets, setting)
+    found = score("steadiness", sets, context)
     assert found == pytest.approx(epsilon(held).radius, rel=1e-9, abs=1e-12)
     assert found > epsilon_bound(held) > 0.0
-    assert score("steadiness", [], setting) == 0.0
+    assert score("steadiness", [], context) == 0.0
 
 
 def test_what_is_prepared_at_once_is_what_is_found_one_by_one(chosen):
-    sets, setting, _ = chosen(clench.Hand.load("robonaut2"), MUG, mug_command())
-    alone = score("steadiness", sets, setting)
-    setting.kept.clear()
-    find_criterion("steadiness", "test").prepare([replace(sets[0], touches=()), *sets], setting)
-    kept = {key for key in setting.kept if "wrenches" in key}
+    sets, context, _ = chosen(clench.Hand.load("robonaut2"), MUG, mug_command())
+    alone = score("steadiness", sets, context)
+    context.kept.clear()
+    find_criterion("steadiness", "test").prepare([replace(sets[0], touches=()), *sets], context)
+    kept = {key for key in context.kept if "wrenches" in key}
     assert len(kept) == len(sets) + 1
-    assert score("steadiness", sets, setting) == pytest.approx(alone, rel=1e-12)
-    assert {key for key in setting.kept if "wrenches" in key} == kept
+    assert score("steadiness", sets, context) == pytest.approx(alone, rel=1e-12)
+    assert {key for key in context.kept if "wrenches" in key} == kept
 
 
 @pytest.mark.parametrize("seed", [0, 2, 7])
@@ -96,12 +96,12 @@ def test_the_steadiest_of_all_combinations_is_chosen(seed):
     command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1, 0.2), preshape="open")
     problem = make_problem(hand, MUG, command)
     calibration = Calibration("steady", {"range_of_motion": 0.2, "steadiness": 1.0})
-    setting = make_setting(problem, calibration)
+    context = make_context(problem, calibration)
     groups = finger_sets(problem)
-    choice = choose(groups, calibration, setting)
+    choice = choose(groups, calibration, context)
     totals = {}
     for sets in itertools.product(*(finger.equals for finger in choice.fingers)):
-        steady = score("steadiness", [g[i] for g, i in zip(groups, sets, strict=True)], setting)
+        steady = score("steadiness", [g[i] for g, i in zip(groups, sets, strict=True)], context)
         own = sum(f.totals[i] for f, i in zip(choice.fingers, sets, strict=True))
         totals[sets] = own + calibration.worth("steadiness", steady)
     assert choice.proved
@@ -121,15 +121,15 @@ def pincer(height=0.035, **changes):
 
 def held_ball(chosen, hand):
     command = clench.GraspCommand(hand_pose=Pose.identity(), criteria={"spy": 1.0}, preshape="open")
-    sets, setting, _ = chosen(hand, clench.GraspObject.load("sphere:r=0.02"), command)
-    return sets, setting
+    sets, context, _ = chosen(hand, clench.GraspObject.load("sphere:r=0.02"), command)
+    return sets, context
 
 
 def test_the_least_torque_agrees_with_statics(chosen):
     """Two opposed fingers and a weight: what the lower one carries and both squeeze, balanced about both joints."""
-    sets, setting = held_ball(chosen, pincer())
+    sets, context = held_ball(chosen, pincer())
     below, above = (next(t for t in c.holding) for c in sorted(sets, key=lambda c: c.holding[0].position[2]))
-    found = score("actuation_force", sets, setting)
+    found = score("actuation_force", sets, context)
     # Planar statics: forces (x, z) at both contacts inside the cones, and a fine grid over the one that is free.
     points = np.array([below.position, above.position])[:, [0, 2]]
     normals = -np.array([below.normal, above.normal])[:, [0, 2]]
@@ -149,22 +149,22 @@ def test_the_least_torque_agrees_with_statics(chosen):
 
 def test_any_way_is_no_less_than_one_way(chosen):
     hand = clench.Hand.load("robonaut2")
-    sets, setting, _ = chosen(hand, MUG, mug_command())
-    one, any_way = (score(name, sets, setting) for name in ("actuation_force", "actuation_force_any_way"))
+    sets, context, _ = chosen(hand, MUG, mug_command())
+    one, any_way = (score(name, sets, context) for name in ("actuation_force", "actuation_force_any_way"))
     assert one is not None
     assert any_way is None or any_way >= one - 1e-9
 
 
-def wrench_hull_torque(sets, setting, load, edges=64):
+def wrench_hull_torque(sets, context, load, edges=64):
     """Return the least worst torque that holds a load, by a linear program over fine polyhedra inside the cones.
 
     Moments are taken about every joint that moves the touching link: a computation apart from ours.
     """
-    hand, T = setting.hand, setting.T_palm_object
-    mass = mass_properties(setting.obj)
+    hand, T = context.hand, context.T_palm_object
+    mass = mass_properties(context.obj)
     center = T[:3, :3] @ mass.center + T[:3, 3]
     wrenches, torques, followers = [], [], {c.follower for c in hand.couplings}
-    q = combined_posture(hand, setting.start, sets)
+    q = combined_posture(hand, context.start, sets)
     for c in sets:
         for t in c.holding:
             n = -np.asarray(t.normal)
@@ -204,44 +204,44 @@ def velocity(hand, q, joint, touch, step=1e-6):
 
 
 def grip(chosen, **changes):
-    """Return three fingers around a ball, which hold it every way, and the setting."""
+    """Return three fingers around a ball, which hold it every way, and the context."""
     hand = clench.Hand.load("robonaut2")
-    sets, setting, _ = chosen(hand, MUG, mug_command(**changes))
-    return sets, setting
+    sets, context, _ = chosen(hand, MUG, mug_command(**changes))
+    return sets, context
 
 
 def test_six_pulls_take_what_a_linear_program_finds(chosen):
-    sets, setting = grip(chosen)
+    sets, context = grip(chosen)
     pulls = np.vstack([np.eye(6)[:3], -np.eye(6)[:3]])
-    expected = max(wrench_hull_torque(sets, setting, pull) for pull in pulls)
-    assert score("actuation_force_six_pulls", sets, setting) == pytest.approx(expected, rel=3e-3)
-    assert score("actuation_force_six_pulls", sets, setting) <= expected + 1e-9
+    expected = max(wrench_hull_torque(sets, context, pull) for pull in pulls)
+    assert score("actuation_force_six_pulls", sets, context) == pytest.approx(expected, rel=3e-3)
+    assert score("actuation_force_six_pulls", sets, context) <= expected + 1e-9
 
 
 def test_a_task_takes_what_a_linear_program_finds_and_is_told_in_the_world(chosen):
     force, torque = np.array([1.0, 0.0, -2.0]), np.array([0.0, 0.02, 0.0])
-    sets, setting = grip(chosen, task_wrenches=({"force": tuple(force), "torque": tuple(torque)},))
+    sets, context = grip(chosen, task_wrenches=({"force": tuple(force), "torque": tuple(torque)},))
     R = mug_command().hand_pose.rotation
-    expected = wrench_hull_torque(sets, setting, np.concatenate([R.T @ force, R.T @ torque]))
-    assert score("actuation_force_task", sets, setting) == pytest.approx(expected, rel=3e-3)
-    assert score("actuation_force_task", sets, replace(setting, task=np.empty((0, 6)))) is None
+    expected = wrench_hull_torque(sets, context, np.concatenate([R.T @ force, R.T @ torque]))
+    assert score("actuation_force_task", sets, context) == pytest.approx(expected, rel=3e-3)
+    assert score("actuation_force_task", sets, replace(context, task=np.empty((0, 6)))) is None
 
 
 def test_the_worst_task_counts_and_limits_bind(chosen):
     light, heavy = {"force": (0.0, 0.0, -1.0)}, {"force": (0.0, 0.0, -3.0)}
-    sets, setting = grip(chosen, task_wrenches=(heavy,))
-    one = score("actuation_force_task", sets, setting)
+    sets, context = grip(chosen, task_wrenches=(heavy,))
+    one = score("actuation_force_task", sets, context)
     both = score("actuation_force_task", *grip(chosen, task_wrenches=(light, heavy)))
     assert both == pytest.approx(one, rel=1e-6)
-    assert one == pytest.approx(3.0 * score("actuation_force", sets, setting), rel=1e-6)
+    assert one == pytest.approx(3.0 * score("actuation_force", sets, context), rel=1e-6)
     assert score("actuation_force_task", *grip(chosen, task_wrenches=({"force": (0.0, 0.0, -3000.0)},))) is None
 
 
 def test_what_cannot_be_held_has_no_force(chosen):
-    sets, setting = held_ball(chosen, pincer())
+    sets, context = held_ball(chosen, pincer())
     lower = [c for c in sets if c.holding and c.holding[0].position[2] > 0.0]
-    assert score("actuation_force", lower, setting) is None
-    assert score("actuation_force", [], setting) is None
+    assert score("actuation_force", lower, context) is None
+    assert score("actuation_force", [], context) is None
 
 
 def test_tensions_of_equal_antagonistic_tendons_are_torque_over_arm(chosen):
@@ -249,9 +249,9 @@ def test_tensions_of_equal_antagonistic_tendons_are_torque_over_arm(chosen):
     arm, least = 0.01, 1.0
     arms = ((arm, -arm, 0.0, 0.0), (0.0, 0.0, arm, -arm))
     hand = pincer(tendons=TendonMap(("index_0", "thumb_0"), arms, (least,) * 4, (500.0,) * 4))
-    sets, setting = held_ball(chosen, hand)
-    torque = score("actuation_force", sets, setting)
-    assert score("tendon_tension", sets, setting) == pytest.approx(torque / arm + least, rel=1e-5)
+    sets, context = held_ball(chosen, hand)
+    torque = score("actuation_force", sets, context)
+    assert score("tendon_tension", sets, context) == pytest.approx(torque / arm + least, rel=1e-5)
 
 
 def test_no_tendons_no_tension(chosen):
@@ -259,9 +259,9 @@ def test_no_tendons_no_tension(chosen):
 
 
 def test_criteria_of_the_hand_say_nothing_without_an_object():
-    setting = ScoringContext(pincer(), np.zeros(2))
-    assert score("steadiness", [], setting) is None
-    assert score("actuation_force", [], setting) is None
+    context = ScoringContext(pincer(), np.zeros(2))
+    assert score("steadiness", [], context) is None
+    assert score("actuation_force", [], context) is None
 
 
 @pytest.mark.parametrize("preset", ["steady", "gentle", "quick", "balanced"])

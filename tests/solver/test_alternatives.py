@@ -93,19 +93,21 @@ def test_only_what_may_be_chosen_is_closed(
     hand, obj = HANDS["patent15"], clench.GraspObject.load("ball")
     command = commands(hand, obj, planes=2, **asked)[0]
     late: list[int] = []
-    close = alternatives.close_items
+    close = alternatives.close_candidates
 
     def counted(problem: Any, *rest: Any) -> Any:
-        late.append(len(problem.plan.items.entry))
+        late.append(len(problem.plan.candidates.finger_posture))
         return close(problem, *rest)
 
-    monkeypatch.setattr(alternatives, "close_items", counted)
+    monkeypatch.setattr(alternatives, "close_candidates", counted)
     made: list[int] = []
     first = pose_solver.candidates_of
     monkeypatch.setattr(
-        pose_solver, "candidates_of", lambda *given: made.append(len((c := first(*given)).plan.items.entry)) or c
+        pose_solver,
+        "candidates_of",
+        lambda *given: made.append(len((c := first(*given)).plan.candidates.finger_posture)) or c,
     )
-    every, fingers = len(plan_hand(make_problem(hand, obj, command)).items.entry), len(hand.fingers)
+    every, fingers = len(plan_hand(make_problem(hand, obj, command)).candidates.finger_posture), len(hand.fingers)
     numbers = {"all": every, "full width": fingers, "planes": every - fingers}
     solution = clench.solve(hand, obj, command)
     assert solution.contacts
@@ -152,7 +154,7 @@ def register(monkeypatch: pytest.MonkeyPatch, called: str, value: Callable[[], f
         scale = 1.0
         larger_is_better = True
 
-        def score(self, candidate: Any, setting: Any) -> float | None:
+        def score(self, candidate: Any, context: Any) -> float | None:
             return None if candidate.plane is None else value()
 
     monkeypatch.setattr(criterion_registry, "_registry", dict(criterion_registry._registry))

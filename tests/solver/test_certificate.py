@@ -39,8 +39,8 @@ def certificate_at(yaw: float, obj: clench.GraspObject) -> Certificate:
     problem = make_problem(hand, obj, clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open"))
     posture = np.array([yaw, 0.0])
     plan = plan_finger(hand, hand.fingers[0], posture, 1, problem.source)
-    best = FingerCandidate(plan, 0, None, np.zeros(1), posture, (), None, exact=True)
-    return certify(problem, [best], [], posture, plan_hand(problem).exact)
+    best = FingerCandidate(plan, 0, None, np.zeros(1), posture, (), None, swept=True)
+    return certify(problem, [best], [], posture, plan_hand(problem).full_width_arrays)
 
 
 @pytest.mark.parametrize(("yaw", "holds"), [(0.0, False), (YAW, True)])

@@ -63,11 +63,11 @@ def test_a_list_that_contains_itself_is_refused(key):
 
 def test_criteria_that_write_to_what_they_are_given_change_no_later_solve():
     from clench.scoring.calibration import calibration_of
-    from clench.solver.problem import make_problem, make_setting
+    from clench.solver.problem import make_context, make_problem
 
     problem = make_problem(HAND, clench.GraspObject.load("ball"), GraspCommand(HERE, preshape="open"))
     before = problem.start.copy()
-    make_setting(problem, calibration_of(None)).start[:] = 7.0
+    make_context(problem, calibration_of(None)).start[:] = 7.0
     assert np.array_equal(problem.start, before)
 
 

@@ -207,7 +207,7 @@ def test_coupled_joints_against_bisection(ratio):
     assert solution.joint_angles["index_1"] == pytest.approx(ratio * expected, abs=EXACT)
 
 
-def test_axis_that_turns_between_joints_gives_families_of_their_own():
+def test_axis_that_turns_between_joints_gives_axis_groups_of_their_own():
     """A posture joint yaws the distal half: its circle is cut by a plane through the yawed finger."""
     yaw, radius, thick = 0.4, 0.02, 0.006
     roles = [clench.JointRole.CLOSING, clench.JointRole.POSTURE, clench.JointRole.CLOSING]

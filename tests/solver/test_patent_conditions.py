@@ -108,7 +108,7 @@ def check(hand, candidate, contact, facet, slope):
 def test_tips_and_corners_meet_the_weaker_form():
     """The object's normal lies in the normal cone of the touching corner: against both sides next to it."""
     link = Shape(ShapeKind.BOX, (0.03, 0.01, 0.008), Pose([0.03, 0.0, 0.0]))
-    # A second joint at the tip makes the family's x axis run along the link.
+    # A second joint at the tip makes the axis group's x axis run along the link.
     hand = HandBuilder().finger("index", [link, None], [0.06, 0.0]).hand()
     mesh, _ = smooth("ball")
     seen = 0

@@ -201,7 +201,7 @@ def test_a_link_that_only_a_posture_joint_moves_blocks_its_finger():
     assert solution.reason["link"] == "index_link_0"
 
 
-def two_families():
+def two_axis_groups():
     """Return a hand whose tip turns about an axis of its own, and is narrower than the link before it."""
     shapes = [Shape(ShapeKind.BOX, (0.025, y, 0.004), Pose([0.025, 0.0, 0.0])) for y in (0.012, 0.01)]
     axes = [-Y, turned(np.array([1.0, 0.0, 0.0]), 0.01) @ -Y]
@@ -210,7 +210,7 @@ def two_families():
 
 def test_a_plane_on_which_other_joints_bring_a_link_into_the_object_has_no_set():
     """On the outermost planes the first joint meets nothing: the tip is on none of them, but on those of its own."""
-    hand, obj = two_families(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
+    hand, obj = two_axis_groups(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
     index = clench.solve(hand, obj, command(planes=3, full_width=False)).fingers["index"]
     for c in (index.candidates[0], index.candidates[-1]):
         assert (c.status, c.feasible, c.contacts) == ("blocked", False, ())
@@ -239,11 +239,13 @@ def test_a_link_that_touched_holds_joints_about_another_axis_as_it_holds_those_a
 
 @pytest.mark.parametrize("text", ["cylinder:r=0.02,h=0.1", "ellipsoid:a=0.02,b=0.02,c=0.03"])
 def test_the_full_width_is_not_spoiled_by_its_one_plane(text):
-    """Swept as a polyhedron, it ends a little inside the round shape that the plane of the next family shows."""
+    """Swept as a polyhedron, it ends a little inside the round shape that the plane of the next axis group shows."""
     lying = Pose([0.08, 0.0, 0.03], wxyz=[HALF, HALF, 0.0, 0.0])
     obj = clench.GraspObject.load(text, pose=lying)
     for place in (0.0, 1e-3, 2.3e-3):
-        index = clench.solve(two_families(), obj, command(planes=1, hand_pose=Pose([place, 0.0, 0.0]))).fingers["index"]
+        index = clench.solve(two_axis_groups(), obj, command(planes=1, hand_pose=Pose([place, 0.0, 0.0]))).fingers[
+            "index"
+        ]
         assert (index.status, index.candidates[index.chosen].plane) == ("touch", None)
 
 
@@ -251,14 +253,14 @@ def test_what_a_link_would_be_brought_into_may_be_an_obstacle():
     obj = clench.GraspObject.load("sphere:r=0.005", pose=Pose([-0.1, 0.0, 0.03]))
     ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
     obj = obj.with_body(clench.Body("ball", ball.bodies[0].moved(obj.pose.inverse() @ ball.pose).shapes))
-    index = clench.solve(two_families(), obj, command(planes=2, full_width=False)).fingers["index"]
+    index = clench.solve(two_axis_groups(), obj, command(planes=2, full_width=False)).fingers["index"]
     assert index.status == "blocked"
     assert index.cause["other"] == "sphere:r=0.005 or an obstacle"
     assert "overlaps sphere:r=0.005 or an obstacle on this plane" in index.reason
 
 
 def test_a_finger_without_a_set_on_any_plane_does_not_move():
-    hand, obj = two_families(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
+    hand, obj = two_axis_groups(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
     asked = command(planes=2, full_width=False)
     solution = clench.solve(hand, obj, asked)
     assert (solution.status, solution.fingers["index"].status) == ("no_contact", "blocked")

@@ -1,7 +1,7 @@
 """Closing a hand in small steps, with a collision query after each: the baselines of `clench bench peers`.
 
 Nothing else uses them. They follow the rules of GraspIt!'s autoGrasp, of Simox's closeActors and of OpenRAVE's grasper,
-on the same solids as the exact sweeps, so that a difference comes from the method alone.
+on the same solids as the sweeps, so that a difference comes from the method alone.
 """
 
 from __future__ import annotations

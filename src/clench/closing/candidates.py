@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 _FACE: Final = 5
 
 
-class Touch(NamedTuple):
+class LinkContact(NamedTuple):
     """Describe one contact, in the palm frame.
 
     Args:
-        link, joint: indices in the hand of the touching link, and of the leader of the group that it stopped. If joints
-            break away, the leader is the last joint that the link stopped.
+        link, joint: indices in the hand of the touching link, and of the leader of the degree of freedom that it
+            stopped. If joints break away, the leader is the last joint that the link stopped.
         body: index of the touched body, or -1 - index of a touched link of the hand itself. graspable: whether that
             body is to be grasped.
-        plane: of the family, None where the touch lies on none. offset: its place along y [m].
+        plane: of the axis group, None where the touch lies on none. offset: its place along y [m].
         kind: 0 side, 1 tip, 2 edge on a plane or of a round link; 3 corner, 4 edge, 5 face of a link's mesh.
         position: [m], normal: of the object's surface there, outward unit, shape (3,). gap: at the final posture [m].
         curve_angle: tangent angle of the object's curve [rad]. link_angle: of the touching side [rad], else None.
@@ -68,14 +68,14 @@ class FingerCandidate:
 
     Args:
         plan: the finger at its posture. posture: index of the posture alternative.
-        plane: index, or None for the full width. travel: of the plan's groups [rad].
+        plane: index, or None for the full width. travel: of the plan's degrees of freedom [rad].
         q: angles of all joints of the hand with this finger closed, shape (J,) [rad].
         touches: in stage order. overlap: the deepest link where the finger overlaps the object at the start,
             or None; then nothing moves.
         late: it would do so on the plane only once joints about another axis had moved; nothing moves either.
-        exact: it was swept over the whole width. clear: it passes through nothing on any of the planes.
-        feasible, penetration: over the whole width, path included; None when not measured.
-        scores: criterion name to value. item: number of its item of work.
+        swept: it was swept over the full width. clear: it passes through nothing on any of the planes.
+        feasible, penetration: over the full width, path included; None when not measured.
+        scores: criterion name to value. index: its place among the candidates of the plan.
     """
 
     plan: FingerPlan
@@ -83,20 +83,20 @@ class FingerCandidate:
     plane: int | None
     travel: FloatArray
     q: FloatArray
-    touches: tuple[Touch, ...]
+    touches: tuple[LinkContact, ...]
     overlap: LinkDepth | None
     late: bool = False
-    exact: bool = False
+    swept: bool = False
     clear: bool = False
     feasible: bool | None = None
     penetration: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
-    item: int = -1
+    index: int = -1
 
     @property
     def offset(self) -> float | None:
-        """Place of the plane along y of the first family [m]; None for the full width."""
-        return None if self.plane is None else float(self.plan.families[0].offsets[self.plane])
+        """Place of the plane along y of the first axis group [m]; None for the full width."""
+        return None if self.plane is None else float(self.plan.axis_groups[0].offsets[self.plane])
 
     @property
     def missed(self) -> bool:
@@ -104,20 +104,20 @@ class FingerCandidate:
         return bool(self.touches) and self.touches[0].link != self.plan.finger.tip_link
 
     def on_the_way(self, hand: Hand, travel: FloatArray) -> FloatArray:
-        """Return the angles of all joints when the groups have travelled so far, each joint until it was held [rad].
+        """Return the angles of all joints when the degrees of freedom have travelled, each until it was held [rad].
 
         Args:
-            hand: the hand. travel: of the plan's groups [rad].
+            hand: the hand. travel: of the plan's degrees of freedom [rad].
         """
         turns = []
         for p in self.plan.joints:
-            moved = min(max(travel[p.group], p.start), p.stop) - p.start
+            moved = min(max(travel[p.dof], p.start), p.stop) - p.start
             final = abs(self.q[p.joint] - self.plan.posture[p.joint])
             turns.append(np.sign(p.rate) * min(abs(p.rate) * moved, final))
         return self.plan.turned(hand, np.array(turns))
 
     @cached_property
-    def holding(self) -> tuple[Touch, ...]:
+    def holding(self) -> tuple[LinkContact, ...]:
         """Contacts with a graspable body that are still touching, each once."""
         still = [t for t in self.touches if t.graspable and not t.passed]
         kept = without_repeats([t.link for t in still], [t.position for t in still], [t.normal for t in still])
@@ -140,51 +140,51 @@ def read_candidates(
     T_palm_object: FloatArray,
     overlaps: Sequence[LinkDepth | None],
 ) -> list[FingerCandidate]:
-    """Return one candidate per item, in item order.
+    """Return the `FingerCandidate` of every candidate of the plan, in its order.
 
     Args:
         plan: of the fingers. packed: the object. T_palm_object: its pose, shape (4, 4). answer: results of the kernels.
-        overlaps: as `start_overlaps` gives them, per entry.
+        overlaps: as `start_overlaps` gives them, per finger posture.
     """
     from clench.kernels.closing.layout import SUNK
 
-    entries = plan.items.entry.tolist()
-    blocked = [overlaps[entry] is not None for entry in entries]
+    finger_postures = plan.candidates.finger_posture.tolist()
+    blocked = [overlaps[finger_posture] is not None for finger_posture in finger_postures]
     if any(blocked):
         still = np.array(blocked)
         travel, contacts = answer.travel.copy(), np.where(still, 0, answer.contacts)
         travel[still] = 0.0
         answer = answer._replace(travel=travel, contacts=contacts)
-    touches, postures = _read_items(plan, packed, T_palm_object, answer)
+    touches, postures = _read_contacts(plan, packed, T_palm_object, answer)
     sunk = [LinkDepth(SUNK - link, 0.0, None) if link <= SUNK else None for link in answer.overlap.tolist()]
-    groups = plan.arrays(planar=False).entry_group.tolist()
-    low, skipped = plan.items.low.tolist(), answer.skipped.tolist()
+    dofs = plan.arrays(planar=False).first_dof.tolist()
+    low, skipped = plan.candidates.low.tolist(), answer.skipped.tolist()
     candidates = []
-    for i, entry in enumerate(entries):
+    for i, finger_posture in enumerate(finger_postures):
         candidates.append(
             FingerCandidate(
-                item=i,
-                plan=plan.plans[entry],
-                posture=plan.posture[entry],
-                plane=None if plan.whole[i] else low[i],
-                travel=answer.travel[i, groups[entry] : groups[entry + 1]],
+                index=i,
+                plan=plan.plans[finger_posture],
+                posture=plan.posture[finger_posture],
+                plane=None if plan.is_full_width[i] else low[i],
+                travel=answer.travel[i, dofs[finger_posture] : dofs[finger_posture + 1]],
                 q=postures[i],
                 touches=touches[i],
-                overlap=overlaps[entry] or sunk[i],
+                overlap=overlaps[finger_posture] or sunk[i],
                 late=not blocked[i] and sunk[i] is not None,
-                exact=plan.whole[i] and not skipped[i],
+                swept=plan.is_full_width[i] and not skipped[i],
             )
         )
     return candidates
 
 
-def held_touches(plan: HandPlan, met: Meetings) -> dict[int, list[Touch]]:
+def held_touches(plan: HandPlan, met: Meetings) -> dict[int, list[LinkContact]]:
     """Return the contacts of fingers that stop each other, by finger, without contacts of resting fingers.
 
     Args:
         plan: of the hand. met: meetings of simultaneously closing fingers at one pose.
     """
-    held: dict[int, list[Touch]] = {}
+    held: dict[int, list[LinkContact]] = {}
     for number, value in zip(met.number[: met.size[0]].tolist(), met.value[: met.size[0]], strict=True):
         for (finger, link, joint), other, sign in ((number[:3], number[4], 1.0), (number[3:], number[1], -1.0)):
             if joint >= 0:
@@ -193,8 +193,8 @@ def held_touches(plan: HandPlan, met: Meetings) -> dict[int, list[Touch]]:
     return held
 
 
-def _held(value: FloatArray, link: int, met: int, joint: int, sign: float) -> Touch:
-    return Touch(
+def _held(value: FloatArray, link: int, met: int, joint: int, sign: float) -> LinkContact:
+    return LinkContact(
         link=link,
         joint=joint,
         body=-1 - met,
@@ -210,20 +210,27 @@ def _held(value: FloatArray, link: int, met: int, joint: int, sign: float) -> To
     )
 
 
-def _read_items(
+def _read_contacts(
     plan: HandPlan, packed: PackedObject, T_palm_object: FloatArray, answer: ClosingArrays
-) -> tuple[list[tuple[Touch, ...]], FloatArray]:
-    """Return the touches of every item, in stage order, and the angles of all joints, (I, J) [rad]."""
-    from clench.kernels.closing.contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays, read_touches
-    from clench.kernels.closing.layout import HIT_PLANE
+) -> tuple[list[tuple[LinkContact, ...]], FloatArray]:
+    """Return the touches of every candidate, in stage order, and the angles of all joints, (I, J) [rad]."""
+    from clench.kernels.closing.contact_reading import (
+        PALM_CONTACT_FLOATS,
+        PALM_CONTACT_INTEGERS,
+        PalmContactArrays,
+        read_contacts,
+    )
+    from clench.kernels.closing.layout import CONTACT_PLANE
 
-    shape = answer.hit.shape[:2]
-    read = TouchArrays(np.empty((*shape, TOUCH_INTEGERS), dtype=np.int64), np.empty((*shape, TOUCH_FLOATS)))
+    shape = answer.contact.shape[:2]
+    read = PalmContactArrays(
+        np.empty((*shape, PALM_CONTACT_INTEGERS), dtype=np.int64), np.empty((*shape, PALM_CONTACT_FLOATS))
+    )
     postures = np.empty((shape[0], len(plan.hand.joints)))
     T = np.ascontiguousarray(T_palm_object[:3])
     found = np.arange(shape[1]) < answer.contacts[:, None]
-    hand = plan.arrays(planar=bool((answer.hit[..., HIT_PLANE] >= 0)[found].any()))
-    read_touches(hand, plan.frames, object_surface(packed), plan.items, answer, T, read, postures)
+    hand = plan.arrays(planar=bool((answer.contact[..., CONTACT_PLANE] >= 0)[found].any()))
+    read_contacts(hand, plan.frames, object_surface(packed), plan.candidates, answer, T, read, postures)
     touches = []
     for i, n in enumerate(answer.contacts.tolist()):
         numbers, values = read.number[i, :n].tolist(), read.value[i, :n].tolist()
@@ -231,11 +238,11 @@ def _read_items(
     return touches, postures
 
 
-def _touch(number: list[int], value: list[float], row: FloatArray) -> Touch:
+def _touch(number: list[int], value: list[float], row: FloatArray) -> LinkContact:
     """Return a touch of numbers as `contact_reading` lists them; position and normal are views of `row`."""
     link, joint, body, kind, plane, graspable = number
     gap, curve, side, offset = value[6:]
-    return Touch(
+    return LinkContact(
         link=link,
         joint=joint,
         body=body,

@@ -32,33 +32,33 @@ class LinkOutline:
 
 @dataclass(frozen=True, eq=False)
 class MovedLink:
-    """Place a link that the joints of a family, or later ones, move.
+    """Place a link that the joints of an axis group, or later ones, move.
 
     Args:
-        link: index in the hand. joint: index in the plan's joints of the family's last joint before the link.
-        T_family_link: at the open posture, shape (4, 4). shapes: of the link, in its frame.
-        pivot: of the joint [m], shape (2,). arm: the joint gets no farther from the family's origin [m].
+        link: index in the hand. joint: index in the plan's joints of the axis group's last joint before the link.
+        T_axis_group_link: at the open posture, shape (4, 4). shapes: of the link, in its frame.
+        pivot: of the joint [m], shape (2,). arm: the joint gets no farther from the axis group's origin [m].
     """
 
     link: int
     joint: int
-    T_family_link: FloatArray
+    T_axis_group_link: FloatArray
     shapes: tuple[Shape, ...]
     pivot: FloatArray
     arm: float
 
 
 @dataclass(frozen=True, eq=False)
-class CurlFamily:
+class AxisGroup:
     """The parallel curl planes that consecutive joints share.
 
     Args:
-        T_palm_family: at the open posture, shape (4, 4); y is normal to the planes.
+        T_palm_axis_group: at the open posture, shape (4, 4); y is normal to the planes.
         offsets: of the planes along y [m], shape (P,).
         moved: the links that the planes cut.
     """
 
-    T_palm_family: FloatArray
+    T_palm_axis_group: FloatArray
     offsets: FloatArray
     moved: tuple[MovedLink, ...]
 
@@ -69,7 +69,7 @@ class CurlFamily:
 
     @cached_property
     def reach(self) -> float:
-        """No moved point on a plane gets farther from the family's origin in the plane [m]."""
+        """No moved point on a plane gets farther from the axis group's origin in the plane [m]."""
         arms, reach = {moved.joint: moved.arm for moved in self.moved}, 0.0
         for o in (o for row in self.outlines for o in row):
             far = float(np.linalg.norm(o.outline.vertices, axis=1).max()) + o.outline.radius
@@ -78,11 +78,11 @@ class CurlFamily:
 
     def pivot_in_palm(self, pivot: FloatArray) -> FloatArray:
         """Return a pivot of its joints in the palm frame at the open posture [m], shape (3,)."""
-        T = self.T_palm_family
+        T = self.T_palm_axis_group
         return np.asarray(T[:3, 3] + T[:3, 0] * pivot[0] + T[:3, 2] * pivot[1])
 
 
-def family_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> FloatArray:
+def axis_group_frame(axis: FloatArray, origin: FloatArray, towards: FloatArray) -> FloatArray:
     """Return the curl-plane frame of a joint, right-handed, shape (4, 4).
 
     Args:
@@ -137,7 +137,7 @@ def plane_offsets(extents: list[tuple[float, float]], count: int) -> FloatArray:
 def refined(offsets: FloatArray, count: int) -> FloatArray:
     """Return `count` planes: the given ones, and as many evenly spaced ones as are missing.
 
-    All families of a finger have as many, so that plane k means the same part of the width in each. A plane that
+    All axis groups of a finger have as many, so that plane k means the same part of the width in each. A plane that
     comes up twice is harmless.
     """
     missing = count - len(offsets)
@@ -146,5 +146,5 @@ def refined(offsets: FloatArray, count: int) -> FloatArray:
 
 
 def _cut(moved: MovedLink, offset: float) -> list[LinkOutline]:
-    cut = (cut_shape(shape, moved.T_family_link, offset) for shape in moved.shapes)
+    cut = (cut_shape(shape, moved.T_axis_group_link, offset) for shape in moved.shapes)
     return [LinkOutline(moved.link, moved.joint, o.about(moved.pivot)) for o in cut if o is not None]

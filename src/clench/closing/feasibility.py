@@ -32,9 +32,9 @@ def judge_sets(
 ) -> None:
     """Fill `clear` of the candidates, and on request `feasible` and `penetration`.
 
-    A set that was swept exactly passes through nothing. Without that, the full-width set passes through nothing on any
-    plane; a plane's own set that equals it is the same set. Any other plane's set passes through the contacts of other
-    planes. The overlap between the planes is measured.
+    A set that was swept over the full width passes through nothing. Without that, the full-width set passes through
+    nothing on any plane; a plane's own set that equals it is the same set. Any other plane's set passes through the
+    contacts of other planes. The overlap between the planes is measured.
 
     Args:
         hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
@@ -45,7 +45,7 @@ def judge_sets(
     for c in candidates:
         if c.overlap is not None:
             c.feasible, c.penetration = False, None if c.late else c.overlap.depth
-        elif c.exact:
+        elif c.swept:
             c.clear, c.feasible, c.penetration = True, True, 0.0
         else:
             full = whole.get(id(c.plan))
@@ -75,7 +75,7 @@ def _deepest(
 
 
 def _path(travel: FloatArray) -> list[FloatArray]:
-    """Return travels along the closing path, one group after another, the end last."""
+    """Return travels along the closing path, one degree of freedom after another, the end last."""
     path = []
     for g in range(len(travel)):
         for part in np.linspace(0.0, 1.0, _LOOKS, endpoint=False)[1:]:
@@ -84,7 +84,7 @@ def _path(travel: FloatArray) -> list[FloatArray]:
 
 
 def _path_at_once(candidate: FingerCandidate) -> list[FloatArray]:
-    """Return travels along a closing path on which all groups move simultaneously, the end last."""
+    """Return travels along a closing path on which all degrees of freedom move simultaneously, the end last."""
     speeds = np.array(candidate.plan.speeds)
     last = float((candidate.travel / speeds).max(initial=0.0))
     parts = np.linspace(0.0, last, _LOOKS * len(speeds), endpoint=False)[1:]

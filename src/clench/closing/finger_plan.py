@@ -1,4 +1,4 @@
-"""Plan how a finger closes at one posture: groups, families of planes, link outlines (docs/method.md sections 1-2).
+"""Plan how a finger closes at one posture: degrees of freedom, axis groups, outlines (docs/method.md sections 1-2).
 
 A plan depends on the hand and the posture alone; nothing in it knows the object.
 """
@@ -18,7 +18,7 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.hand.link_mesh import link_meshes
 from clench.models.shapes import CollisionSource
 
-from .curl_planes import CurlFamily, MovedLink, family_frame, plane_offsets, refined
+from .curl_planes import AxisGroup, MovedLink, axis_group_frame, plane_offsets, refined
 from .outlines import extent
 
 
@@ -27,16 +27,16 @@ class PlannedJoint:
     """Describe a closing joint in its plan.
 
     Args:
-        joint: index in the hand. family, group: indices in the plan.
-        pivot: in its family's (x, z) at the open posture [m], shape (2,).
+        joint: index in the hand. axis_group, dof: indices in the plan.
+        pivot: in its axis group's (x, z) at the open posture [m], shape (2,).
         turn: +1 when its model angle grows with a turn from x towards z, else -1.
-        rate: turn per unit of the group's travel [-].
-        start, stop: travel of the group between which it moves [rad].
+        rate: turn per unit of travel of its degree of freedom [-].
+        start, stop: travel of the degree of freedom between which it moves [rad].
     """
 
     joint: int
-    family: int
-    group: int
+    axis_group: int
+    dof: int
     pivot: FloatArray
     turn: float
     rate: float
@@ -50,11 +50,11 @@ class FingerPlan(Keeper):
 
     Args:
         finger: the finger. posture: open angles of all joints of the hand [rad], shape (J,).
-        joints: closing joints, palm side first. leaders: leader of each group (index in the hand).
-        lengths: travel of each group to its limit [rad]. families: see `CurlFamily`.
-        speeds: relative speed of each group in simultaneous closing. breaks: whether later joints of a group continue
-            when earlier joints are blocked.
-        length: no moved point gets farther from a family's origin in its plane, for round shapes nearly [m].
+        joints: closing joints, palm side first. leaders: leader of each degree of freedom (index in the hand).
+        lengths: travel of each degree of freedom to its limit [rad]. axis_groups: see `AxisGroup`.
+        speeds: relative speed of each degree of freedom in simultaneous closing. breaks: whether later joints of a
+            degree of freedom continue when earlier joints are blocked.
+        length: no moved point gets farther from an axis group's origin in its plane, for round shapes nearly [m].
     """
 
     finger: Finger
@@ -64,11 +64,11 @@ class FingerPlan(Keeper):
     lengths: tuple[float, ...]
     speeds: tuple[float, ...]
     breaks: tuple[bool, ...]
-    families: tuple[CurlFamily, ...]
+    axis_groups: tuple[AxisGroup, ...]
     length: float
 
     def lies_in_planes(self, again: bool) -> bool:
-        """Say whether the joints of only one family ever move together, with earlier joints at rest: then planes
+        """Say whether the joints of only one axis group ever move together, with earlier joints at rest: then planes
         suffice.
 
         Args:
@@ -76,8 +76,8 @@ class FingerPlan(Keeper):
         """
         homes: dict[int, set[int]] = {}
         for p in self.joints:
-            homes.setdefault(0 if again else p.group, set()).add(p.family)
-        return all(len(families) == 1 for families in homes.values())
+            homes.setdefault(0 if again else p.dof, set()).add(p.axis_group)
+        return all(len(axis_groups) == 1 for axis_groups in homes.values())
 
     def turned(self, hand: Hand, turn: FloatArray) -> FloatArray:
         """Return the angles of all joints of the hand when the plan's joints have turned, shape (J,) [rad]."""
@@ -88,7 +88,7 @@ class FingerPlan(Keeper):
         return q
 
     def angles(self, hand: Hand, travel: FloatArray) -> FloatArray:
-        """Return the angles of all joints of the hand when the groups have travelled, shape (J,) [rad]."""
+        """Return the angles of all joints of the hand when the degrees of freedom have travelled, shape (J,) [rad]."""
         q = self.posture.copy()
         for leader, s in zip(self.leaders, travel, strict=True):
             joint = hand.joints[leader]
@@ -121,21 +121,21 @@ def plan_finger(
     mover = {link.joint: i for i, link in enumerate(hand.links) if link.joint >= 0}
     axes = {j: poses[mover[j]][:3, :3] @ hand.joints[j].axis * hand.joints[j].direction for j in closing}
     anchors = {j: (poses[mover[j]] @ np.append(hand.joints[j].anchor, 1.0))[:3] for j in closing}
-    split = _families(closing, axes)
+    split = _axis_groups(closing, axes)
     moved_by = last_closing_joint(hand, finger, closing)
     frames = [_frame(hand, closing, f, axes, anchors, poses, moved_by, source) for f in split]
     joints = []
     for f, members in enumerate(split):
-        to_family = invert(frames[f])
+        to_axis_group = invert(frames[f])
         for j in members:
-            local = to_family @ np.append(anchors[j], 1.0)
+            local = to_axis_group @ np.append(anchors[j], 1.0)
             model_axis = axes[j] * hand.joints[j].direction
             turn = -1.0 if model_axis @ frames[f][:3, 1] > 0.0 else 1.0
             joints.append((j, f, local[[0, 2]], turn))
     planned = tuple(_planned(hand, posture, leaders, j, f, pivot, turn) for j, f, pivot, turn in joints)
     order = list(dict.fromkeys(leaders[j] for j in closing))
     lengths = tuple(_travel(hand, posture, leader) for leader in order)
-    families = _lay_families(hand, planned, frames, split, poses, moved_by, planes, source)
+    axis_groups = _lay_axis_groups(hand, planned, frames, split, poses, moved_by, planes, source)
     return FingerPlan(
         finger,
         posture,
@@ -144,8 +144,8 @@ def plan_finger(
         lengths,
         tuple((speeds or {}).get(hand.joints[leader].name, 1.0) for leader in order),
         tuple(any(c.breakaway and c.leader == leader for c in hand.couplings) for leader in order),
-        families,
-        _length(hand, families, source),
+        axis_groups,
+        _length(hand, axis_groups, source),
     )
 
 
@@ -188,15 +188,15 @@ def _leaders(hand: Hand, closing: list[int]) -> dict[int, int]:
     return leaders
 
 
-def _families(closing: list[int], axes: dict[int, FloatArray]) -> list[list[int]]:
+def _axis_groups(closing: list[int], axes: dict[int, FloatArray]) -> list[list[int]]:
     """Split closing joints into runs of parallel axes."""
-    families: list[list[int]] = []
+    axis_groups: list[list[int]] = []
     for j in closing:
-        if families and np.linalg.norm(np.cross(axes[families[-1][0]], axes[j])) <= PARALLEL_ANGLE:
-            families[-1].append(j)
+        if axis_groups and np.linalg.norm(np.cross(axes[axis_groups[-1][0]], axes[j])) <= PARALLEL_ANGLE:
+            axis_groups[-1].append(j)
         else:
-            families.append([j])
-    return families
+            axis_groups.append([j])
+    return axis_groups
 
 
 def last_closing_joint(hand: Hand, finger: Finger, closing: list[int]) -> dict[int, int]:
@@ -239,7 +239,7 @@ def _frame(
     across = towards - origin - axis * ((towards - origin) @ axis)
     if np.linalg.norm(across) < 1e-6:
         towards = _farthest(hand, origin, axis, poses, [i for i in moved_by if moved_by[i] in members], source)
-    return family_frame(axis, origin, towards)
+    return axis_group_frame(axis, origin, towards)
 
 
 def _farthest(
@@ -264,28 +264,28 @@ def _travel(hand: Hand, posture: FloatArray, leader: int) -> float:
 
 
 def _planned(
-    hand: Hand, posture: FloatArray, leaders: dict[int, int], j: int, family: int, pivot: FloatArray, turn: float
+    hand: Hand, posture: FloatArray, leaders: dict[int, int], j: int, axis_group: int, pivot: FloatArray, turn: float
 ) -> PlannedJoint:
     """Return a joint's motion: followers move while their coupled angle is inside their limits."""
     order = list(dict.fromkeys(leaders.values()))
     leader = leaders[j]
     direction = hand.joints[leader].direction
     length = _travel(hand, posture, leader)
-    group = order.index(leader)
+    dof = order.index(leader)
     if leader == j:
-        return PlannedJoint(j, family, group, pivot, turn, turn * direction, 0.0, length)
+        return PlannedJoint(j, axis_group, dof, pivot, turn, turn * direction, 0.0, length)
     coupling = next(c for c in hand.couplings if c.follower == j)
     at_open = coupling.ratio * posture[leader] + coupling.offset
     speed = coupling.ratio * direction
     lower, upper = hand.joints[j].lower, hand.joints[j].upper
     if speed == 0.0:
-        return PlannedJoint(j, family, group, pivot, turn, 0.0, 0.0, 0.0)
+        return PlannedJoint(j, axis_group, dof, pivot, turn, 0.0, 0.0, 0.0)
     window = sorted([(lower - at_open) / speed, (upper - at_open) / speed])
     start, stop = max(window[0], 0.0), min(window[1], length)
-    return PlannedJoint(j, family, group, pivot, turn, turn * speed, start, max(stop, start))
+    return PlannedJoint(j, axis_group, dof, pivot, turn, turn * speed, start, max(stop, start))
 
 
-def _lay_families(
+def _lay_axis_groups(
     hand: Hand,
     joints: tuple[PlannedJoint, ...],
     frames: list[FloatArray],
@@ -294,25 +294,25 @@ def _lay_families(
     moved_by: dict[int, int],
     planes: int,
     source: CollisionSource,
-) -> tuple[CurlFamily, ...]:
-    """Lay the planes of every family across the links that its joints, or later ones, move."""
+) -> tuple[AxisGroup, ...]:
+    """Lay the planes of every axis group across the links that its joints, or later ones, move."""
     position = {p.joint: i for i, p in enumerate(joints)}
     placed = []
     for f in range(len(split)):
-        to_family = invert(frames[f])
-        links = [(i, to_family @ poses[i]) for i in moved_by if joints[position[moved_by[i]]].family >= f]
+        to_axis_group = invert(frames[f])
+        links = [(i, to_axis_group @ poses[i]) for i in moved_by if joints[position[moved_by[i]]].axis_group >= f]
         extents = _extents(hand, links, source)
         placed.append((links, plane_offsets(extents, planes)))
     most = max(len(offsets) for _, offsets in placed)
-    families = []
+    axis_groups = []
     for f, (links, offsets) in enumerate(placed):
-        last, arms = position[split[f][-1]], _arms([p for p in joints if p.family == f], position)
+        last, arms = position[split[f][-1]], _arms([p for p in joints if p.axis_group == f], position)
         moved = []
         for i, T in links:
             joint = min(position[moved_by[i]], last)
             moved.append(MovedLink(i, joint, T, hand.links[i].shapes[source], joints[joint].pivot, arms[joint]))
-        families.append(CurlFamily(frames[f], refined(offsets, most), tuple(moved)))
-    return tuple(families)
+        axis_groups.append(AxisGroup(frames[f], refined(offsets, most), tuple(moved)))
+    return tuple(axis_groups)
 
 
 def _extents(hand: Hand, links: list[tuple[int, FloatArray]], source: CollisionSource) -> list[tuple[float, float]]:
@@ -321,7 +321,7 @@ def _extents(hand: Hand, links: list[tuple[int, FloatArray]], source: CollisionS
 
 
 def _arms(own: list[PlannedJoint], position: dict[int, int]) -> dict[int, float]:
-    """Return the length of the chain from a family's origin to each of its joints [m]."""
+    """Return the length of the chain from an axis group's origin to each of its joints [m]."""
     arm = 0.0
     arms = {}
     for before, p in zip([None, *own], own, strict=False):
@@ -330,12 +330,12 @@ def _arms(own: list[PlannedJoint], position: dict[int, int]) -> dict[int, float]
     return arms
 
 
-def _length(hand: Hand, families: tuple[CurlFamily, ...], source: CollisionSource) -> float:
+def _length(hand: Hand, axis_groups: tuple[AxisGroup, ...], source: CollisionSource) -> float:
     """Return the length of a finger from the triangles of its links, which need no planes [m]."""
     vertices = {mesh.link: mesh.tree.vertices for mesh in link_meshes(hand, source)}
     length = 0.0
-    for moved in (m for family in families for m in family.moved if m.link in vertices):
-        rows = moved.T_family_link[[0, 2]]
+    for moved in (m for axis_group in axis_groups for m in axis_group.moved if m.link in vertices):
+        rows = moved.T_axis_group_link[[0, 2]]
         away = vertices[moved.link] @ rows[:, :3].T + (rows[:, 3] - moved.pivot)
         length = max(length, moved.arm + float(np.sqrt((away * away).sum(axis=1).max())))
     return length

@@ -35,8 +35,8 @@ class Answers(NamedTuple):
         return Answers(closed, solved)
 
 
-#: Chooses an item for every finger at a closed pose. It gets the index of the pose, its answers, the items, and whether
-#: links overlap at their start; it returns the last two.
+#: Chooses a candidate for every finger at a closed pose. It gets the index of the pose, its answers, the candidates,
+#: and whether links overlap at their start; it returns the last two.
 Chooser = Callable[[int, Answers], tuple[list[int], bool]]
 
 
@@ -52,7 +52,7 @@ def solve_packed(
 
     Args:
         problem: the rest. T_palm_object: where the object is, shape (N, 3, 4).
-        choose: chooses the items; None leaves the choice to the kernels. threads: how many are used.
+        choose: chooses the candidates; None leaves the choice to the kernels. threads: how many are used.
         on_device: fingers close on a CUDA device; the other stages run on the CPU.
     """
     from clench.kernels.closing.solve_layout import BLOCK, CHOOSE, CLOSE, FINISH
@@ -74,16 +74,16 @@ def solve_packed(
             return
         run_stages(problem, T, some, first)
         for n in range(span[1] - span[0]):
-            items, nested = choose(span[0] + n, some.at(slice(n, n + 1)))
-            some.solved.chosen[n], some.closed.nested[n] = items, nested
+            candidates, nested = choose(span[0] + n, some.at(slice(n, n + 1)))
+            some.solved.chosen[n], some.closed.nested[n] = candidates, nested
         run_stages(problem, T, some, FINISH)
 
     share_out(run, pairwise(ends), threads)
     return answers
 
 
-def close_items(problem: PackedProblem, T_palm_object: FloatArray) -> Closed:
-    """Close the items of a plan at one pose of the object, (3, 4), without the other fingers, and choose nothing."""
+def close_candidates(problem: PackedProblem, T_palm_object: FloatArray) -> Closed:
+    """Close the candidates of a plan at one pose of the object, (3, 4), without the other fingers; choose nothing."""
     from clench.kernels.closing.solve_layout import BLOCK, CLOSE
 
     answers = empty_answers(problem, 1)
@@ -120,16 +120,16 @@ def _close_on_device(problem: PackedProblem, T_palm_object: FloatArray, closed: 
 
 def empty_answers(problem: PackedProblem, count: int) -> Answers:
     """Return the arrays that a solve of so many poses writes."""
-    from clench.kernels.closing.contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS
+    from clench.kernels.closing.contact_reading import PALM_CONTACT_FLOATS, PALM_CONTACT_INTEGERS
     from clench.kernels.closing.solve_layout import Closed, Solved
 
     arrays, most = problem.arrays, problem.most_contacts
-    entries, joints = arrays.frames.posture.shape
+    finger_postures, joints = arrays.frames.posture.shape
     fingers = len(arrays.command.thumb)
     closed = Closed(
-        free=_closing_arrays(problem, (count, len(arrays.items.entry))),
-        crossed=_whole((count, entries)),
-        blocked=_whole((count, entries)),
+        free=_closing_arrays(problem, (count, len(arrays.candidates.finger_posture))),
+        crossed=_whole((count, finger_postures)),
+        blocked=_whole((count, finger_postures)),
         nested=np.full(count, int(arrays.command.nested), dtype=np.int64),
         final=_closing_arrays(problem, (count, fingers)),
         anew=_whole((count, fingers)),
@@ -144,23 +144,23 @@ def empty_answers(problem: PackedProblem, count: int) -> Answers:
         fingers=_whole((count, fingers)),
         chosen=_whole((count, fingers)),
         contacts=_whole((count, fingers)),
-        number=_whole((count, fingers, most, TOUCH_INTEGERS)),
-        value=np.zeros((count, fingers, most, TOUCH_FLOATS)),
+        number=_whole((count, fingers, most, PALM_CONTACT_INTEGERS)),
+        value=np.zeros((count, fingers, most, PALM_CONTACT_FLOATS)),
     )
     return Answers(closed, solved)
 
 
 def _closing_arrays(problem: PackedProblem, shape: tuple[int, int]) -> ClosingArrays:
-    from clench.kernels.closing.layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays
+    from clench.kernels.closing.layout import CONTACT_FLOATS, CONTACT_INTEGERS, ClosingArrays
 
     hand, contacts = problem.arrays.hand, problem.most_contacts
     return ClosingArrays(
-        travel=np.zeros((*shape, len(hand.chain.group_length))),
+        travel=np.zeros((*shape, len(hand.chain.dof_length))),
         turn=np.zeros((*shape, len(hand.chain.rate))),
         contacts=_whole(shape),
-        hit=_whole((*shape, contacts, HIT_INTEGERS)),
-        point=np.zeros((*shape, contacts, HIT_FLOATS)),
-        pose=np.zeros((*shape, len(hand.family_pose), 3, 4)),
+        contact=_whole((*shape, contacts, CONTACT_INTEGERS)),
+        point=np.zeros((*shape, contacts, CONTACT_FLOATS)),
+        pose=np.zeros((*shape, len(hand.axis_group_pose), 3, 4)),
         overflow=_whole(shape),
         overlap=np.full(shape, -1, dtype=np.int64),
         skipped=_whole(shape),

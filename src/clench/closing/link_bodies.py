@@ -1,4 +1,4 @@
-"""Pack the input of the exact sweep: the links and the object as bodies, and the motion of the links (section 5)."""
+"""Pack the input of the full-width sweep: links and object as bodies, and the motion of the links (section 5)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .finger_plan import FingerPlan, closing_joints, last_closing_joint
 
 if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays
-    from clench.kernels.toi.full_width import ExactArrays
+    from clench.kernels.toi.full_width import FullWidthArrays
 
 
 class HandBodies(NamedTuple):
-    """The data of a hand for exact sweeps at any posture; L links.
+    """The data of a hand for full-width sweeps at any posture; L links.
 
     Args:
         links: every link that can touch as a body, in its own frame.
@@ -83,23 +83,25 @@ def _within(hand: Hand, across: np.ndarray) -> np.ndarray:
     return checked
 
 
-def pack_exact(hand: Hand, plans: Sequence[FingerPlan], wanted: Sequence[bool], bodies: HandBodies) -> ExactArrays:
+def pack_full_width(
+    hand: Hand, plans: Sequence[FingerPlan], requested: Sequence[bool], bodies: HandBodies
+) -> FullWidthArrays:
     """Pack the links of the plans' fingers and how their joints move them; the object is left out.
 
     Args:
-        hand: the hand. plans: one per entry. wanted: per item. bodies: see `hand_bodies`.
+        hand: the hand. plans: one per finger posture. requested: per candidate. bodies: see `hand_bodies`.
     """
     from clench.kernels.geometry.bodies import no_body
-    from clench.kernels.toi.full_width import ExactArrays
+    from clench.kernels.toi.full_width import FullWidthArrays
 
     first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
     movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
     axes = [_axis(plan, k) for plan in plans for k in range(len(plan.joints))]
     poses = [hand.link_poses(plan.posture)[:, :3] for plan in plans]
     rows = [(link, joint, pose[link]) for found, pose in zip(movers, poses, strict=True) for link, joint in found]
-    return ExactArrays(
+    return FullWidthArrays(
         joint_first=first.astype(np.int64),
-        wanted=np.array(wanted, dtype=np.int64),
+        requested=np.array(requested, dtype=np.int64),
         links=bodies.links,
         object=no_body(),
         mover_first=np.cumsum([0, *(len(found) for found in movers)]).astype(np.int64),
@@ -123,8 +125,8 @@ def _movers(hand: Hand, plan: FingerPlan, first: int) -> list[tuple[int, int]]:
 def _axis(plan: FingerPlan, k: int) -> tuple[FloatArray, FloatArray]:
     """Return axis and anchor of a joint in the palm frame at the open posture; a positive turn takes x towards z."""
     joint = plan.joints[k]
-    family = plan.families[joint.family]
-    return -family.T_palm_family[:3, 1], family.pivot_in_palm(joint.pivot)
+    axis_group = plan.axis_groups[joint.axis_group]
+    return -axis_group.T_palm_axis_group[:3, 1], axis_group.pivot_in_palm(joint.pivot)
 
 
 def swept_deviation(hand: Hand, source: CollisionSource, packed: PackedObject) -> float:

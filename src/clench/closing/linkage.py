@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def plan_frames(hand: Hand, plans: Sequence[FingerPlan]) -> FrameArrays:
-    """Return the kinematics of a hand with the plans of its fingers, one entry each."""
+    """Return the kinematics of a hand with the plans of its fingers, one finger posture each."""
     return hand_frames(hand)._replace(
         posture=np.array([plan.posture for plan in plans], dtype=np.float64),
-        group_leader=_whole([leader for plan in plans for leader in plan.leaders]),
+        dof_leader=_whole([leader for plan in plans for leader in plan.leaders]),
         chain_joint=_whole([p.joint for plan in plans for p in plan.joints]),
         chain_turn=np.array([p.turn for plan in plans for p in plan.joints], dtype=np.float64),
     )
@@ -37,7 +37,7 @@ def placed_links(hand: Hand, q: FloatArray) -> FloatArray:
 
 
 def hand_frames(hand: Hand) -> FrameArrays:
-    """Return the kinematics of a hand without any entry; made once per hand."""
+    """Return the kinematics of a hand without any finger posture; made once per hand."""
     return hand.kept(("frames",), lambda: _make_frames(hand))
 
 
@@ -61,7 +61,7 @@ def _make_frames(hand: Hand) -> FrameArrays:
         ratio=np.array([c.ratio for c in couplings], dtype=np.float64),
         offset=np.array([c.offset for c in couplings], dtype=np.float64),
         posture=np.empty((0, len(joints))),
-        group_leader=_whole([]),
+        dof_leader=_whole([]),
         chain_joint=_whole([]),
         chain_turn=np.empty(0),
         breakaway=_whole([c.breakaway for c in couplings]),

@@ -29,7 +29,7 @@ class RoundedOutline:
     """The section of a shape: all points within `radius` of a core.
 
     Args:
-        vertices: of the core [m], in the family's (x, z), shape (N, 2).
+        vertices: of the core [m], in the axis group's (x, z), shape (N, 2).
         sides: rows (n_x, n_z, g, t_a, t_b), shape (M, 5): outward unit normal, offset, and the two ends along
             (-n_z, n_x) [m].
         radius: [m]. both: the sides' winding is not known, so both faces count.
@@ -65,24 +65,24 @@ class RoundedOutline:
         return np.stack([foot + along * self.sides[:, 3:4], foot + along * self.sides[:, 4:5]], axis=1)
 
 
-def cut_shape(shape: Shape, T_family_link: FloatArray, offset: float) -> RoundedOutline | None:
-    """Cut one shape by the plane `y_family = offset`.
+def cut_shape(shape: Shape, T_axis_group_link: FloatArray, offset: float) -> RoundedOutline | None:
+    """Cut one shape by the plane `y_axis_group = offset`.
 
     Args:
-        shape: in its link's frame. T_family_link: shape (4, 4). offset: [m].
+        shape: in its link's frame. T_axis_group_link: shape (4, 4). offset: [m].
 
     Returns:
-        the outline in family coordinates, or None where the plane misses the shape.
+        the outline in coordinates of the axis group, or None where the plane misses the shape.
     """
-    T = T_family_link @ shape.pose.matrix
+    T = T_axis_group_link @ shape.pose.matrix
     if shape.kind is ShapeKind.MESH or shape.kind is ShapeKind.BOX:
         return _cut_mesh(shape, T, offset)
     return _cut_round(shape, T, offset)
 
 
-def extent(shape: Shape, T_family_link: FloatArray) -> tuple[float, float]:
-    """Return the least and greatest y of a shape in the family's frame [m]."""
-    T = T_family_link @ shape.pose.matrix
+def extent(shape: Shape, T_axis_group_link: FloatArray) -> tuple[float, float]:
+    """Return the least and greatest y of a shape in the axis group's frame [m]."""
+    T = T_axis_group_link @ shape.pose.matrix
     y = T[1, :3]
     a, b, c = shape.size
     match shape.kind:

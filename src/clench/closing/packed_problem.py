@@ -24,7 +24,7 @@ from .hand_plan import HandPlan
 from .start_blocking import link_masks
 
 if TYPE_CHECKING:
-    from clench.kernels.closing.layout import ItemArrays
+    from clench.kernels.closing.layout import CandidateArrays
     from clench.kernels.closing.solve_layout import Arena, CommandArrays, ObjectArrays, ProblemArrays
 
 #: Segments per plane that an arena holds before it has to grow.
@@ -60,20 +60,20 @@ class PackedProblem:
         return kept(self.arrays)
 
     def staying(self, present: NDArray[np.int64], margin: float) -> PackedProblem:
-        """Return the problem with other items that go before others; see `CommandArrays`."""
+        """Return the problem with other candidates that go before others; see `CommandArrays`."""
         command = self.arrays.command._replace(present=present, margin=margin)
         return replace(self, arrays=self.arrays._replace(command=command))
 
     @property
     def most_planes(self) -> int:
-        """Number of planes of the largest entry."""
+        """Number of planes of the largest finger posture."""
         hand = self.arrays.hand
-        return int(np.diff(hand.family_plane[hand.entry_family]).max())
+        return int(np.diff(hand.axis_group_plane[hand.first_axis_group]).max())
 
     @property
     def most_contacts(self) -> int:
-        """Number of joints of the largest entry, each of which one contact may stop."""
-        return int(np.diff(self.arrays.exact.joint_first).max())
+        """Number of joints of the largest finger posture, each of which one contact may stop."""
+        return int(np.diff(self.arrays.full_width.joint_first).max())
 
     @contextmanager
     def arena(self) -> Iterator[Arena]:
@@ -146,11 +146,11 @@ def pack_problem(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: b
 def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) -> ProblemArrays:
     from clench.kernels.closing.solve_layout import ProblemArrays
 
-    target, bodies, items = object_arrays(packed), plan.bodies, items_around(plan, packed)
+    target, bodies, candidates = object_arrays(packed), plan.bodies, candidates_around(plan, packed)
     return ProblemArrays(
-        hand=plan.arrays(planar=bool((items.low < items.high).any())),
-        exact=plan.exact._replace(object=target.bodies),
-        items=items,
+        hand=plan.arrays(planar=bool((candidates.low < candidates.high).any())),
+        full_width=plan.full_width_arrays._replace(object=target.bodies),
+        candidates=candidates,
         target=target,
         nothing=nothing_to_close(),
         frames=plan.frames,
@@ -159,7 +159,7 @@ def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) ->
         meshes=link_mesh_arrays(plan.hand, plan.source),
         across=bodies.across,
         apart=np.asarray(bodies.across - bodies.within),
-        command=_pack_command(plan, terms, tip_only, planes_tell(plan, items)),
+        command=_pack_command(plan, terms, tip_only, planes_tell(plan, candidates)),
         fingers=pack_finger_links(plan),
     )
 
@@ -187,8 +187,8 @@ def _pack_command(plan: HandPlan, terms: Terms, tip_only: bool, crossing: bool) 
         margin=0.0,
         times=plan.times,
         together=plan.together,
-        whole=plan.full,
-        chosen=plan.item_finger == list(range(len(fingers))),
+        full_width=plan.full,
+        chosen=plan.candidate_finger == list(range(len(fingers))),
         crossing=crossing,
         several=plan.several,
         nested=link_within_link(hand, start, source, plan.bodies.across) is not None,
@@ -204,26 +204,26 @@ def _own_joints(fingers: Sequence[Finger]) -> np.ndarray:
     return joints
 
 
-def items_around(plan: HandPlan, packed: PackedObject) -> ItemArrays:
-    """Return the items of a plan as they close around an object.
+def candidates_around(plan: HandPlan, packed: PackedObject) -> CandidateArrays:
+    """Return the candidates of a plan as they close around an object.
 
     The full width needs no planes around exactly swept shapes: the sweep alone is faster. Cylinders and ellipsoids are
     swept as polyhedra, so a plane can show an earlier contact with the true shape.
     """
     if packed.is_curved:
-        return plan.items
-    return plan.items._replace(high=np.where(plan.whole, plan.items.low, plan.items.high))
+        return plan.candidates
+    return plan.candidates._replace(high=np.where(plan.is_full_width, plan.candidates.low, plan.candidates.high))
 
 
-def planes_tell(plan: HandPlan, items: ItemArrays) -> bool:
+def planes_tell(plan: HandPlan, candidates: CandidateArrays) -> bool:
     """Say whether planes tell, too, which fingers overlap the object at the start; of the full width the links do.
 
     Args:
-        plan: of the hand. items: see `items_around`.
+        plan: of the hand. candidates: see `candidates_around`.
     """
-    planar = items.low < items.high
-    whole = np.array(plan.whole, dtype=bool)
-    return bool(planar[whole].any() if whole.any() else planar.any() and not plan.full)
+    planar = candidates.low < candidates.high
+    full_width = np.array(plan.is_full_width, dtype=bool)
+    return bool(planar[full_width].any() if full_width.any() else planar.any() and not plan.full)
 
 
 def object_arrays(packed: PackedObject) -> ObjectArrays:

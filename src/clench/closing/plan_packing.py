@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PackedPlans:
-    """Pack plans, one entry each, with every index global; see `HandArrays`.
+    """Pack plans, one finger posture each, with every index global; see `HandArrays`.
 
     Args:
         plans: of the fingers.
@@ -33,29 +33,29 @@ class PackedPlans:
         """What closings that sweep no plane read; it saves cutting the links."""
         from clench.kernels.closing.layout import HandArrays
 
-        families = [f for plan in self.plans for f in plan.families]
-        planes = [len(f.offsets) for f in families]
+        axis_groups = [f for plan in self.plans for f in plan.axis_groups]
+        planes = [len(f.offsets) for f in axis_groups]
         return HandArrays(
-            entry_group=_firsts([len(plan.lengths) for plan in self.plans]),
-            entry_family=_firsts([len(plan.families) for plan in self.plans]),
+            first_dof=_firsts([len(plan.lengths) for plan in self.plans]),
+            first_axis_group=_firsts([len(plan.axis_groups) for plan in self.plans]),
             chain=_chain(self.plans),
             outlines=_outlines([]),
-            family_pose=np.array([pose for plan in self.plans for pose in _relative_poses(plan)]).reshape(-1, 3, 4),
-            family_plane=_firsts(planes),
-            plane_offset=np.concatenate([f.offsets for f in families]) if families else np.empty(0),
-            family_reach=np.zeros(len(families)),
-            family_length=np.array([plan.length for plan in self.plans for _ in plan.families]),
+            axis_group_pose=np.array([pose for plan in self.plans for pose in _relative_poses(plan)]).reshape(-1, 3, 4),
+            axis_group_plane=_firsts(planes),
+            plane_offset=np.concatenate([f.offsets for f in axis_groups]) if axis_groups else np.empty(0),
+            axis_group_reach=np.zeros(len(axis_groups)),
+            axis_group_length=np.array([plan.length for plan in self.plans for _ in plan.axis_groups]),
             plane_outline=np.zeros(sum(planes) + 1, dtype=np.int64),
         )
 
     @cached_property
     def with_outlines(self) -> HandArrays:
         """What closings on planes read."""
-        families = [f for plan in self.plans for f in plan.families]
+        axis_groups = [f for plan in self.plans for f in plan.axis_groups]
         return self.without_outlines._replace(
             outlines=_outlines(self.plans),
-            family_reach=np.array([f.reach for f in families]),
-            plane_outline=_firsts([len(row) for f in families for row in f.outlines]),
+            axis_group_reach=np.array([f.reach for f in axis_groups]),
+            plane_outline=_firsts([len(row) for f in axis_groups for row in f.outlines]),
         )
 
 
@@ -64,13 +64,13 @@ def _firsts(counts: list[int]) -> np.ndarray:
 
 
 def _relative_poses(plan: FingerPlan) -> list[FloatArray]:
-    """Return the pose of the first family in the palm, and of each other one on the last pivot before it."""
+    """Return the pose of the first axis group in the palm, and of each other one on the last pivot before it."""
     poses = []
-    for f, family in enumerate(plan.families):
-        pose = family.T_palm_family
+    for f, axis_group in enumerate(plan.axis_groups):
+        pose = axis_group.T_palm_axis_group
         if f:
-            before = plan.families[f - 1].T_palm_family.copy()
-            last = [p for p in plan.joints if p.family == f - 1][-1]
+            before = plan.axis_groups[f - 1].T_palm_axis_group.copy()
+            last = [p for p in plan.joints if p.axis_group == f - 1][-1]
             before[:3, 3] += before[:3, 0] * last.pivot[0] + before[:3, 2] * last.pivot[1]
             pose = invert(before) @ pose
         poses.append(pose[:3])
@@ -80,24 +80,24 @@ def _relative_poses(plan: FingerPlan) -> list[FloatArray]:
 def _chain(plans: Sequence[FingerPlan]) -> ChainArrays:
     from clench.kernels.closing.layout import ChainArrays
 
-    joints, family_first, group_first = [], 0, 0
+    joints, axis_group_first, dof_first = [], 0, 0
     for plan in plans:
         before = None
         for p in plan.joints:
-            same = before is not None and before.family == p.family
+            same = before is not None and before.axis_group == p.axis_group
             offset = p.pivot - before.pivot if same and before is not None else p.pivot
-            joints.append((p.family + family_first, p.group + group_first, offset, p.rate, p.start, p.stop))
+            joints.append((p.axis_group + axis_group_first, p.dof + dof_first, offset, p.rate, p.start, p.stop))
             before = p
-        family_first += len(plan.families)
-        group_first += len(plan.lengths)
+        axis_group_first += len(plan.axis_groups)
+        dof_first += len(plan.lengths)
     return ChainArrays(
-        joint_family=np.array([j[0] for j in joints], dtype=np.int64),
-        joint_group=np.array([j[1] for j in joints], dtype=np.int64),
+        joint_axis_group=np.array([j[0] for j in joints], dtype=np.int64),
+        joint_dof=np.array([j[1] for j in joints], dtype=np.int64),
         pivot=np.array([j[2] for j in joints]).reshape(-1, 2),
         rate=np.array([j[3] for j in joints], dtype=np.float64),
         start=np.array([j[4] for j in joints], dtype=np.float64),
         stop=np.array([j[5] for j in joints], dtype=np.float64),
-        group_length=np.array([length for plan in plans for length in plan.lengths], dtype=np.float64),
+        dof_length=np.array([length for plan in plans for length in plan.lengths], dtype=np.float64),
         speed=np.array([speed for plan in plans for speed in plan.speeds], dtype=np.float64),
         breaks=np.array([breaks for plan in plans for breaks in plan.breaks], dtype=np.int64),
     )
@@ -109,8 +109,8 @@ def _outlines(plans: Sequence[FingerPlan]) -> OutlineArrays:
     joint, link, outlines = [], [], []
     joint_first = 0
     for plan in plans:
-        for family in plan.families:
-            for item in (o for row in family.outlines for o in row):
+        for axis_group in plan.axis_groups:
+            for item in (o for row in axis_group.outlines for o in row):
                 joint.append(item.joint + joint_first)
                 link.append(item.link)
                 outlines.append(item.outline)

@@ -19,7 +19,7 @@ from .hand_plan import HandPlan
 
 
 class LinkMasks(NamedTuple):
-    """Masks of meshes, (E, M) each: those of the entry's finger, and those of them that closing does not move."""
+    """Masks of meshes, (E, M) each: those of the finger, and those of them that closing does not move."""
 
     own: NDArray[np.int64]
     resting: NDArray[np.int64]
@@ -37,7 +37,7 @@ def link_masks(hand: Hand, plans: tuple[FingerPlan, ...], source: CollisionSourc
 def start_overlaps(
     plan: HandPlan, blocked: NDArray[np.int64], packed: PackedObject, T_palm_object: FloatArray
 ) -> list[LinkDepth | None]:
-    """Return the link that overlaps the object deepest at the start, or None, for every entry.
+    """Return the link that overlaps the object deepest at the start, or None, for every finger posture.
 
     Args:
         plan: of the hand. blocked: blocked flags from the kernels, see `Closed`, shape (E,).

@@ -6,11 +6,11 @@ from typing import Final
 
 #: Feature pairs with |gap| below this fraction of the finger's length touch [-] (section 3).
 TOUCH_FRACTION: Final = 1e-9
-#: The exact sweep stops a link at a positive gap of at most this fraction of the finger's length [-] (section 5).
+#: The full-width sweep stops a link at a positive gap of at most this fraction of the finger's length [-] (section 5).
 SWEEP_FRACTION: Final = 1e-10
 #: Foot points count as inside up to this fraction of the feature's length [-] (section 3).
 FOOT_FRACTION: Final = 1e-12
-#: Axes closer than this share one family of curl planes [rad] (section 1). With 1e-6, a finger of 0.1 m would be off by
+#: Axes closer than this are of one axis group [rad] (section 1). With 1e-6, a finger of 0.1 m would be off by
 #: 1e-7 m: a hundred times the gap tolerance of a contact.
 PARALLEL_ANGLE: Final = 1e-9
 #: Joints within this of the most distal joint's axis close the finger [rad] (section 1).

@@ -48,7 +48,7 @@ class GraspCommand:
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
         check_sets: measure the penetration of every alternative set, which costs more than the solve.
-        measure: measure the penetration of the chosen set over the whole width, which costs as much as the solve.
+        measure: measure the penetration of the chosen set over the full width, which costs as much as the solve.
         collision_source: geometry of the hand; None is the hand's default.
         opposition_grid: offsets [rad] added to the thumb's first posture joint as alternatives.
         criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.

@@ -148,7 +148,7 @@ class Closer:
     ) -> list[Trial]:
         score, bound = self.bounds(batch)
         kinds = contact_kinds(self.hand, batch.contacts.first, batch.contacts.link, self._counted(batch)[1])
-        wanted = [KINDS.index(GraspKind(kind)) for kind in self.asked.kinds or GraspKind]
+        requested = [KINDS.index(GraspKind(kind)) for kind in self.asked.kinds or GraspKind]
         touching = self._touching(batch)
         thumbs = [k for k, f in enumerate(batch.finger_names) if self.hand.finger(f).is_thumb]
         at_limit = (batch.finger_codes[:, thumbs] == _LIMIT).any(axis=1)
@@ -158,7 +158,7 @@ class Closer:
             (~holds & at_limit, Rejection.THUMB_LIMIT),
             (~holds | (touching < self.asked.min_fingers), Rejection.NO_GRASP),
             (~batch.certified, Rejection.NOT_CERTIFIED),
-            (~np.isin(kinds, wanted), Rejection.OTHER_KIND),
+            (~np.isin(kinds, requested), Rejection.OTHER_KIND),
             (~in_region, Rejection.REGION),
             (bound <= 0.0, Rejection.NO_CLOSURE),
         )

@@ -86,7 +86,7 @@ class HandChoice:
 
 
 def choose(
-    groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration, setting: ScoringContext
+    groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration, context: ScoringContext
 ) -> HandChoice:
     """Return the best set of every finger; the sets' scores are filled on the way.
 
@@ -95,15 +95,15 @@ def choose(
     sets of the fingers are the best of all; else see `best_combination`.
 
     Args:
-        groups: sets of every finger. calibration: weights and limits. setting: context of the judgement.
+        groups: sets of every finger. calibration: weights and limits. context: context of the judgement.
     """
     criteria = {name: find_criterion(name, calibration.name) for name in calibration.criteria}
     of_finger = [name for name, c in criteria.items() if is_of_finger(c)]
     for group in groups:
-        score_sets(group, of_finger, setting)
-    fingers = [_compare(group, of_finger, calibration, setting.tip_only) for group in groups]
+        score_sets(group, of_finger, context)
+    fingers = [_compare(group, of_finger, calibration, context.tip_only) for group in groups]
     of_hand = [name for name, c in criteria.items() if is_of_hand(c)]
-    judge = _HandJudge(groups, fingers, of_hand, calibration, setting)
+    judge = _HandJudge(groups, fingers, of_hand, calibration, context)
     known = {name for group in groups for c in group for name in c.scores}
     if of_hand:
         search = best_combination([finger.equals for finger in fingers], judge)
@@ -187,17 +187,17 @@ class _HandJudge:
         fingers: Sequence[FingerChoice],
         criteria: Sequence[str],
         calibration: Calibration,
-        setting: ScoringContext,
+        context: ScoringContext,
     ) -> None:
         self._groups, self._fingers, self._criteria = groups, fingers, criteria
-        self._calibration, self._setting = calibration, setting
+        self._calibration, self._context = calibration, context
         self._worth = {name: calibration.worth(name, 1.0) for name in criteria}
         self._options = [[group[i] for i in f.equals] for group, f in zip(groups, fingers, strict=True)]
         #: Values that no combination beats, by criterion; criteria that know none are missing.
         self._unbeaten: dict[str, FloatArray] = {
             name: np.array(ideal) for name in criteria if (ideal := ideal_value(name)) is not None
         }
-        prepare_hand([c for options in self._options for c in options], criteria, setting)
+        prepare_hand([c for options in self._options for c in options], criteria, context)
 
     @property
     def criteria(self) -> int:
@@ -207,7 +207,7 @@ class _HandJudge:
     def __call__(self, sets: tuple[int, ...]) -> Combination:
         """Return a combination with its scores and total."""
         chosen = [group[i] for group, i in zip(self._groups, sets, strict=True)]
-        scores = score_hand(chosen, self._criteria, self._setting)
+        scores = score_hand(chosen, self._criteria, self._context)
         total = sum(f.totals[i] for f, i in zip(self._fingers, sets, strict=True))
         total += sum(self._worth[name] * value for name, value in scores.items())
         allowed = all(self._calibration.allows(name, scores.get(name)) for name in self._criteria)
@@ -216,7 +216,7 @@ class _HandJudge:
     def ceilings(self, places: tuple[int, ...]) -> Ceilings | None:
         """Return upper bounds of all combinations; None if a criterion of the whole hand gives no bound."""
         for name in self._criteria:
-            found = bound_hand(name, self._options, places, self._setting)
+            found = bound_hand(name, self._options, places, self._context)
             if found is not None:
                 closer = np.minimum if find_criterion(name, "choice").larger_is_better else np.maximum
                 self._unbeaten[name] = closer(self._unbeaten.get(name, found), found)

@@ -142,27 +142,27 @@ def is_of_finger(criterion: Criterion | HandCriterion) -> TypeGuard[Criterion]:
     return not is_of_hand(criterion)
 
 
-def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: ScoringContext) -> None:
+def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> None:
     """Fill the scores of sets for the always-scored and the named criteria; a criterion may give no score.
 
     Raises:
         CommandError: a criterion gave a value that is not a finite number.
     """
-    wanted = dict.fromkeys([*ALWAYS, *names])
-    criteria = [c for c in map(_registry.__getitem__, wanted) if is_of_finger(c)]
+    requested = dict.fromkeys([*ALWAYS, *names])
+    criteria = [c for c in map(_registry.__getitem__, requested) if is_of_finger(c)]
     for candidate in candidates:
         for criterion in criteria:
-            value = criterion.score(candidate, setting)
+            value = criterion.score(candidate, context)
             if value is not None:
                 candidate.scores[criterion.name] = checked_value(criterion, value)
 
 
-def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], setting: ScoringContext) -> None:
+def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> None:
     """Give all sets to the named criteria that prepare for judging combinations."""
     for name in names:
         prepare = getattr(_registry[name], "prepare", None)
         if prepare is not None:
-            prepare(candidates, setting)
+            prepare(candidates, context)
 
 
 def ideal_value(name: str) -> float | None:
@@ -172,15 +172,15 @@ def ideal_value(name: str) -> float | None:
 
 
 def bound_hand(
-    name: str, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], setting: ScoringContext
+    name: str, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], context: ScoringContext
 ) -> FloatArray | None:
     """Return a criterion's bounds of all combinations, if it gives any; see `HandCriterion`."""
     bound = getattr(_registry[name], "bound", None)
-    found = None if bound is None else bound(groups, places, setting)
+    found = None if bound is None else bound(groups, places, context)
     return None if found is None else np.asarray(found, dtype=np.float64)
 
 
-def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting: ScoringContext) -> dict[str, float]:
+def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> dict[str, float]:
     """Return the values of the named whole-hand criteria for one set per finger.
 
     Raises:
@@ -189,7 +189,7 @@ def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], setting:
     scores = {}
     for name in names:
         criterion = _registry[name]
-        value = criterion.score_hand(chosen, setting) if is_of_hand(criterion) else None
+        value = criterion.score_hand(chosen, context) if is_of_hand(criterion) else None
         if value is not None:
             scores[name] = checked_value(criterion, value)
     return scores

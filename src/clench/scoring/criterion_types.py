@@ -70,7 +70,7 @@ class Criterion(Protocol):
     scale: ClassVar[float]
     larger_is_better: ClassVar[bool]
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float | None:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
         """Return the value of a set, or None when the criterion says nothing about it."""
         ...
 
@@ -81,8 +81,8 @@ class HandCriterion(Protocol):
 
     Optional members speed up the search for the best combination and let it end with a proof:
 
-    - `prepare(candidates, setting)` is given all sets before any combination is judged; - `ideal`: a value that no
-    combination beats; - `bound(groups, places, setting)` returns bounds, one axis per finger, near the value of the
+    - `prepare(candidates, context)` is given all sets before any combination is judged; - `ideal`: a value that no
+    combination beats; - `bound(groups, places, context)` returns bounds, one axis per finger, near the value of the
     combination that takes set `places[k]` of `groups[k]`; None: no bound.
     """
 
@@ -92,7 +92,7 @@ class HandCriterion(Protocol):
     scale: ClassVar[float]
     larger_is_better: ClassVar[bool]
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return the value of one set per finger, or None when the criterion says nothing about them."""
         ...
 

@@ -30,11 +30,11 @@ class RangeOfMotion:
     scale: ClassVar[float] = 1.0
     larger_is_better: ClassVar[bool] = False
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float:
         """Return Σ |Δq| [rad]."""
-        moved = np.abs(own_angles(candidate, candidate.q - setting.start))
-        if setting.joint_weights is not None:
-            moved = moved * own_angles(candidate, setting.joint_weights)
+        moved = np.abs(own_angles(candidate, candidate.q - context.start))
+        if context.joint_weights is not None:
+            moved = moved * own_angles(candidate, context.joint_weights)
         return float(moved.sum())
 
 
@@ -47,7 +47,7 @@ class TouchingLinks:
     scale: ClassVar[float] = 1.0
     larger_is_better: ClassVar[bool] = True
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float:
         """Return the number of touching links."""
         return float(len({t.link for t in candidate.holding}))
 
@@ -61,10 +61,10 @@ class LimitDistance:
     scale: ClassVar[float] = 0.5
     larger_is_better: ClassVar[bool] = True
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float:
         """Return the least distance to a limit in the closing direction, 0 to 1."""
         q = candidate.q
-        return min([1.0, *(abs(end - q.item(j)) / span for j, end, span in _ranges(setting.hand, candidate.plan))])
+        return min([1.0, *(abs(end - q.item(j)) / span for j, end, span in _ranges(context.hand, candidate.plan))])
 
 
 def _ranges(hand: Hand, plan: FingerPlan) -> list[tuple[int, float, float]]:
@@ -83,11 +83,11 @@ class NextStepTime:
     scale: ClassVar[float] = 0.5
     larger_is_better: ClassVar[bool] = False
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float | None:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
         """Return Σ over the steps of max |Δq| / velocity [s]; None without next steps."""
         joints = candidate.plan.finger.joints
-        speeds = np.array([setting.hand.joints[j].velocity or DEFAULT_SPEED for j in joints])
-        moves = _moves(candidate, setting)
+        speeds = np.array([context.hand.joints[j].velocity or DEFAULT_SPEED for j in joints])
+        moves = _moves(candidate, context)
         return None if moves is None else float((moves / speeds).max(axis=1, initial=0.0).sum())
 
 
@@ -100,19 +100,19 @@ class NextStepDistance:
     scale: ClassVar[float] = 1.0
     larger_is_better: ClassVar[bool] = False
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float | None:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
         """Return Σ |Δq| over steps and joints [rad]; None without next steps."""
-        moves = _moves(candidate, setting)
+        moves = _moves(candidate, context)
         return None if moves is None else float(moves.sum())
 
 
-def _moves(candidate: FingerCandidate, setting: ScoringContext) -> np.ndarray | None:
+def _moves(candidate: FingerCandidate, context: ScoringContext) -> np.ndarray | None:
     """Return |Δq| of the finger's joints in every step, shape (S, joints) [rad]; joints not named stay."""
-    if not setting.steps:
+    if not context.steps:
         return None
     at = own_angles(candidate, candidate.q)
     moves = []
-    for step in setting.steps:
+    for step in context.steps:
         named = own_angles(candidate, step)
         then = np.where(np.isnan(named), at, named)
         moves.append(np.abs(then - at))
@@ -129,15 +129,15 @@ class Clearance:
     scale: ClassVar[float] = 0.01
     larger_is_better: ClassVar[bool] = True
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float | None:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
         """Return the gap [m]; None without obstacles."""
-        if setting.obj is None or setting.T_palm_object is None or setting.source is None:
+        if context.obj is None or context.T_palm_object is None or context.source is None:
             return None
-        if all(body.role is BodyRole.GRASPABLE for body in setting.obj.bodies):
+        if all(body.role is BodyRole.GRASPABLE for body in context.obj.bodies):
             return None
-        links, there = candidate.plan.finger.links, setting.T_palm_object
-        body = obstacle_body(setting.obj)
-        gap, _ = nearest_link(setting.hand, candidate.q, links, setting.source, body, there)
+        links, there = candidate.plan.finger.links, context.T_palm_object
+        body = obstacle_body(context.obj)
+        gap, _ = nearest_link(context.hand, candidate.q, links, context.source, body, there)
         return min(gap, MOST_CLEARANCE)
 
 
@@ -150,9 +150,9 @@ class PoseSensitivity:
     scale: ClassVar[float] = 50.0
     larger_is_better: ClassVar[bool] = False
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float | None:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
         """Return max |dq/dx| [rad/m]; None where a joint's is not known, and for other closing orders."""
-        s = setting
+        s = context
         in_stages = s.in_stages and not any(candidate.plan.breaks)
         if s.packed is None or s.T_palm_object is None or s.source is None or not in_stages or candidate.overlap:
             return None
@@ -175,6 +175,6 @@ class PadIndentation:
     scale: ClassVar[float] = 1e-3
     larger_is_better: ClassVar[bool] = False
 
-    def score(self, candidate: FingerCandidate, setting: ScoringContext) -> float | None:
+    def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
         """Return the depth along path and at the end [m]; None when not measured (`check_sets`)."""
         return candidate.penetration

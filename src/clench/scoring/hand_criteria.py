@@ -39,33 +39,33 @@ class Steadiness:
     scale: ClassVar[float] = 0.1
     larger_is_better: ClassVar[bool] = True
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return epsilon [N per N of normal force], 0 without force closure."""
-        if setting.obj is None:
+        if context.obj is None:
             return None
-        wrenches = np.vstack([np.empty((0, 6)), *(_wrenches(c, setting) for c in chosen)])
+        wrenches = np.vstack([np.empty((0, 6)), *(_wrenches(c, context) for c in chosen)])
         ball = epsilon_l1(wrenches)
         if ball.weakest is not None:
-            setting.kept.setdefault(_WEAKEST, []).append(ball.weakest)
+            context.kept.setdefault(_WEAKEST, []).append(ball.weakest)
         return ball.radius
 
-    def prepare(self, candidates: Sequence[FingerCandidate], setting: ScoringContext) -> None:
+    def prepare(self, candidates: Sequence[FingerCandidate], context: ScoringContext) -> None:
         """Compute the wrenches of all sets in one call, which takes a tenth of the time of single calls."""
-        if setting.obj is not None:
-            _keep_wrenches(candidates, setting)
+        if context.obj is not None:
+            _keep_wrenches(candidates, context)
 
     def bound(
-        self, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], setting: ScoringContext
+        self, groups: Sequence[Sequence[FingerCandidate]], places: tuple[int, ...], context: ScoringContext
     ) -> FloatArray | None:
         """Return how far every combination reaches along a direction in which one is weak [N per N]."""
-        if setting.obj is None:
+        if context.obj is None:
             return None
         key = ("alternatives", *(id(c) for group in groups for c in group))
-        if key not in setting.kept:
-            wrenches = [[_wrenches(c, setting) for c in group] for group in groups]
-            setting.kept[key] = AlternativeWrenches(wrenches)
-        alternatives: AlternativeWrenches = setting.kept[key]
-        return alternatives.bound(places, setting.kept.pop(_WEAKEST, ()))
+        if key not in context.kept:
+            wrenches = [[_wrenches(c, context) for c in group] for group in groups]
+            context.kept[key] = AlternativeWrenches(wrenches)
+        alternatives: AlternativeWrenches = context.kept[key]
+        return alternatives.bound(places, context.kept.pop(_WEAKEST, ()))
 
 
 class ActuationForce:
@@ -78,9 +78,9 @@ class ActuationForce:
     ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return the torque [Nm per N]; None when the contacts cannot hold the object."""
-        return _worst_torque(chosen, setting, weight(_NEWTON, setting.gravity))
+        return _worst_torque(chosen, context, weight(_NEWTON, context.gravity))
 
 
 class ActuationForceAnyWay:
@@ -93,9 +93,9 @@ class ActuationForceAnyWay:
     ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return the torque over 12 loads whose hull holds 1 N in every direction [Nm per N]; None as above."""
-        return _worst_torque(chosen, setting, gravity_any_direction(_NEWTON))
+        return _worst_torque(chosen, context, gravity_any_direction(_NEWTON))
 
 
 class ActuationForceSixPulls:
@@ -108,9 +108,9 @@ class ActuationForceSixPulls:
     ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return the torque over six pulls of 1 N at the centre of mass, each alone [Nm per N]; None as above."""
-        return _worst_torque(chosen, setting, six_pulls(1.0))
+        return _worst_torque(chosen, context, six_pulls(1.0))
 
 
 class ActuationForceTask:
@@ -123,10 +123,10 @@ class ActuationForceTask:
     ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return the torque [Nm]; None without task wrenches, or if a wrench cannot be held inside all limits."""
-        held = _held(chosen, setting) if len(setting.task) else None
-        return None if held is None else _worst(held, [task_wrench(w[:3], w[3:], held.length)[0] for w in setting.task])
+        held = _held(chosen, context) if len(context.task) else None
+        return None if held is None else _worst(held, [task_wrench(w[:3], w[3:], held.length)[0] for w in context.task])
 
 
 class TendonTension:
@@ -139,18 +139,18 @@ class TendonTension:
     ideal: ClassVar[float] = 0.0
     larger_is_better: ClassVar[bool] = False
 
-    def score_hand(self, chosen: Sequence[FingerCandidate], setting: ScoringContext) -> float | None:
+    def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
         """Return the tension [N]; None without tendons, or when they or the contacts cannot hold the object."""
-        held = _held(chosen, setting)
+        held = _held(chosen, context)
         if held is None or held.drive is None:
             return None
-        plan = least_effort(held, weight(_NEWTON, setting.gravity)[0], Effort.TENSION)
+        plan = least_effort(held, weight(_NEWTON, context.gravity)[0], Effort.TENSION)
         return None if plan is None else plan.worst_tension
 
 
-def _worst_torque(chosen: Sequence[FingerCandidate], setting: ScoringContext, loads: FloatArray) -> float | None:
+def _worst_torque(chosen: Sequence[FingerCandidate], context: ScoringContext, loads: FloatArray) -> float | None:
     """Return the smallest worst torque over loads, without regard to torque limits; None when one cannot be held."""
-    held = _held(chosen, setting)
+    held = _held(chosen, context)
     return None if held is None else _worst(held.without_limits(), loads)
 
 
@@ -165,50 +165,50 @@ def _worst(held: HeldObject, loads: Iterable[FloatArray]) -> float | None:
     return worst
 
 
-def _held(chosen: Sequence[FingerCandidate], setting: ScoringContext) -> HeldObject | None:
-    """Return the object as the sets hold it; None when the setting has none, or nothing touches."""
-    if setting.obj is None or not any(c.holding for c in chosen):
+def _held(chosen: Sequence[FingerCandidate], context: ScoringContext) -> HeldObject | None:
+    """Return the object as the sets hold it; None when the context has none, or nothing touches."""
+    if context.obj is None or not any(c.holding for c in chosen):
         return None
-    contacts = _contacts(chosen, setting)
-    return held_by_hand(setting.hand, combined_posture(setting.hand, setting.start, chosen), contacts, *_mass(setting))
+    contacts = _contacts(chosen, context)
+    return held_by_hand(context.hand, combined_posture(context.hand, context.start, chosen), contacts, *_mass(context))
 
 
-def _wrenches(candidate: FingerCandidate, setting: ScoringContext) -> FloatArray:
+def _wrenches(candidate: FingerCandidate, context: ScoringContext) -> FloatArray:
     """Return the wrenches of the edges of a set's friction cones, shape (N, 6); found once per set."""
     key = ("wrenches", id(candidate))
-    if key not in setting.kept:
-        _keep_wrenches([candidate], setting)
-    found: FloatArray = setting.kept[key][1]
+    if key not in context.kept:
+        _keep_wrenches([candidate], context)
+    found: FloatArray = context.kept[key][1]
     return found
 
 
-def _keep_wrenches(candidates: Sequence[FingerCandidate], setting: ScoringContext) -> None:
+def _keep_wrenches(candidates: Sequence[FingerCandidate], context: ScoringContext) -> None:
     """Compute the wrenches of several sets in one call; sets are kept with them, so that identities stay unique."""
     for c in candidates:
-        setting.kept["wrenches", id(c)] = (c, np.empty((0, 6)))
+        context.kept["wrenches", id(c)] = (c, np.empty((0, 6)))
     holding = [c for c in candidates if c.holding]
     if not holding:
         return
-    whole = held_by_contacts(_contacts(holding, setting), *_mass(setting)).edge_wrenches(EDGES)
+    whole = held_by_contacts(_contacts(holding, context), *_mass(context)).edge_wrenches(EDGES)
     for c, own in zip(holding, np.split(whole, np.cumsum([len(c.holding) for c in holding])[:-1]), strict=True):
-        setting.kept["wrenches", id(c)] = (c, own.reshape(-1, 6))
+        context.kept["wrenches", id(c)] = (c, own.reshape(-1, 6))
 
 
-def _contacts(chosen: Sequence[FingerCandidate], setting: ScoringContext) -> ContactSet:
+def _contacts(chosen: Sequence[FingerCandidate], context: ScoringContext) -> ContactSet:
     """Return the contacts of sets in the palm frame."""
-    assert setting.obj is not None
+    assert context.obj is not None
     touches = [t for c in chosen for t in c.holding]
     return make_contacts(
         np.array([t.position for t in touches]),
         -np.array([t.normal for t in touches]),
-        [pair_friction(setting.hand, t.link, setting.obj.bodies[t.body]) for t in touches],
+        [pair_friction(context.hand, t.link, context.obj.bodies[t.body]) for t in touches],
         links=[t.link for t in touches],
     )
 
 
-def _mass(setting: ScoringContext) -> tuple[FloatArray, float]:
+def _mass(context: ScoringContext) -> tuple[FloatArray, float]:
     """Return the centre of mass in the palm frame [m] and the length scale [m]."""
-    assert setting.obj is not None
-    assert setting.T_palm_object is not None
-    mass = mass_properties(setting.obj)
-    return setting.T_palm_object[:3, :3] @ mass.center + setting.T_palm_object[:3, 3], mass.length
+    assert context.obj is not None
+    assert context.T_palm_object is not None
+    mass = mass_properties(context.obj)
+    return context.T_palm_object[:3, :3] @ mass.center + context.T_palm_object[:3, 3], mass.length

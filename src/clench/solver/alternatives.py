@@ -10,7 +10,7 @@ from clench.closing.candidates import FingerCandidate, read_candidates
 from clench.closing.collision.containment import link_within_link
 from clench.closing.feasibility import judge_sets
 from clench.closing.hand_plan import HandPlan
-from clench.closing.kernel_run import close_items, row_of
+from clench.closing.kernel_run import close_candidates, row_of
 from clench.closing.packed_problem import PackedProblem, Terms, pack_problem
 from clench.closing.start_blocking import start_overlaps
 from clench.core.caching.deferring import once
@@ -67,7 +67,7 @@ def candidates_of(problem: Problem, calibration: Calibration) -> Candidates:
     if plan.full_width is not None:
         return Candidates(pack_problem(plan.full_width, problem.packed, (), tip_only), True)
     few = all(len(p.finger.joints) <= _MOST_JOINTS for p in plan.plans)
-    by_sums = not any(plan.whole) and not plan.several and few and not tip_only and _sums_alone(calibration)
+    by_sums = not any(plan.is_full_width) and not plan.several and few and not tip_only and _sums_alone(calibration)
     terms = _terms(calibration) if by_sums else ()
     return Candidates(pack_problem(plan, problem.packed, terms, tip_only), by_sums)
 
@@ -88,12 +88,12 @@ def finger_sets(problem: Problem) -> Groups:
     """Return all sets of every finger."""
     plan = plan_hand(problem)
     packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
-    closed = close_items(packed, problem.T_palm_object[:3])
+    closed = close_candidates(packed, problem.T_palm_object[:3])
     return group_by_finger(plan, read_sets(problem, plan, closed))
 
 
 def overlaps_of(problem: Problem, plan: HandPlan, closed: Closed) -> list[LinkDepth | None]:
-    """Return the link of every entry that overlaps the object at the start, or None; `closed` is for one pose."""
+    """Return the link of every finger posture that overlaps the object at the start, or None; `closed`: at one pose."""
     return start_overlaps(plan, closed.blocked[0], problem.packed, problem.T_palm_object)
 
 
@@ -109,11 +109,11 @@ def with_planes(problem: Problem, overlaps: Sequence[LinkDepth | None], whole: S
     """Return the sets of every finger: planes are closed now, the full widths are given.
 
     Args:
-        problem: the three inputs. overlaps: per entry. whole: the full width of every finger.
+        problem: the three inputs. overlaps: per finger posture. whole: the full width of every finger.
     """
     plan = plan_hand(problem).planes
     packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
-    closed = close_items(packed, problem.T_palm_object[:3])
+    closed = close_candidates(packed, problem.T_palm_object[:3])
     sets = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
     _judge(problem, [*sets, *whole])
     groups = group_by_finger(plan, sets)
@@ -123,7 +123,7 @@ def with_planes(problem: Problem, overlaps: Sequence[LinkDepth | None], whole: S
 def group_by_finger(plan: HandPlan, sets: Sequence[FingerCandidate]) -> Groups:
     """Return the sets of each finger that closes, in the command's order."""
     groups: Groups = [[] for _ in plan.fingers]
-    for finger, candidate in zip(plan.item_finger, sets, strict=True):
+    for finger, candidate in zip(plan.candidate_finger, sets, strict=True):
         groups[finger].append(candidate)
     return groups
 
@@ -138,22 +138,22 @@ class Alternatives:
     """The alternative sets of every finger, and the choice among them. Both are computed when first read.
 
     Args:
-        problem, calibration, setting: the basis of the choice. close: returns the sets.
+        problem, calibration, context: the basis of the choice. close: returns the sets.
     """
 
     problem: Problem
     calibration: Calibration
-    setting: ScoringContext
+    context: ScoringContext
     close: Callable[[], Groups]
 
     def __post_init__(self) -> None:
         """Make the choice once, also for threads that read at the same time: criteria keep values in the context."""
-        close, calibration, setting = self.close, self.calibration, self.setting
+        close, calibration, context = self.close, self.calibration, self.context
 
         # Nothing here refers to this object, so that it is freed as soon as nobody uses it.
         def score() -> tuple[Groups, HandChoice]:
             groups = close()
-            return groups, choose(groups, calibration, setting)
+            return groups, choose(groups, calibration, context)
 
         self._scored = once(score)
 
@@ -166,8 +166,8 @@ class Alternatives:
         """Return the sets of a finger, as closed without the other fingers, with their scores."""
         return self._scored()[0][k]
 
-    def chosen_items(self) -> tuple[list[int], bool]:
-        """Return the chosen items, and whether links already overlap at the start of their closing."""
+    def chosen_candidates(self) -> tuple[list[int], bool]:
+        """Return the chosen candidates, and whether links already overlap at the start of their closing."""
         best = [self.of_finger(k)[i] for k, i in enumerate(self.choice.chosen)]
         problem = self.problem
         opened = problem.start.copy()
@@ -176,7 +176,7 @@ class Alternatives:
             opened[own] = c.plan.posture[own]
         checked = plan_hand(problem).bodies.across
         nested = link_within_link(problem.hand, opened, problem.source, checked) is not None
-        return [c.item for c in best], nested
+        return [c.index for c in best], nested
 
     def explained(self, best: Sequence[FingerCandidate], changed: Sequence[int]) -> dict[str, Any]:
         """Return the choice as plain values; see `explain_choice`.
@@ -189,5 +189,5 @@ class Alternatives:
         for k in changed:
             explained["fingers"][best[k].plan.finger.name]["closed_again"] = True
         if changed:
-            explained["final_hand_scores"] = score_hand(best, choice.used, self.setting)
+            explained["final_hand_scores"] = score_hand(best, choice.used, self.context)
         return explained

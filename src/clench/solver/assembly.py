@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clench.closing.candidates import FingerCandidate, Touch
+from clench.closing.candidates import FingerCandidate, LinkContact
 from clench.closing.collision.depths import LinkDepth, retreat_distance
 from clench.closing.collision.object_surface import nearest_body
 from clench.closing.collision.packed_object import hash_hand
@@ -183,7 +183,7 @@ def _candidate(c: FingerCandidate, problem: Problem, placed: _Places) -> Candida
     )
 
 
-def _contact(c: FingerCandidate, t: Touch, problem: Problem, placed: _Places) -> Contact:
+def _contact(c: FingerCandidate, t: LinkContact, problem: Problem, placed: _Places) -> Contact:
     position, normal = placed[id(t)]
     return Contact(
         finger=c.plan.finger.name,
@@ -202,7 +202,7 @@ def _contact(c: FingerCandidate, t: Touch, problem: Problem, placed: _Places) ->
     )
 
 
-def _body_name(t: Touch, problem: Problem) -> str:
+def _body_name(t: LinkContact, problem: Problem) -> str:
     """Return the name of a touched body, or of a touched link of the hand itself."""
     return problem.packed.body_names[t.body] if t.body >= 0 else problem.hand.links[-1 - t.body].name
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from clench.closing.candidates import FingerCandidate, Touch
+from clench.closing.candidates import FingerCandidate, LinkContact
 from clench.closing.collision.object_surface import nearest_body
 from clench.closing.collision.reach import beside, beyond_reach, graspable_body, nearest_link
 from clench.closing.finger_plan import last_closing_joint
@@ -119,7 +119,7 @@ def _no_motion(c: FingerCandidate, problem: Problem) -> dict[str, Any]:
     return {"code": CauseCode.NO_MOTION.value, "text": text, "joints": joints}
 
 
-def _stopped(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
+def _stopped(c: FingerCandidate, t: LinkContact, problem: Problem) -> dict[str, Any]:
     hand, name = problem.hand, c.plan.finger.name
     link, joint = hand.links[t.link].name, hand.joints[t.joint].name
     if t.body >= 0:
@@ -143,7 +143,7 @@ def _stopped(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
     }
 
 
-def _missed(c: FingerCandidate, t: Touch, problem: Problem) -> dict[str, Any]:
+def _missed(c: FingerCandidate, t: LinkContact, problem: Problem) -> dict[str, Any]:
     """Name the obstruction that the link met before the tip: the object, or another body in the way."""
     if not t.graspable:
         return _stopped(c, t, problem)

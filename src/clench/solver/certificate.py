@@ -18,7 +18,7 @@ from clench.core.pose import FloatArray
 from clench.core.tolerances import ALLOWED_PENETRATION
 
 if TYPE_CHECKING:
-    from clench.kernels.toi.full_width import ExactArrays
+    from clench.kernels.toi.full_width import FullWidthArrays
 
     from .problem import Problem
 
@@ -69,14 +69,14 @@ def judge(
     problem: Problem,
     best: Sequence[FingerCandidate],
     final: FloatArray,
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     promise: Certificate | None = None,
 ) -> tuple[Sequence[LinkDepth], Sequence[LinkDepth] | None, Certificate]:
-    """Measure the overlaps at the start and at the end over the whole width, and state the guarantee.
+    """Measure the overlaps at the start and at the end over the full width, and state the guarantee.
 
     Args:
         problem: the three inputs. best: one set per finger. final: posture at the end, shape (J,) [rad].
-        exact: the hand as it was swept. promise: the guarantee, if known.
+        full_width: the hand as it was swept. promise: the guarantee, if known.
 
     Returns:
         depths of the links that no finger moves, before closing; of all links, at the end, or None where that is not
@@ -84,7 +84,7 @@ def judge(
     """
     hand, packed, T = problem.hand, problem.packed, problem.T_palm_object
     at_start = hand_depths(hand, problem.start, packed, T, problem.source, links=hand.fixed_links)
-    certificate = promise or certify(problem, best, at_start, final, exact)
+    certificate = promise or certify(problem, best, at_start, final, full_width)
     # If nothing can overlap, only the resting bodies need a measurement.
     at_end = at_start if certificate.holds else None
     if at_end is None and problem.command.measure:
@@ -97,13 +97,13 @@ def certify(
     best: Sequence[FingerCandidate],
     at_start: Sequence[LinkDepth],
     final: FloatArray,
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
 ) -> Certificate:
-    """Judge the chosen sets: swept over their whole width, from a start that is free; and the whole hand at the end.
+    """Judge the chosen sets: swept over their full width, from a start that is free; and the whole hand at the end.
 
     Args:
         problem: the three inputs. best: one set per finger. at_start: depths of the links that rest.
-        final: posture at the end, shape (J,) [rad]. exact: the hand as it was swept.
+        final: posture at the end, shape (J,) [rad]. full_width: the hand as it was swept.
     """
     hand = problem.hand
     for found in at_start:
@@ -121,13 +121,13 @@ def certify(
         if c.plane is not None:
             text = f"The set of {name} was computed on one plane; between planes nothing is known."
             return _refused(CertificateCode.ONE_PLANE, text, finger=name)
-        if not c.exact:
+        if not c.swept:
             text = f"Links of {name} overlap other links of the hand before it moves."
-            links = _overlapping(problem, c.plan.posture, exact)
+            links = _overlapping(problem, c.plan.posture, full_width)
             return _refused(CertificateCode.SELF_COLLISION_AT_START, text, links, name)
         own = c.plan.finger.own
         opened[own] = c.plan.posture[own]
-    overlap = _overlap(problem, opened, final, exact)
+    overlap = _overlap(problem, opened, final, full_width)
     if overlap is not None:
         return overlap
     return promised(problem)
@@ -142,7 +142,9 @@ def promised(problem: Problem) -> Certificate:
     return Certificate(True, f"{text}{but}.", deviation)
 
 
-def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: ExactArrays) -> Certificate | None:
+def _overlap(
+    problem: Problem, opened: FloatArray, final: FloatArray, full_width: FullWidthArrays
+) -> Certificate | None:
     """Refuse links that overlap something at the end, or lie in the object or in each other at the start.
 
     If surfaces never cross on the way, a body stays inside or outside: a check at the start is enough.
@@ -159,24 +161,24 @@ def _overlap(problem: Problem, opened: FloatArray, final: FloatArray, exact: Exa
         names = [hand.links[i].name for i in pair]
         text = f"{names[0]} lies inside {names[1]} before anything moves."
         return _refused(CertificateCode.SELF_COLLISION_AT_START, text, names)
-    found = _overlapping(problem, final, exact)
+    found = _overlapping(problem, final, full_width)
     if not found:
         return None
     code, when = CertificateCode.OVERLAP_AT_END, "at the end"
-    if _overlapping(problem, opened, exact) == found:
+    if _overlapping(problem, opened, full_width) == found:
         code, when = CertificateCode.SELF_COLLISION_AT_START, "before anything moves"
         if len(found) == 1:
             code = CertificateCode.BLOCKED_AT_START
     return _refused(code, f"{found[0]} overlaps {found[1] if len(found) > 1 else 'the object'} {when}.", found)
 
 
-def _overlapping(problem: Problem, q: FloatArray, exact: ExactArrays) -> list[str]:
+def _overlapping(problem: Problem, q: FloatArray, full_width: FullWidthArrays) -> list[str]:
     """Return the names of two links that overlap at a posture, or of a link that overlaps the object, or nothing."""
     from clench.kernels.toi.full_width import find_link_overlap
 
     hand, T = problem.hand, np.ascontiguousarray(problem.T_palm_object[:3])
     poses = placed_links(hand, q)
     across = hand_bodies(hand, problem.source, problem.start).across
-    everything = exact._replace(object=problem.packed.bodies, checked=across)
+    everything = full_width._replace(object=problem.packed.bodies, checked=across)
     pair = find_link_overlap(everything, poses, T, ALLOWED_PENETRATION)
     return [hand.links[i].name for i in pair if 0 <= i < len(hand.links)]

@@ -51,25 +51,25 @@ def plan_hand(problem: Problem) -> HandPlan:
 
 def _plan(problem: Problem) -> HandPlan:
     hand, command, start = problem.hand, problem.command, problem.start
-    entries: list[tuple[FingerPlan, int, int]] = []
+    finger_postures: list[tuple[FingerPlan, int, int]] = []
     idle = []
     for f, own in enumerate(asked_fingers(hand, command)):
         if not closing_joints(hand, own):
             idle.append(own)
             continue
         for p, q in enumerate(alternatives(hand, own, start, command)):
-            entries.append(
+            finger_postures.append(
                 (plan_finger(hand, own, q, command.planes, problem.source, command.speeds), f - len(idle), p)
             )
-    if not entries:
+    if not finger_postures:
         raise HandError(f"{hand.name}: none of the fingers asked for has a closing joint.")
     if not command.full_width:
-        _check_planes([plan for plan, _, _ in entries], command, problem.together)
+        _check_planes([plan for plan, _, _ in finger_postures], command, problem.together)
     return make_hand_plan(
         hand,
         start,
         problem.source,
-        entries,
+        finger_postures,
         idle=idle,
         full_width=command.full_width,
         together=problem.together,

@@ -23,7 +23,7 @@ from .certificate import judge, promised
 from .clock import Clock
 from .orders import best_order
 from .planning import plan_hand
-from .problem import Problem, check_calibration, make_problem, make_setting
+from .problem import Problem, check_calibration, make_context, make_problem
 from .solution import GraspSolution
 
 
@@ -59,7 +59,7 @@ class PoseSolver:
 
     def __init__(self, problem: Problem, calibration: Calibration, candidates: Candidates) -> None:
         self._problem, self._calibration, self._candidates = problem, calibration, candidates
-        self._setting = once(partial(make_setting, problem, calibration))
+        self._context = once(partial(make_context, problem, calibration))
         self._alternatives: Alternatives | None = None
 
     def solve(self) -> Answers:
@@ -69,14 +69,14 @@ class PoseSolver:
         return solve_packed(self._candidates.problem, T, choose=choose)
 
     def choose(self, answers: Answers) -> tuple[list[int], bool]:
-        """Choose among the sets that are closed at the pose; see `Alternatives.chosen_items`."""
+        """Choose among the sets that are closed at the pose; see `Alternatives.chosen_candidates`."""
         plan = self._candidates.plan
         read = partial(read_sets, self._problem, plan, answers.closed)
         self._alternatives = self._alternatives_of(lambda: group_by_finger(plan, read()))
-        return self._alternatives.chosen_items()
+        return self._alternatives.chosen_candidates()
 
     def _alternatives_of(self, close: Callable[[], list[list[FingerCandidate]]]) -> Alternatives:
-        return Alternatives(self._problem, self._calibration, self._setting(), close)
+        return Alternatives(self._problem, self._calibration, self._context(), close)
 
     def solution(self, answers: Answers, stages: Mapping[str, float]) -> GraspSolution:
         """Return the solution of answers for this pose alone; contacts, reasons and scores are made when read."""
@@ -106,26 +106,28 @@ class PoseSolver:
         if alternatives is None:
             free = read_sets(problem, plan, answers.closed)
             alternatives = self._alternatives_of(self._late_sets(answers, free))
-        items = answers.solved.chosen[0].tolist()
+        candidates = answers.solved.chosen[0].tolist()
         if free is None:
             chosen, names = alternatives.choice.chosen, alternatives.choice.used
             best = [alternatives.of_finger(k)[i] for k, i in enumerate(chosen)]
         else:
-            names, best = tuple(self._calibration.criteria), [free[i] for i in items]
-            chosen = plan_hand(problem).plane_counts if any(plan.whole) else plan.items.low[items].tolist()
-            score_sets(best, names, self._setting())
+            names, best = tuple(self._calibration.criteria), [free[i] for i in candidates]
+            chosen = (
+                plan_hand(problem).plane_counts if any(plan.is_full_width) else plan.candidates.low[candidates].tolist()
+            )
+            score_sets(best, names, self._context())
         changed = self._closed_again(answers, best)
-        score_sets([best[k] for k in changed], names, self._setting())
+        score_sets([best[k] for k in changed], names, self._context())
         final = answers.solved.angles[0]
         certificate = promised(problem) if answers.solved.certified[0] else None
-        at_start, at_end, certificate = judge(problem, best, final, plan.exact, certificate)
+        at_start, at_end, certificate = judge(problem, best, final, plan.full_width_arrays, certificate)
         explained = DeferredMapping(partial(alternatives.explained, best, changed))
         return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
 
     def _late_sets(self, answers: Answers, free: list[FingerCandidate]) -> Callable[[], list[list[FingerCandidate]]]:
         """Return a function that gives all sets of every finger, from which the kernels chose."""
         problem, plan = self._problem, self._candidates.plan
-        if any(plan.whole):
+        if any(plan.is_full_width):
             return lambda: with_planes(problem, overlaps_of(problem, plan, answers.closed), free)
         return lambda: group_by_finger(plan, free)
 
@@ -138,10 +140,10 @@ class PoseSolver:
             nowhere = [None] * len(picked.plans)
             sets = read_candidates(picked, problem.packed, row_of(closed.final, 0), problem.T_palm_object, nowhere)
             for k in anew.nonzero()[0].tolist():
-                best[k] = replace(sets[k], item=best[k].item, clear=best[k].clear)
+                best[k] = replace(sets[k], index=best[k].index, clear=best[k].clear)
         held = held_touches(picked, row_of(closed.met, 0))
         for k in sorted({*held, *overlapping.nonzero()[0].tolist()}):
             touches = (*best[k].touches, *held.get(k, ()))
-            best[k] = replace(best[k], exact=best[k].exact and not overlapping[k], touches=touches)
+            best[k] = replace(best[k], swept=best[k].swept and not overlapping[k], touches=touches)
             anew[k] = True
         return [int(k) for k in anew.nonzero()[0]]

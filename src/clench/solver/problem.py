@@ -95,8 +95,8 @@ def check_calibration(hand: Hand, calibration: Calibration) -> None:
             )
 
 
-def make_setting(problem: Problem, calibration: Calibration) -> ScoringContext:
-    """Return the setting in which the criteria score sets; see `check_calibration`."""
+def make_context(problem: Problem, calibration: Calibration) -> ScoringContext:
+    """Return the context in which the criteria score sets; see `check_calibration`."""
     hand = problem.hand
     weights = np.ones(len(hand.joints)) if calibration.joints else None
     for name, weight in calibration.joints.items():

@@ -70,7 +70,7 @@ class Contact:
     Args:
         finger, link: names. body: the touched body of the object.
         stops_joint: the joint whose motion this contact stopped, or None.
-        plane: index of the curl plane, None between the planes; offset: place along the family's y axis [m].
+        plane: index of the curl plane, None between the planes; offset: place along the axis group's y axis [m].
         kind: see `ContactKind`. passed: a later motion opened it by more than 1 µm.
         position: [m], shape (3,). normal: unit, out of the object, shape (3,).
         gap: distance left at the final posture [m].
@@ -192,7 +192,7 @@ class GraspSolution(Displayed, LateFields):
         certified, certificate: whether the certificate of docs/method.md section 5 holds. ``"text"`` states the
             guarantee or why there is none; ``"deviation"`` is that of shapes swept as polyhedra [m].
         choice: why these sets: criteria, totals, runners-up, and sentences (docs/calibration.md).
-        max_penetration: over the whole width and all links [m], None when not computed.
+        max_penetration: over the full width and all links [m], None when not computed.
         speeds: relative closing speeds of free joints in an order where all move simultaneously; 1 if not named.
         rounds: number of passes through the joints, 0 for until rest.
         next_steps: postures [rad] by joint name that the hand goes to after the grasp, as commanded.

@@ -62,8 +62,8 @@ def check_contacts(hand: clench.Hand, obj: clench.GraspObject, command: GraspCom
         scenes = FingerScenes(hand, obj, command, solution, name, result.candidates[result.chosen])
         for candidate in result.candidates:
             shown = scenes.showing(candidate)
-            for family, plane in shown.touched_planes(99):
-                scene = shown.scene(family, plane)
+            for axis_group, plane in shown.touched_planes(99):
+                scene = shown.scene(axis_group, plane)
                 for c in scene.contacts:
                     later = candidate.contacts[candidate.contacts.index(c.contact) + 1 :]
                     if c.contact.passed or c.contact.link in {other.link for other in later}:
@@ -166,7 +166,7 @@ def test_drawn_pivots_agree_with_the_hands_own_kinematics(
 
 def between_planes(scenes: FingerScenes) -> list[PlaneScene]:
     """Return what the planes show that go through contacts off the finger's own planes."""
-    own = [len(f.offsets) for f in scenes.plan.families]
+    own = [len(f.offsets) for f in scenes.plan.axis_groups]
     return [scenes.scene(f, k) for f, k in scenes.touched_planes(99) if k >= own[f]]
 
 
@@ -212,11 +212,11 @@ def test_a_contact_on_a_flat_side_in_the_plane_is_drawn_on_the_section(
     candidate = next(c for c in solution.fingers["index"].candidates if c.plane is None)
     contact = next(c for c in candidate.contacts if c.plane is None)
     scenes = FingerScenes(hand, ball, command, solution, "index", candidate)
-    family = solution.hand_pose.matrix @ scenes.frames[0]
+    axis_group = solution.hand_pose.matrix @ scenes.frames[0]
     for side in (1.0, -1.0):
         # A block of which the contact is on an edge: one of its sides lies in the plane, up to the contact's gap.
-        T = family.copy()
-        T[:3, 3] = contact.position - (0.01 + 1e-9) * side * family[:3, 1] - 0.01 * family[:3, 2]
+        T = axis_group.copy()
+        T[:3, 3] = contact.position - (0.01 + 1e-9) * side * axis_group[:3, 1] - 0.01 * axis_group[:3, 2]
         block = clench.GraspObject.load("box:x=0.02,y=0.02,z=0.02")
         moved = replace(solution, object_pose=clench.Pose.from_matrix(T))
         (scene,) = between_planes(
@@ -227,14 +227,14 @@ def test_a_contact_on_a_flat_side_in_the_plane_is_drawn_on_the_section(
 
 
 @pytest.mark.shared
-def test_a_finger_of_two_families_is_drawn_where_it_touches(shared_data: Path, tmp_path: Path) -> None:
+def test_a_finger_of_two_axis_groups_is_drawn_where_it_touches(shared_data: Path, tmp_path: Path) -> None:
     leap = clench.Hand.load(shared_data / "hands" / "leap_hand_urdf" / "leap_hand_right.urdf")
     can = clench.GraspObject.load("cylinder:r=0.03,h=0.1")
     command, solution = grasp(leap, can, planes=3, fingers=("index", "middle"))
     assert check_contacts(leap, can, command, solution) >= 2
     result = solution.fingers["index"]
     scenes = FingerScenes(leap, can, command, solution, "index", result.candidates[result.chosen])
-    assert {family for family, _ in scenes.touched_planes(3)} == {0, 1}
+    assert {axis_group for axis_group, _ in scenes.touched_planes(3)} == {0, 1}
     assert len(draw_solution(leap, can, command, solution, tmp_path)) == 5
 
 
@@ -271,7 +271,7 @@ def test_obstacles_are_told_from_the_object(hand: clench.Hand, tmp_path: Path) -
     command, solution = grasp(hand, scene, planes=1, fingers=("index",))
     result = solution.fingers["index"]
     scenes = FingerScenes(hand, scene, command, solution, "index", result.candidates[result.chosen])
-    kinds = {c.obstacle for p in range(len(scenes.plan.families[0].offsets)) for c in scenes.scene(0, p).section}
+    kinds = {c.obstacle for p in range(len(scenes.plan.axis_groups[0].offsets)) for c in scenes.scene(0, p).section}
     assert kinds == {True, False}
     low, high = bounds([scenes.scene(0, 0)])
     assert (high - low).max() < 0.5, "the table does not decide how much is shown"

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.closing import contact_reading as touches
+from clench.kernels.closing import contact_reading
 from clench.kernels.closing.layout import RoundArrays
 from kernels.kernel_entries import entry
 
-put_round_normal = entry(touches.put_round_normal)
+put_round_normal = entry(contact_reading.put_round_normal)
 SIZE = np.array([0.02, 0.03, 0.05])
 
 

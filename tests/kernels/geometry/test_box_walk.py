@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernels.geometry.test_obb import below, to_segment
 
 from clench.kernels.geometry import box_walk
 from clench.kernels.geometry.bodies import Elements, pack_bodies
 from clench.kernels.toi import core_motion
 from clench.kernels.trees import obb as slabs
 from clench.kernels.trees.node_boxes import SLAB
-from kernels.geometry.test_obb import below, to_segment
 from kernels.kernel_entries import entry
 from kernels.toi.test_toi_bodies import KINDS, drawn_chain, patch, pose
 

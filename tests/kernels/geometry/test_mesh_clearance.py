@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 from clench.kernels.geometry import mesh_clearance as apart
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, measure_depths
 from clench.kernels.geometry.penetration import CROSSINGS, penetration
-from clench.kernels.sections import plane_pose as family_pose
+from clench.kernels.sections import plane_pose
 from clench.kernels.trees.bvh import STACK_SIZE, build_tree, feature_owners
 from kernels.kernel_entries import entry
 from kernels.kernel_solids import ball, bounding_volumes, box, gap, star
 
-surfaces_apart, compose_inverse = entry(apart.surfaces_apart), entry(family_pose.compose_inverse)
+surfaces_apart, compose_inverse = entry(apart.surfaces_apart), entry(plane_pose.compose_inverse)
 
 SOLIDS = {
     "slab": box(1.0, 2.0, 0.3),

@@ -11,7 +11,7 @@ import numba
 import pytest
 
 from benchmarks.peers.kernels import stepped_closing
-from clench.kernels.closing import close_item
+from clench.kernels.closing import close_candidate
 from clench.kernels.runtime import compiling, warming
 
 KERNELS = Path(compiling.__file__).parents[1]
@@ -115,8 +115,8 @@ def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expe
 
 
 def test_a_kernel_without_an_entry_refuses_a_call_from_python() -> None:
-    with pytest.raises(TypeError, match="close_group: expected a call from a kernel"):
-        close_item.close_group(1.0)
+    with pytest.raises(TypeError, match="close_dof: expected a call from a kernel"):
+        close_candidate.close_dof(1.0)
 
 
 def test_an_index_of_another_version_on_disk_is_no_index(tmp_path, monkeypatch) -> None:

@@ -27,7 +27,7 @@ def test_what_is_compiled_is_what_a_solve_calls():
     values = warming.sample_values()
     called = (
         *(solve_poses.solve_poses, frames.relate_poses, frames.place_links),
-        *(link_meshes.measure_depths, touches.read_touches),
+        *(link_meshes.measure_depths, touches.read_contacts),
     )
     for kernel in called:
         assert warming.argument_types(kernel, values) in kernel.signatures

@@ -14,12 +14,14 @@ from oracle.shapes import CURVES, turned
 
 
 def moved_at_once(seed, kinds):
-    """Return a finger of two or three joints, all in one group and at rates of their own, and what draws on."""
+    """Return a finger of two or three joints, all in one degree of freedom and at rates of their own, and what draws
+    on.
+    """
     rng = np.random.default_rng([5, seed])
     count = int(rng.choice([2, 3]))
     finger = random_finger(rng, kinds, count)
     rates = rng.uniform(0.3, 1.2, count) * rng.choice([1.0, 1.0, -1.0], count)
-    return replace(finger, group=np.zeros(count, dtype=np.int64), rates=rates), rng
+    return replace(finger, dof=np.zeros(count, dtype=np.int64), rates=rates), rng
 
 
 def within_reach(finger, curve, rng, *, touching):

@@ -7,12 +7,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 from clench.kernels.closing.layout import KIND_EDGE, KIND_SIDE, KIND_TIP, RUN, Outline, SectionArrays, Work
-from clench.kernels.sections import outline_gap
-from clench.kernels.sections import plane_sections as family_section
+from clench.kernels.sections import outline_gap, plane_sections
 from kernels.kernel_entries import entry
 
 outline_distance, core_distance = entry(outline_gap.outline_distance), entry(outline_gap.core_distance)
-round_distance, put_circles = entry(outline_gap.round_distance), entry(family_section.put_circles)
+round_distance, put_circles = entry(outline_gap.round_distance), entry(plane_sections.put_circles)
 SIZE = 0.03
 TOUCH = 1e-10
 DENSE = 300

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from clench.closing.outlines import RoundedOutline
 from clench.closing.plan_packing import enclosing
 from clench.kernels.closing.layout import Outline, SectionArrays, Work
-from clench.kernels.sections import outline_sweep
-from clench.kernels.sections import plane_sections as family_section
+from clench.kernels.sections import outline_sweep, plane_sections
 from kernels.kernel_entries import entry
 from oracle.adapter import solve_planar
 from oracle.cases import placed_vertices, random_finger
@@ -20,7 +19,7 @@ from oracle.planar import gap_at
 from oracle.scene import PlanarCurve
 from oracle.shapes import turned
 
-put_circles = entry(family_section.put_circles)
+put_circles = entry(plane_sections.put_circles)
 put_stadium, stadium_gap, farthest, first_near = (
     entry(f)
     for f in (outline_sweep.put_stadium, outline_sweep.stadium_gap, outline_sweep.farthest, outline_sweep.first_near)
@@ -98,7 +97,7 @@ def before_a_wall(seed, joints):
     while True:
         finger = random_finger(rng, joints=joints)
         rates = rng.uniform(0.4, 1.2, joints) * rng.choice([-1.0, 1.0])
-        finger = replace(finger, group=np.zeros(joints, dtype=np.int64), rates=rates)
+        finger = replace(finger, dof=np.zeros(joints, dtype=np.int64), rates=rates)
         half = rng.uniform(0.004, 0.1)
         line = turned(np.array([[-half, 0.0], [half, 0.0]]), rng.uniform(0.0, 7.0))
         met = placed_vertices(finger, rng.uniform(0.0, 1.0, 1), int(rng.integers(len(finger.outlines))))

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from clench.kernels.closing.layout import (
-    HIT_CURVE_X,
-    HIT_GAP,
-    HIT_GROUP,
-    HIT_NX,
-    HIT_OUTLINE,
-    HIT_SOURCE,
-    HIT_X,
-    ItemArrays,
+    CONTACT_CURVE_X,
+    CONTACT_DOF,
+    CONTACT_GAP,
+    CONTACT_NX,
+    CONTACT_OUTLINE,
+    CONTACT_SOURCE,
+    CONTACT_X,
+    CandidateArrays,
     no_rounds,
 )
 from clench.kernels.closing.solve_layout import ObjectArrays
@@ -19,7 +19,7 @@ from clench.kernels.geometry.bodies import no_body
 from clench.kernels.sections.plane_sections import make_sections
 from clench.kernels.toi.full_width import planes_only
 from clench.kernels.trees.bvh import build_tree
-from kernels.plain_closing import close_items
+from kernels.plain_closing import close_candidates
 from oracle.adapter import empty_answer, pack_curve, pack_finger, solve_planar
 from oracle.cases import cases
 from oracle.distances import place, signed_gap
@@ -36,7 +36,7 @@ def contacts():
             _, answer = solve_planar(case.finger, case.curve)
             np.testing.assert_allclose(answer.turn[0], case.finger.angles(answer.travel[0]), atol=1e-14)
             for k in range(answer.contacts[0]):
-                yield case, answer, answer.hit[0, k], answer.point[0, k]
+                yield case, answer, answer.contact[0, k], answer.point[0, k]
 
 
 def gap(case, curve, outline, angles):
@@ -51,31 +51,31 @@ def test_a_contact_lies_on_both_and_looks_out_of_the_object():
     elsewhere since, where going on would lead away: that is no contact of theirs.
     """
     seen, corners, opened, elsewhere = 0, 0, 0, 0
-    for case, answer, hit, point in contacts():
-        size, o, angles = case.finger.length, hit[HIT_OUTLINE], answer.turn[0]
+    for case, answer, contact, point in contacts():
+        size, o, angles = case.finger.length, contact[CONTACT_OUTLINE], answer.turn[0]
         left = gap(case, case.curve, o, angles)
         on = answer.travel[0].copy()
-        on[hit[HIT_GROUP]] += 1e-5
+        on[contact[CONTACT_DOF]] += 1e-5
         beyond = gap(case, case.curve, o, case.finger.angles(on))
-        if abs(left) <= case.finger.tolerance < point[HIT_GAP]:
+        if abs(left) <= case.finger.tolerance < point[CONTACT_GAP]:
             elsewhere += 1
             assert beyond >= left - 1e-9 * size
-            assert hit[HIT_GROUP] < case.finger.groups - 1
+            assert contact[CONTACT_DOF] < case.finger.dofs - 1
             continue
-        assert point[HIT_GAP] == pytest.approx(left, abs=2e-8 * size)
+        assert point[CONTACT_GAP] == pytest.approx(left, abs=2e-8 * size)
         assert beyond <= left + 1e-9 * size or left > case.finger.tolerance
-        n, curve_normal = point[HIT_NX : HIT_NX + 2], point[HIT_CURVE_X : HIT_CURVE_X + 2]
+        n, curve_normal = point[CONTACT_NX : CONTACT_NX + 2], point[CONTACT_CURVE_X : CONTACT_CURVE_X + 2]
         assert np.hypot(*n) == pytest.approx(1.0)
-        assert case.finger.outlines[o].joint >= case.finger.leader(hit[HIT_GROUP])
+        assert case.finger.outlines[o].joint >= case.finger.leader(contact[CONTACT_DOF])
         if abs(left) > case.finger.tolerance:
             # A later stage took the link away; in the last one it stays.
             opened += 1
-            assert hit[HIT_GROUP] < case.finger.groups - 1
+            assert contact[CONTACT_DOF] < case.finger.dofs - 1
             continue
-        at = PlanarCurve(disks=np.array([[*point[HIT_X : HIT_X + 2], 0.0]]))
+        at = PlanarCurve(disks=np.array([[*point[CONTACT_X : CONTACT_X + 2], 0.0]]))
         assert gap(case, at, o, angles) == pytest.approx(0.0, abs=2e-8 * size)
-        if hit[HIT_SOURCE] >= 0:
-            row = pack_curve(case.curve).segments[0, hit[HIT_SOURCE]]
+        if contact[CONTACT_SOURCE] >= 0:
+            row = pack_curve(case.curve).segments[0, contact[CONTACT_SOURCE]]
             a, b = row[:4].reshape(2, 2)
             t = np.clip((point[:2] - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0.0, 1.0)
             assert np.hypot(*(a + t * (b - a) - point[:2])) <= 1e-12 * size
@@ -93,29 +93,29 @@ def test_a_contact_lies_on_both_and_looks_out_of_the_object():
 
 
 def behind_a_joint(hand, turn, pose):
-    """Return a hand whose family comes after one with a single joint, which turns first and moves no outline."""
+    """Return a hand whose axis group comes after one with a single joint, which turns first and moves no outline."""
     chain, outlines = hand.chain, hand.outlines
     behind = chain._replace(
-        joint_family=np.concatenate([[0], chain.joint_family + 1]),
-        joint_group=np.concatenate([[0], chain.joint_group + 1]),
+        joint_axis_group=np.concatenate([[0], chain.joint_axis_group + 1]),
+        joint_dof=np.concatenate([[0], chain.joint_dof + 1]),
         pivot=np.vstack([np.zeros((1, 2)), chain.pivot]),
         rate=np.concatenate([[1.0], chain.rate]),
         start=np.concatenate([[0.0], chain.start]),
         stop=np.concatenate([[turn], chain.stop]),
-        group_length=np.concatenate([[turn], chain.group_length]),
+        dof_length=np.concatenate([[turn], chain.dof_length]),
         speed=np.concatenate([[1.0], chain.speed]),
         breaks=np.concatenate([[0], chain.breaks]),
     )
     return hand._replace(
-        entry_group=np.array([0, len(chain.group_length) + 1]),
-        entry_family=np.array([0, 2]),
+        first_dof=np.array([0, len(chain.dof_length) + 1]),
+        first_axis_group=np.array([0, 2]),
         chain=behind,
         outlines=outlines._replace(joint=outlines.joint + 1),
-        family_pose=np.stack([hand.family_pose[0], pose]),
-        family_plane=np.array([0, 1, 2]),
+        axis_group_pose=np.stack([hand.axis_group_pose[0], pose]),
+        axis_group_plane=np.array([0, 1, 2]),
         plane_offset=np.zeros(2),
-        family_reach=np.repeat(hand.family_reach, 2),
-        family_length=np.repeat(hand.family_length, 2),
+        axis_group_reach=np.repeat(hand.axis_group_reach, 2),
+        axis_group_length=np.repeat(hand.axis_group_length, 2),
         plane_outline=np.concatenate([[0], hand.plane_outline]),
     )
 
@@ -132,8 +132,8 @@ def walls(curve, height):
     return vertices, np.vstack(triangles).astype(np.int32)
 
 
-def test_a_later_family_touches_as_the_same_joints_do_in_the_first():
-    """Its planes lie askew to those of the family before, and cut the object only once that one has turned."""
+def test_a_later_axis_group_touches_as_the_same_joints_do_in_the_first():
+    """Its planes lie askew to those of the axis group before, and cut the object only once that one has turned."""
     turn, tilt = 0.7, 0.4
     pose = np.array([[1.0, 0, 0, 0.01], [0, np.cos(tilt), -np.sin(tilt), 0.02], [0, np.sin(tilt), np.cos(tilt), -0.01]])
     c, s = np.cos(turn), np.sin(turn)
@@ -148,19 +148,19 @@ def test_a_later_family_touches_as_the_same_joints_do_in_the_first():
         shared, own = make_sections(2, 1, 0), make_sections(2, 4 * len(curve.segments), 0)
         joints = len(hand.chain.rate)
         whole = np.array([0], dtype=np.int64)
-        items = ItemArrays(whole, whole, whole + 1, np.full((1, joints), np.inf))
-        answer, exact = empty_answer(hand, 1, finger.groups + 1), planes_only(1, 1)
+        candidates = CandidateArrays(whole, whole, whole + 1, np.full((1, joints), np.inf))
+        answer, full_width = empty_answer(hand, 1, finger.dofs + 1), planes_only(1, 1)
         obj = ObjectArrays(build_tree(*walls(curve, finger.length)), no_rounds(), True, no_body())
-        close_items(hand, exact, obj, T_palm_object, (shared, own), items, answer)
+        close_candidates(hand, full_width, obj, T_palm_object, (shared, own), candidates, answer)
         plain = solve_planar(finger, curve)[1]
         assert answer.overflow[0] == 0
         assert answer.turn[0, 0] == turn
         np.testing.assert_allclose(answer.turn[0, 1:], plain.turn[0], atol=1e-7)
         assert answer.contacts[0] == plain.contacts[0]
         for k in range(plain.contacts[0]):
-            assert answer.hit[0, k, HIT_GROUP] == plain.hit[0, k, HIT_GROUP] + 1
-            gap_there = answer.point[0, k, HIT_GAP]
-            assert gap_there == pytest.approx(plain.point[0, k, HIT_GAP], abs=2e-8 * finger.length)
+            assert answer.contact[0, k, CONTACT_DOF] == plain.contact[0, k, CONTACT_DOF] + 1
+            gap_there = answer.point[0, k, CONTACT_GAP]
+            assert gap_there == pytest.approx(plain.point[0, k, CONTACT_GAP], abs=2e-8 * finger.length)
             opened += gap_there > finger.tolerance
             touching += gap_there <= finger.tolerance
     assert opened > 10

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from clench.kernels.closing.layout import RUN
-from clench.kernels.sections import plane_sections as family_section
+from clench.kernels.sections import plane_sections
 from clench.kernels.sections.plane_sections import make_sections
 from kernels.kernel_entries import entry
 
-put_circles = entry(family_section.put_circles)
+put_circles = entry(plane_sections.put_circles)
 
 
 @pytest.mark.parametrize("count", [0, 1, RUN - 1, RUN, RUN + 1, 5 * RUN + 3])

@@ -5,14 +5,13 @@ import pytest
 
 from clench.core.pose import Pose
 from clench.kernels.closing.layout import RoundArrays
-from clench.kernels.sections import conics
-from clench.kernels.sections import plane_sections as family_section
+from clench.kernels.sections import conics, plane_sections
 from clench.kernels.sections.section import cut_mesh
 from clench.models.shapes import Shape, ShapeKind
 from kernels.kernel_entries import entry
 
-region_gap, cut_rounds = entry(conics.region_gap), entry(family_section.cut_rounds)
-make_sections = family_section.make_sections
+region_gap, cut_rounds = entry(conics.region_gap), entry(plane_sections.cut_rounds)
+make_sections = plane_sections.make_sections
 
 NUMBER = {ShapeKind.SPHERE: 0, ShapeKind.CAPSULE: 1, ShapeKind.CYLINDER: 2, ShapeKind.ELLIPSOID: 3}
 SIZE = (0.02, 0.035, 0.028)

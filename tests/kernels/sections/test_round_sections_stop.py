@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clench.kernels.closing.layout import HIT_GAP, HIT_KIND, HIT_NX, HIT_X, KIND_SIDE
+from clench.kernels.closing.layout import CONTACT_GAP, CONTACT_KIND, CONTACT_NX, CONTACT_X, KIND_SIDE
 from oracle.adapter import pack_curve, pack_finger, solve_planar
 from oracle.cases import random_finger
 from oracle.planar import gap_at
@@ -28,7 +28,7 @@ def thrown(seed, radius):
     finger = random_finger(rng)
     while True:
         at = finger.pivots[0] + rng.uniform(-1.0, 1.0, 2) * finger.length
-        if gap_at(finger, PlanarCurve(disks=np.array([[*at, radius]])), np.zeros(finger.groups)) > 1e-4:
+        if gap_at(finger, PlanarCurve(disks=np.array([[*at, radius]])), np.zeros(finger.dofs)) > 1e-4:
             return finger, at, rng
 
 
@@ -55,13 +55,15 @@ def test_a_circle_is_an_ellipse_with_equal_axes(together):
         assert ellipse.contacts == disk.contacts
         count = disk.contacts[0]
         one, other = disk.point[0, :count], ellipse.point[0, :count]
-        np.testing.assert_allclose(one[:, HIT_X : HIT_NX + 2], other[:, HIT_X : HIT_NX + 2], atol=1e-5)
-        np.testing.assert_allclose(one[:, HIT_GAP], other[:, HIT_GAP], atol=1e-7)
+        np.testing.assert_allclose(one[:, CONTACT_X : CONTACT_NX + 2], other[:, CONTACT_X : CONTACT_NX + 2], atol=1e-5)
+        np.testing.assert_allclose(one[:, CONTACT_GAP], other[:, CONTACT_GAP], atol=1e-7)
         # The contact lies on the circle, and its normal is along the radius.
-        from_middle = one[:, HIT_X : HIT_X + 2] - at
-        kinds += disk.hit[0, :count, HIT_KIND].tolist()
-        touching = np.abs(one[:, HIT_GAP]) < finger.tolerance
-        np.testing.assert_allclose(from_middle[touching], radius * one[touching, HIT_NX : HIT_NX + 2], atol=1e-8)
+        from_middle = one[:, CONTACT_X : CONTACT_X + 2] - at
+        kinds += disk.contact[0, :count, CONTACT_KIND].tolist()
+        touching = np.abs(one[:, CONTACT_GAP]) < finger.tolerance
+        np.testing.assert_allclose(
+            from_middle[touching], radius * one[touching, CONTACT_NX : CONTACT_NX + 2], atol=1e-8
+        )
     assert kinds.count(KIND_SIDE) > 2
     assert len(kinds) - kinds.count(KIND_SIDE) > 2
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.closing.layout import HIT_NX
+from clench.kernels.closing.layout import CONTACT_NX
 from oracle.adapter import pack_finger, solve_planar
 from oracle.cases import cases
 from oracle.planar import overlaps_at_start
@@ -31,7 +31,7 @@ def test_sides_that_look_inwards_stop_as_well_when_both_faces_count(together):
         assert found.contacts == expected.contacts
         count = found.contacts[0]
         # Normals look out of the object whichever way the side looks.
-        one, other = (a.point[0, :count, HIT_NX : HIT_NX + 2] for a in (expected, found))
+        one, other = (a.point[0, :count, CONTACT_NX : CONTACT_NX + 2] for a in (expected, found))
         np.testing.assert_allclose(one, other, atol=1e-6)
         missed += not np.allclose(through.turn, expected.turn, atol=1e-9)
     assert missed > 10

@@ -29,10 +29,11 @@ def overlap(one, other, R, offset):
     poses = np.tile(np.eye(4)[:3], (3, 1, 1))
     poses[1, :, :3], poses[1, :, 3] = R, offset
     poses[2, :, 3] = [1.0, 0.0, 0.0]
-    exact = plan_hand(problem).exact
+    full_width = plan_hand(problem).full_width_arrays
     far = np.column_stack([np.eye(3), [5.0, 0.0, 0.0]])
     return (
-        find_link_overlap(exact._replace(checked=np.array([[0, 1, 1], [1, 0, 0], [1, 0, 0]])), poses, far, 1e-6)[0] >= 0
+        find_link_overlap(full_width._replace(checked=np.array([[0, 1, 1], [1, 0, 0], [1, 0, 0]])), poses, far, 1e-6)[0]
+        >= 0
     )
 
 

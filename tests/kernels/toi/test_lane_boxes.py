@@ -22,17 +22,17 @@ def placed(turn, place):
     return np.column_stack([Rotation.from_rotvec(turn).as_matrix(), place])
 
 
-def lane(box, T, family):
-    """Return the extent of a box along a family's y axis."""
+def lane(box, T, axis_group):
+    """Return the extent of a box along an axis group's y axis."""
     corners = np.array([np.add(box[:3], np.multiply(box[3:], s)) for s in itertools.product((-1.0, 1.0), repeat=3)])
-    y = (corners @ T[:, :3].T + T[:, 3]) @ family[:, 1]
+    y = (corners @ T[:, :3].T + T[:, 3]) @ axis_group[:, 1]
     return y.min(), y.max()
 
 
 @settings(deadline=None, max_examples=300)
 @given(box, pose, box, pose, pose)
-def test_boxes_are_apart_where_their_corners_are(one, there, other, elsewhere, family):
-    T, R, F = placed(*there), placed(*elsewhere), placed(*family)
+def test_boxes_are_apart_where_their_corners_are(one, there, other, elsewhere, axis_group):
+    T, R, F = placed(*there), placed(*elsewhere), placed(*axis_group)
     lanes = [lane_of(np.array(size), at, *F[:, 1]) for size, at in ((one, T), (other, R))]
     np.testing.assert_allclose(lanes, [lane(one, T, F), lane(other, R, F)], atol=1e-14)
     (low, high), (least, most) = lanes

@@ -138,9 +138,9 @@ def test_axes_that_are_almost_parallel_split_the_planes(tmp_path, tilt: float, c
     for finding in findings:
         assert finding.severity is Severity.NOTE
         assert finding.numbers["angle_deg"] == pytest.approx(np.rad2deg(np.arctan(tilt)), rel=1e-6)
-    families = plan_finger(loaded, loaded.fingers[0], loaded.open_angles(), 3, loaded.default_source).families
+    axis_groups = plan_finger(loaded, loaded.fingers[0], loaded.open_angles(), 3, loaded.default_source).axis_groups
     closing = [j for j in loaded.fingers[0].joints if loaded.joints[j].role == "closing"]
-    assert len(families) == (2 if count else 1 if tilt < 0.1 else len(closing))
+    assert len(axis_groups) == (2 if count else 1 if tilt < 0.1 else len(closing))
 
 
 def test_a_whole_model_in_millimetres(tmp_path) -> None:

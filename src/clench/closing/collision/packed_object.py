@@ -62,7 +62,7 @@ class PackedObject(Keeper):
         rounds: spheres, capsules, cylinders and ellipsoids.
         full_tree: all shapes as triangles, round ones inscribed, off by `tessellation_deviation` at most.
         full_owners: `feature_owners` of `full_tree`.
-        bodies: everything as the elements of one body, for exact sweeps. element_body: index of the body of each
+        bodies: everything as the elements of one body, for sweeps. element_body: index of the body of each
             element.
         closed: every body is watertight with outward normals, so one-sided tests are exact.
         body_closed: the same for each body.

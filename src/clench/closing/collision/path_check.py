@@ -96,10 +96,10 @@ def find_path_overlap(
     """Return the first overlap on a path of the whole hand; None proves that the path is free.
 
     Every link is checked against every other link and against the object with its obstacles, over the whole path. The
-    exact sweep continues until two bodies touch. From there, steps are so short that the bodies cannot overlap by more
-    than 10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs_for`) are left out. A pair that
-    overlaps at the start of the path may keep that depth until it separates. A soft pad may be indented by the object
-    as far as the hand file says.
+    sweep continues until two bodies touch. From there, steps are so short that the bodies cannot overlap by more than
+    10 µm between two of them. Pairs that may overlap (see `Hand.allowed_pairs_for`) are left out. A pair that overlaps
+    at the start of the path may keep that depth until it separates. A soft pad may be indented by the object as far as
+    the hand file says.
 
     Args:
         hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.

@@ -84,12 +84,12 @@ def beside(
 ) -> float:
     """Return how far a body lies to the side of everything that closing moves [m], at least 0.
 
-    Closing joints that are parallel move their links in planes; a finger with several families of planes gives 0.
+    Closing joints that are parallel move their links in planes; a finger with several axis groups gives 0.
     """
     room = _room(hand, plan, source)
-    if len(plan.families) > 1 or target.root[0] < 0:
+    if len(plan.axis_groups) > 1 or target.root[0] < 0:
         return 0.0
-    across = plan.families[0].T_palm_family[:3, 1]
+    across = plan.axis_groups[0].T_palm_axis_group[:3, 1]
     places = target.vertices @ (T_palm_target[:3, :3].T @ across) + T_palm_target[:3, 3] @ across
     # Corner by corner: numpy takes the least of three in a row ten times as long.
     corners = [places[numbers] for numbers in target.elements.T]
@@ -103,7 +103,7 @@ class _Room(NamedTuple):
 
     Args:
         pivot: anchor of the first closing joint, as a body. reach: no point gets farther from it [m].
-        low, high: of all moved points along y of the first family [m].
+        low, high: of all moved points along y of the first axis group [m].
     """
 
     pivot: BodyArrays
@@ -132,7 +132,7 @@ def _make_room(hand: Hand, plan: FingerPlan, source: CollisionSource) -> _Room:
             k = own.index(moved[mesh.link])
             points = mesh.tree.vertices @ poses[mesh.link][:3, :3].T + poses[mesh.link][:3, 3]
             reach = max(reach, arms[k] + float(np.linalg.norm(points - anchors[k], axis=1).max()))
-            along = points @ plan.families[0].T_palm_family[:3, 1]
+            along = points @ plan.axis_groups[0].T_palm_axis_group[:3, 1]
             low, high = min(low, float(along.min())), max(high, float(along.max()))
     spare = TESSELLATION_DEVIATION
     pivot = pack_bodies([Elements(anchors[:1], np.zeros((1, 3), dtype=np.int32), np.zeros(1))])

@@ -143,8 +143,8 @@ class GraspDataset:
             import torch
         except ImportError:
             raise ClenchError("Batches of tensors need PyTorch: pip install torch.") from None
-        wanted = _check_columns(columns)
-        numbers = [name for name in wanted if COLUMNS[name].type not in ("text", "texts")]
+        requested = _check_columns(columns)
+        numbers = [name for name in requested if COLUMNS[name].type not in ("text", "texts")]
         for batch in self.batches(size, numbers):
             yield {name: torch.from_numpy(np.array(array)) for name, array in batch.items()}
 

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.runtime.by_reference import whole
+from clench.kernels.runtime.by_reference import by_value
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.toi.full_width import ExactArrays
+from clench.kernels.toi.full_width import FullWidthArrays
 
 from .layout import ChainArrays, ClosingArrays, Floats, HandArrays, Ints
 
 
 @kernel(allocates=True)
 def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
-    """Return the answers of all items at one pose."""
+    """Return the answers of all candidates at one pose."""
     return ClosingArrays(
         answers.travel[n],
         answers.turn[n],
         answers.contacts[n],
-        answers.hit[n],
+        answers.contact[n],
         answers.point[n],
         answers.pose[n],
         answers.overflow[n],
@@ -28,7 +28,7 @@ def answer_at(answers: ClosingArrays, n: int) -> ClosingArrays:
 
 @kernel
 def clear_answer(answer: ClosingArrays, i: int) -> None:
-    """Make an item's answer what the closing starts from."""
+    """Make a candidate's answer what the closing starts from."""
     answer.travel[i] = 0.0
     answer.turn[i] = 0.0
     answer.contacts[i], answer.overflow[i], answer.skipped[i] = 0, 0, 0
@@ -36,19 +36,21 @@ def clear_answer(answer: ClosingArrays, i: int) -> None:
 
 
 @kernel(allocates=True)
-def among(exact: ExactArrays, wanted: Ints, obj: BodyArrays, link_pose: Floats, checked: Ints) -> ExactArrays:
-    """Return what sweeps read, for other items and another object, with links elsewhere and others to be checked."""
-    return ExactArrays(
-        exact.joint_first,
-        wanted,
-        whole(exact.links),
-        whole(obj),
-        exact.mover_first,
-        exact.mover_link,
-        exact.mover_joint,
-        exact.mover_pose,
-        exact.axis,
-        exact.anchor,
+def among(
+    full_width: FullWidthArrays, requested: Ints, obj: BodyArrays, link_pose: Floats, checked: Ints
+) -> FullWidthArrays:
+    """Return what sweeps read, for other candidates, another object, links elsewhere and other links to be checked."""
+    return FullWidthArrays(
+        full_width.joint_first,
+        requested,
+        by_value(full_width.links),
+        by_value(obj),
+        full_width.mover_first,
+        full_width.mover_link,
+        full_width.mover_joint,
+        full_width.mover_pose,
+        full_width.axis,
+        full_width.anchor,
         link_pose,
         checked,
     )
@@ -56,17 +58,17 @@ def among(exact: ExactArrays, wanted: Ints, obj: BodyArrays, link_pose: Floats, 
 
 @kernel(allocates=True)
 def with_lengths(hand: HandArrays, length: Floats) -> HandArrays:
-    """Return fingers whose groups have other limits."""
+    """Return fingers whose degrees of freedom have other limits."""
     c = hand.chain
     return HandArrays(
-        hand.entry_group,
-        hand.entry_family,
-        ChainArrays(c.joint_family, c.joint_group, c.pivot, c.rate, c.start, c.stop, length, c.speed, c.breaks),
-        whole(hand.outlines),
-        hand.family_pose,
-        hand.family_plane,
+        hand.first_dof,
+        hand.first_axis_group,
+        ChainArrays(c.joint_axis_group, c.joint_dof, c.pivot, c.rate, c.start, c.stop, length, c.speed, c.breaks),
+        by_value(hand.outlines),
+        hand.axis_group_pose,
+        hand.axis_group_plane,
         hand.plane_offset,
-        hand.family_reach,
-        hand.family_length,
+        hand.axis_group_reach,
+        hand.axis_group_length,
         hand.plane_outline,
     )

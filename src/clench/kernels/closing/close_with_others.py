@@ -1,4 +1,4 @@
-"""Close the chosen items with the other fingers in their way: in turn, or all at once (docs/method.md section 5)."""
+"""Close the chosen candidates with other fingers in their way: in turn, or all at once (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from clench.kernels.closing.solve_layout import Closed, ProblemArrays, Workspace
 from clench.kernels.meetings.at_once import close_at_once
 from clench.kernels.meetings.meeting_layout import Meetings
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.sections.plane_sections import cut_first_families, needs_planes
+from clench.kernels.sections.plane_sections import cut_first_axis_groups, needs_planes
 
 
 @kernel(allocates=True)
@@ -22,11 +22,11 @@ def close_with_others(
     n: int,
     fresh: bool,
 ) -> int:
-    """Close the picked items with the other fingers in their way, at pose `n`.
+    """Close the picked candidates with the other fingers in their way, at pose `n`.
 
     Args:
-        final: answers of the picked items, which are overwritten. found: written. fresh: the arenas hold the sections
-            of another pose.
+        final: answers of the picked candidates, which are overwritten. found: written. fresh: the arenas hold the
+            sections of another pose.
 
     Returns:
         the capacity of the arenas that is wanted, or 0.
@@ -39,7 +39,7 @@ def close_with_others(
         return 0
     if fresh and needs_planes(space.picked):
         shared, pose = space.arena.shared, space.work.pose
-        overflow = cut_first_families(problem.hand, target.tree, target.rounds, T_palm_object, shared, pose)
+        overflow = cut_first_axis_groups(problem.hand, target.tree, target.rounds, T_palm_object, shared, pose)
         if overflow > 0:
             return int(overflow)
     if not command.together:
@@ -47,7 +47,9 @@ def close_with_others(
     return int(
         close_at_once(
             problem.hand,
-            among(problem.exact, space.swept, target.bodies, problem.exact.link_pose, problem.exact.checked),
+            among(
+                problem.full_width, space.swept, target.bodies, problem.full_width.link_pose, problem.full_width.checked
+            ),
             target,
             T_palm_object,
             space.picked,
@@ -69,7 +71,7 @@ def close_with_others(
 
 @kernel
 def put_swept(space: Workspace) -> int:
-    """Write the fingers that are swept exactly to `space.rows`; return how many there are."""
+    """Write the fingers that are swept over the full width to `space.rows`; return how many there are."""
     count = 0
     for f in range(space.swept.shape[0]):
         if space.swept[f]:

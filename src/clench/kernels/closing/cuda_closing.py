@@ -1,7 +1,7 @@
 """Close the fingers for many poses on a CUDA device, by the functions that do it on the CPU (docs/method.md section 4).
 
-One thread cuts the object by the planes of one pose, one thread closes one item. Everything is double precision, as on
-the CPU; only the last bits may differ, as the device's sine, cosine and fused products do.
+One thread cuts the object by the planes of one pose, one thread closes one candidate. Everything is double precision,
+as on the CPU; only the last bits may differ, as the device's sine, cosine and fused products do.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ import numba.cuda
 import numpy as np
 
 from clench.kernels.sections.advance import make_work
-from clench.kernels.sections.plane_sections import cut_first_families, needs_planes
+from clench.kernels.sections.plane_sections import cut_first_axis_groups, needs_planes
 from clench.kernels.sections.section_overlap import look_for_overlaps
-from clench.kernels.toi.full_width import ExactArrays
+from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.toi_work import SweepWork, make_sweep_work
 from clench.kernels.trees.bvh import MeshTree
 
 from .bundles import answer_at
-from .close_item import close_item
+from .close_candidate import close_candidate
 from .layout import (
+    CandidateArrays,
     ClosingArrays,
     Floats,
     HandArrays,
     Ints,
-    ItemArrays,
     RoundArrays,
     SectionArrays,
     Work,
@@ -45,12 +45,12 @@ class Job(NamedTuple):
     """Bundle what the device reads and writes: see `close_on_device`.
 
     Args:
-        shared, work: of every pose. own, item_work, sweep: of every pose and item, pose after pose.
+        shared, work: of every pose. own, candidate_work, sweep: of every pose and candidate, pose after pose.
     """
 
     hand: HandArrays
-    exact: ExactArrays
-    items: ItemArrays
+    full_width: FullWidthArrays
+    candidates: CandidateArrays
     tree: MeshTree
     rounds: RoundArrays
     closed: bool
@@ -61,7 +61,7 @@ class Job(NamedTuple):
     shared: SectionArrays
     work: Work
     own: SectionArrays
-    item_work: Work
+    candidate_work: Work
     sweep: SweepWork
     crossed: Ints
     overflow: Ints
@@ -85,8 +85,8 @@ def close_on_device(problem: ProblemArrays, T_palm_objects: Floats, arena: Arena
         _device().put,
         Job(
             hand=problem.hand,
-            exact=problem.exact,
-            items=problem.items,
+            full_width=problem.full_width,
+            candidates=problem.candidates,
             tree=target.tree,
             rounds=target.rounds,
             closed=bool(target.closed),
@@ -97,7 +97,7 @@ def close_on_device(problem: ProblemArrays, T_palm_objects: Floats, arena: Arena
             shared=arena.shared,
             work=work,
             own=arena.own,
-            item_work=work,
+            candidate_work=work,
             sweep=sweep,
             crossed=closed.crossed,
             overflow=closed.overflow,
@@ -108,7 +108,7 @@ def close_on_device(problem: ProblemArrays, T_palm_objects: Floats, arena: Arena
         shared=_rows(arena.shared, poses),
         work=_rows(work, poses),
         own=_rows(arena.own, poses * count),
-        item_work=_rows(work, poses * count),
+        candidate_work=_rows(work, poses * count),
         sweep=_rows(sweep, poses * count),
     )
     _cut[-(-poses // BLOCK), BLOCK](many)
@@ -233,11 +233,11 @@ def _cut(job: Job) -> None:
     if n >= job.T_palm_object.shape[0]:
         return
     shared, work, T = _sections_at(job.shared, n), _work_at(job.work, n), job.T_palm_object[n]
-    wanted, planar = 0, needs_planes(job.items)
+    wanted, planar = 0, needs_planes(job.candidates)
     if planar:
-        wanted = cut_first_families(job.hand, job.tree, job.rounds, T, shared, work.pose)
-    for entry in range(job.crossed.shape[1]):
-        job.crossed[n, entry] = -1
+        wanted = cut_first_axis_groups(job.hand, job.tree, job.rounds, T, shared, work.pose)
+    for finger_posture in range(job.crossed.shape[1]):
+        job.crossed[n, finger_posture] = -1
     job.overflow[n] = wanted
     if planar and job.crossing and wanted == 0:
         look_for_overlaps(job.hand, job.tree, job.rounds, job.closed, T, shared, job.crossed[n], work)
@@ -245,32 +245,32 @@ def _cut(job: Job) -> None:
 
 @cuda.jit
 def _close(job: Job) -> None:
-    """Close one item at one pose."""
+    """Close one candidate at one pose."""
     index = cuda.grid(1)
-    items = job.answers.contacts.shape[1]
-    if index >= job.T_palm_object.shape[0] * items:
+    candidates = job.answers.contacts.shape[1]
+    if index >= job.T_palm_object.shape[0] * candidates:
         return
-    n, i = index // items, index % items
+    n, i = index // candidates, index % candidates
     answer = _answer_at(job.answers, n)
     for k in range(answer.travel.shape[1]):
         answer.travel[i, k] = 0.0
     for k in range(answer.turn.shape[1]):
         answer.turn[i, k] = 0.0
     answer.contacts[i], answer.skipped[i], answer.overlap[i], answer.overflow[i] = 0, 0, -1, 0
-    if job.overflow[n] > 0 or job.crossed[n, job.items.entry[i]] >= 0:
+    if job.overflow[n] > 0 or job.crossed[n, job.candidates.finger_posture[i]] >= 0:
         return
-    close_item(
+    close_candidate(
         job.hand,
-        job.exact,
-        ObjectArrays(job.tree, job.rounds, job.closed, job.exact.object),
+        job.full_width,
+        ObjectArrays(job.tree, job.rounds, job.closed, job.full_width.object),
         job.T_palm_object[n],
         _sections_at(job.shared, n),
         _sections_at(job.own, index),
-        job.items,
+        job.candidates,
         i,
         job.times,
         job.together,
-        _work_at(job.item_work, index),
+        _work_at(job.candidate_work, index),
         _sweep_at(job.sweep, index),
         answer,
     )

@@ -1,15 +1,15 @@
-"""Close the chosen items again, one finger after another, each with the others in its way (section 5)."""
+"""Close the chosen candidates again, one finger after another, each with the others in its way (section 5)."""
 
 from __future__ import annotations
 
 from clench.kernels.geometry.link_frames import put_links
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.toi.full_width import ExactArrays
+from clench.kernels.toi.full_width import FullWidthArrays
 
 from .bundles import among, clear_answer, with_lengths
-from .close_item import close_item
+from .close_candidate import close_candidate
 from .layout import SUNK, ClosingArrays, Floats, HandArrays, Ints
-from .picking import put_item_angles, take_joints
+from .picking import put_candidate_angles, take_joints
 from .solve_layout import ProblemArrays, Workspace
 
 
@@ -28,8 +28,8 @@ def close_in_turn(
     object before they move, stay as they are.
 
     Args:
-        final: answers of the picked items, which are overwritten. blocked: see `Closed`. anew: written where a finger
-            closes anew, (F,).
+        final: answers of the picked candidates, which are overwritten. blocked: see `Closed`. anew: written where a
+            finger closes anew, (F,).
 
     Returns:
         the capacity of the arenas that is wanted, or 0.
@@ -38,16 +38,16 @@ def close_in_turn(
     first = 0
     while True:
         place_fingers(problem, space, final)
-        others = among(problem.exact, space.swept, nothing.bodies, space.placed, problem.apart)
+        others = among(problem.full_width, space.swept, nothing.bodies, space.placed, problem.apart)
         f = first_meeting(
             problem, with_lengths(hand, space.length), others, T_palm_object, space, final, blocked, first
         )
         if f < 0:
             return 0
         shared = space.arena.shared
-        everything = among(problem.exact, space.swept, target.bodies, space.placed, problem.across)
+        everything = among(problem.full_width, space.swept, target.bodies, space.placed, problem.across)
         clear_answer(final, f)
-        close_item(
+        close_candidate(
             hand,
             everything,
             target,
@@ -74,24 +74,26 @@ def place_fingers(problem: ProblemArrays, space: Workspace, final: ClosingArrays
     for j in range(q.shape[0]):
         q[j] = command.start[j]
     for f in range(final.contacts.shape[0]):
-        entry = space.picked.entry[f]
+        finger_posture = space.picked.finger_posture[f]
         for j in range(q.shape[0]):
             angles[j] = q[j]
         for k in range(command.joints.shape[1]):
-            if command.joints[entry, k] >= 0:
-                angles[command.joints[entry, k]] = frames.posture[entry, command.joints[entry, k]]
-        put_links(frames, angles, space.poses, space.placed[entry])
-        for g in range(problem.hand.entry_group[entry], problem.hand.entry_group[entry + 1]):
+            if command.joints[finger_posture, k] >= 0:
+                angles[command.joints[finger_posture, k]] = frames.posture[
+                    finger_posture, command.joints[finger_posture, k]
+                ]
+        put_links(frames, angles, space.poses, space.placed[finger_posture])
+        for g in range(problem.hand.first_dof[finger_posture], problem.hand.first_dof[finger_posture + 1]):
             space.length[g] = final.travel[f, g]
-        put_item_angles(problem, entry, final.travel[f], final.turn[f], angles)
-        take_joints(command, entry, angles, q)
+        put_candidate_angles(problem, finger_posture, final.travel[f], final.turn[f], angles)
+        take_joints(command, finger_posture, angles, q)
 
 
 @kernel
 def first_meeting(
     problem: ProblemArrays,
     hand: HandArrays,
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     T_palm_object: Floats,
     space: Workspace,
     final: ClosingArrays,
@@ -103,16 +105,16 @@ def first_meeting(
     Fingers that close in several rounds, or whose joints break away, do not follow one path: they always close again.
     """
     nothing, spare, picked = problem.nothing, space.spare, space.picked
-    for f in range(first, picked.entry.shape[0]):
-        entry = picked.entry[f]
-        if blocked[entry] or not space.swept[f] or final.overlap[f] <= SUNK:
+    for f in range(first, picked.finger_posture.shape[0]):
+        finger_posture = picked.finger_posture[f]
+        if blocked[finger_posture] or not space.swept[f] or final.overlap[f] <= SUNK:
             continue
-        if problem.command.times > 1 or breaks_away(hand, entry):
+        if problem.command.times > 1 or breaks_away(hand, finger_posture):
             return f
         clear_answer(spare, f)
-        close_item(
+        close_candidate(
             hand,
-            exact,
+            full_width,
             nothing,
             T_palm_object,
             space.arena.no_shared,
@@ -131,9 +133,9 @@ def first_meeting(
 
 
 @kernel
-def breaks_away(hand: HandArrays, entry: int) -> bool:
-    """Say whether joints of an entry go on when those before them are blocked."""
+def breaks_away(hand: HandArrays, finger_posture: int) -> bool:
+    """Say whether joints of a finger go on when those before them are blocked."""
     breaks = False
-    for g in range(hand.entry_group[entry], hand.entry_group[entry + 1]):
+    for g in range(hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]):
         breaks = breaks or hand.chain.breaks[g] != 0
     return breaks

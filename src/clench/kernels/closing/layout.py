@@ -1,8 +1,8 @@
 """Layout of the arrays that kernels read and write (docs/method.md sections 1 and 2).
 
-A *family* is a set of parallel curl planes shared by consecutive joints of a finger. Its frame has y along the
-planes' normal, so in-plane coordinates are (x, z) and a positive turn takes x towards z. Everything in `FingerArrays`
-is in family axes at the open posture.
+An *axis group* is a run of consecutive joints of a finger with parallel axes. They share parallel curl planes. Its
+frame has y along the planes' normal, so in-plane coordinates are (x, z) and a positive turn takes x towards z.
+Everything in `FingerArrays` is in this frame, at the open posture.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ Ints = NDArray[np.int64]
 
 
 class ChainArrays(NamedTuple):
-    """The joints; J joints, G groups.
+    """The joints; J joints, G degrees of freedom.
 
     Args:
-        joint_family: (J,), ascending. joint_group: (J,).
-        pivot: pivot of each joint relative to the pivot before it in its family [m], (J, 2).
-        rate: turn per unit of its group's travel [-], (J,).
-        start, stop: travel of the group between which the joint moves [rad], (J,).
-        group_length: travel of each group up to its limit [rad], (G,).
-        speed: travel of each group per unit of the motion where all move at once [rad], (G,).
-        breaks: whether the joints of a group go on when those before them are blocked, (G,).
+        joint_axis_group: (J,), ascending. joint_dof: (J,).
+        pivot: pivot of each joint relative to the pivot before it in its axis group [m], (J, 2).
+        rate: turn per unit of travel of its degree of freedom [-], (J,).
+        start, stop: travel of the degree of freedom between which the joint moves [rad], (J,).
+        dof_length: travel of each degree of freedom up to its limit [rad], (G,).
+        speed: travel of each degree of freedom per unit of the motion where all move at once [rad], (G,).
+        breaks: whether the joints of a degree of freedom go on when those before them are blocked, (G,).
     """
 
-    joint_family: Ints
-    joint_group: Ints
+    joint_axis_group: Ints
+    joint_dof: Ints
     pivot: Floats
     rate: Floats
     start: Floats
     stop: Floats
-    group_length: Floats
+    dof_length: Floats
     speed: Floats
     breaks: Ints
 
@@ -79,36 +79,37 @@ class Outline(NamedTuple):
 
 
 class HandArrays(NamedTuple):
-    """The fingers of a hand, each at one or several postures ("entries"), in one piece.
+    """The fingers of a hand, each at one or several postures, in one piece.
 
-    E entries, F families, P planes. Every index is global, and what belongs to one entry stands together: an item of
-    work is a range of groups and a range of planes.
+    E finger postures, F axis groups, P planes. Every index is global, and what belongs to one finger posture stands
+    together: a candidate is a range of degrees of freedom and a range of planes.
 
     Args:
-        entry_group: first group of each entry, (E + 1,). entry_family: first family of each entry, (E + 1,).
+        first_dof: first degree of freedom of each finger posture, (E + 1,). first_axis_group: first axis group of each
+            finger posture, (E + 1,).
         chain: the joints. outlines: the links, by plane.
-        family_pose: (F, 3, 4). An entry's first is in the palm frame. Each other one is in a frame on the last pivot of
-            the family before: it has that family's axes, and turns with its last joint.
-        family_plane: first plane of each family, (F + 1,). plane_offset: place along y [m], (P,).
-        family_reach: no moved point gets farther from the family's origin in the plane [m], (F,).
-        family_length: length of the finger [m], the scale of its tolerances, (F,).
+        axis_group_pose: (F, 3, 4). A finger posture's first is in the palm frame. Each other one is in a frame on the
+            last pivot of the axis group before: it is parallel to that one's, and turns with its last joint.
+        axis_group_plane: first plane of each axis group, (F + 1,). plane_offset: place along y [m], (P,).
+        axis_group_reach: no moved point gets farther from the axis group's origin in the plane [m], (F,).
+        axis_group_length: length of the finger [m], the scale of its tolerances, (F,).
         plane_outline: first outline of each plane, (P + 1,).
     """
 
-    entry_group: Ints
-    entry_family: Ints
+    first_dof: Ints
+    first_axis_group: Ints
     chain: ChainArrays
     outlines: OutlineArrays
-    family_pose: Floats
-    family_plane: Ints
+    axis_group_pose: Floats
+    axis_group_plane: Ints
     plane_offset: Floats
-    family_reach: Floats
-    family_length: Floats
+    axis_group_reach: Floats
+    axis_group_length: Floats
     plane_outline: Ints
 
 
 class Work(NamedTuple):
-    """The scratch space of one item, so that closing allocates nothing.
+    """The scratch space of one candidate, so that closing allocates nothing.
 
     Args:
         place: joints at the start of the segment, rows (x, z, turn, its cosine and sine), (J, 5). moved, turns: joints
@@ -184,38 +185,40 @@ def no_rounds() -> RoundArrays:
     return RoundArrays(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)))
 
 
-class ItemArrays(NamedTuple):
-    """List the items of work: an entry's one plane, or all of its planes (the full width).
+class CandidateArrays(NamedTuple):
+    """List the candidates: one plane of a finger posture, or all of its planes (the full width).
 
     Args:
-        entry: (I,). low, high: range of planes, counted from the first plane of each family of the entry, (I,).
+        finger_posture: (I,). low, high: range of planes, counted from the first plane of each axis group of the finger
+            posture, (I,).
         until: place in the motion from which each joint is held from outside, infinite without one, (I, J).
     """
 
-    entry: Ints
+    finger_posture: Ints
     low: Ints
     high: Ints
     until: Floats
 
 
 class ClosingArrays(NamedTuple):
-    """The answers of all items; I items, S contacts at most.
+    """The answers of all candidates; I candidates, S contacts at most.
 
     Args:
-        travel: of every group [rad], (I, G). turn: of every joint [rad], (I, J); only the entry's own are set.
-        contacts: how many there are, (I,). hit: integers of each contact, (I, S, 9), see below.
-        point: numbers of each contact in its family's plane, (I, S, 7), see below.
-        pose: `T_palm_family` of every family of the entry at the end, (I, F, 3, 4).
-        overflow: capacity wanted where the arena was too small for a later family's section, else 0, (I,).
+        travel: of every degree of freedom [rad], (I, G). turn: of every joint [rad], (I, J); only the finger posture's
+            own are set.
+        contacts: how many there are, (I,). contact: integers of each contact, (I, S, 9), see below.
+        point: numbers of each contact in its axis group's plane, (I, S, 7), see below.
+        pose: `T_palm_axis_group` of every axis group of the finger posture at the end, (I, F, 3, 4).
+        overflow: capacity wanted where the arena was too small for a later axis group's section, else 0, (I,).
         overlap: link that overlaps the object at the start over its width, (I,); then nothing moves. Or `SUNK` - link
-            where earlier families would bring it there on the item's one plane; nothing moves either. Else -1.
+            where earlier axis groups would bring it there on the candidate's one plane; nothing moves either. Else -1.
         skipped: pairs of the hand's own links that were left alone, as they overlapped already, (I,).
     """
 
     travel: Floats
     turn: Floats
     contacts: Ints
-    hit: Ints
+    contact: Ints
     point: Floats
     pose: Floats
     overflow: Ints
@@ -225,17 +228,26 @@ class ClosingArrays(NamedTuple):
 
 #: See `ClosingArrays.overlap`.
 SUNK = -2
-#: Columns of `ClosingArrays.hit`.
-HIT_PLANE, HIT_OUTLINE, HIT_KIND, HIT_SOURCE, HIT_GROUP, HIT_FAMILY, HIT_FEATURE, HIT_WHICH = 0, 1, 2, 3, 4, 5, 6, 7
+#: Columns of `ClosingArrays.contact`.
+(
+    CONTACT_PLANE,
+    CONTACT_OUTLINE,
+    CONTACT_KIND,
+    CONTACT_SOURCE,
+    CONTACT_DOF,
+    CONTACT_AXIS_GROUP,
+    CONTACT_FEATURE,
+    CONTACT_WHICH,
+) = 0, 1, 2, 3, 4, 5, 6, 7
 #: The last joint that the contact stops.
-HIT_JOINT = 8
-HIT_INTEGERS = 9
-#: For an exact contact the plane is -1, and the columns mean: link, kind, element of the other body, group, family,
-#: element of the link, and the other body (a link, or the number of links for the object). Columns of
-#: `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at the item's
-#: final posture; for an exact contact point and normal in the palm frame, and the gap.
-HIT_X, HIT_Z, HIT_NX, HIT_NZ, HIT_CURVE_X, HIT_CURVE_Z, HIT_GAP = 0, 1, 2, 3, 4, 5, 6
-HIT_FLOATS = 7
+CONTACT_JOINT = 8
+CONTACT_INTEGERS = 9
+#: For a full-width contact the plane is -1, and the columns mean: link, kind, element of the other body, degree of
+#: freedom, axis group, element of the link, and the other body (a link, or the number of links for the object). Columns
+#: of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at the
+#: candidate's final posture; for a full-width contact point and normal in the palm frame, and the gap.
+CONTACT_X, CONTACT_Z, CONTACT_NX, CONTACT_NZ, CONTACT_CURVE_X, CONTACT_CURVE_Z, CONTACT_GAP = 0, 1, 2, 3, 4, 5, 6
+CONTACT_FLOATS = 7
 
 #: Kinds of touching features: of an outline; of a link's mesh (corner, edge, face, as `closest` numbers them).
 KIND_SIDE, KIND_TIP, KIND_EDGE, KIND_VERTEX, KIND_LINE, KIND_FACE = 0, 1, 2, 3, 4, 5

@@ -1,4 +1,4 @@
-"""Take the chosen item of every finger, and pose the hand as these items say."""
+"""Take the chosen candidate of every finger, and pose the hand as these candidates say."""
 
 from __future__ import annotations
 
@@ -11,27 +11,31 @@ from .solve_layout import CommandArrays, ProblemArrays, Workspace
 
 
 @kernel
-def pick_items(
+def pick_candidates(
     problem: ProblemArrays, free: ClosingArrays, chosen: Ints, space: Workspace, final: ClosingArrays
 ) -> None:
-    """Copy the chosen items to `space.picked`, and their answers to `final`."""
-    items, picked = problem.items, space.picked
+    """Copy the chosen candidates to `space.picked`, and their answers to `final`."""
+    candidates, picked = problem.candidates, space.picked
     for f in range(chosen.shape[0]):
         i = chosen[f]
-        picked.entry[f], picked.low[f], picked.high[f] = items.entry[i], items.low[i], items.high[i]
-        space.swept[f] = problem.exact.wanted[i]
-        copy_row(items.until[i], picked.until[f])
+        picked.finger_posture[f], picked.low[f], picked.high[f] = (
+            candidates.finger_posture[i],
+            candidates.low[i],
+            candidates.high[i],
+        )
+        space.swept[f] = problem.full_width.requested[i]
+        copy_row(candidates.until[i], picked.until[f])
         copy_answer(free, i, final, f)
 
 
 @kernel
 def copy_answer(given: ClosingArrays, i: int, out: ClosingArrays, f: int) -> None:
-    """Copy the answer of one item."""
+    """Copy the answer of one candidate."""
     copy_row(given.travel[i], out.travel[f])
     copy_row(given.turn[i], out.turn[f])
     for n in range(given.contacts[i]):
-        for k in range(given.hit.shape[2]):
-            out.hit[f, n, k] = given.hit[i, n, k]
+        for k in range(given.contact.shape[2]):
+            out.contact[f, n, k] = given.contact[i, n, k]
         copy_row(given.point[i, n], out.point[f, n])
     for k in range(given.pose.shape[1]):
         copy_pose(given.pose[i, k], out.pose[f, k])
@@ -47,16 +51,16 @@ def copy_row(given: Floats, out: Floats) -> None:
 
 
 @kernel
-def put_item_angles(problem: ProblemArrays, entry: int, travel: Floats, turn: Floats, q: Floats) -> None:
-    """Write all joints' angles when an entry has closed; see `FingerPlan.angles` and `FingerPlan.turned`."""
+def put_candidate_angles(problem: ProblemArrays, finger_posture: int, travel: Floats, turn: Floats, q: Floats) -> None:
+    """Write all joints' angles when a finger posture has closed; see `FingerPlan.angles` and `FingerPlan.turned`."""
     hand = problem.hand
-    first, last = hand.entry_group[entry], hand.entry_group[entry + 1]
-    put_closed(problem.frames, hand.chain, entry, first, last, travel, turn, q)
+    first, last = hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]
+    put_closed(problem.frames, hand.chain, finger_posture, first, last, travel, turn, q)
 
 
 @kernel
-def take_joints(command: CommandArrays, entry: int, angles: Floats, q: Floats) -> None:
+def take_joints(command: CommandArrays, finger_posture: int, angles: Floats, q: Floats) -> None:
     """Copy the angles of a finger's own joints into the posture of the hand."""
     for k in range(command.joints.shape[1]):
-        if command.joints[entry, k] >= 0:
-            q[command.joints[entry, k]] = angles[command.joints[entry, k]]
+        if command.joints[finger_posture, k] >= 0:
+            q[command.joints[finger_posture, k]] = angles[command.joints[finger_posture, k]]

@@ -8,26 +8,26 @@ from clench.kernels.runtime.compiling import kernel
 
 from .layout import ChainArrays, Floats, Ints
 
-#: The group of a motion in which all groups move at once.
+#: The degree of freedom of a motion in which all move at once.
 ALL = -1
 
 
 @kernel
 def next_bound(chain: ChainArrays, j: int, travel: float) -> float:
-    """Return the travel of its group at which a joint next starts or stops moving, or the group is at its limit."""
-    g = chain.joint_group[j]
+    """Return the travel at which a joint next starts or stops, or its degree of freedom is at its limit."""
+    g = chain.joint_dof[j]
     if travel < chain.start[j]:
-        return min(float(chain.start[j]), float(chain.group_length[g]))
+        return min(float(chain.start[j]), float(chain.dof_length[g]))
     if travel < chain.stop[j]:
-        return min(float(chain.stop[j]), float(chain.group_length[g]))
-    return float(chain.group_length[g])
+        return min(float(chain.stop[j]), float(chain.dof_length[g]))
+    return float(chain.dof_length[g])
 
 
 @kernel
 def next_segment(
     chain: ChainArrays,
     joints: tuple[int, int],
-    group: int,
+    dof: int,
     travel: Floats,
     locked: Ints,
     until: Floats,
@@ -37,17 +37,17 @@ def next_segment(
     """Write the present speed of every joint; return how long it lasts, 0 when nothing moves any more.
 
     Args:
-        joints: range of the finger's. group: the moving one, or `ALL`. travel: of every group [rad], (G,).
-        locked: joints that stand still, (J,). until: see `ItemArrays`, (J,). along: the motion so far.
+        joints: range of the finger's. dof: the moving one, or `ALL`. travel: of every degree of freedom [rad], (G,).
+        locked: joints that stand still, (J,). until: see `CandidateArrays`, (J,). along: the motion so far.
     """
     end = math.inf
     for j in range(joints[0], joints[1]):
         rates[j] = 0.0
-        g = chain.joint_group[j]
+        g = chain.joint_dof[j]
         s = travel[g]
-        if (group != ALL and g != group) or locked[j] or s >= chain.group_length[g]:
+        if (dof != ALL and g != dof) or locked[j] or s >= chain.dof_length[g]:
             continue
-        speed = chain.speed[g] if group == ALL else 1.0
+        speed = chain.speed[g] if dof == ALL else 1.0
         end = min(end, (next_bound(chain, j, s) - s) / speed)
         if until[j] < math.inf:
             end = min(end, until[j] - along)
@@ -58,39 +58,39 @@ def next_segment(
 
 @kernel
 def first_member(chain: ChainArrays, begin: int, joint: int) -> int:
-    """Return the first joint of the finger that is in a joint's group; members need not stand side by side."""
+    """Return the finger's first joint that moves with a joint; such joints need not stand side by side."""
     first = begin
-    while chain.joint_group[first] != chain.joint_group[joint]:
+    while chain.joint_dof[first] != chain.joint_dof[joint]:
         first += 1
     return first
 
 
 @kernel
-def move_groups(
-    chain: ChainArrays, joints: tuple[int, int], group: int, travel: Floats, locked: Ints, moved: float
+def move_dofs(
+    chain: ChainArrays, joints: tuple[int, int], dof: int, travel: Floats, locked: Ints, moved: float
 ) -> None:
-    """Move every group on that has a joint which is not locked; bounds that are reached are reached exactly."""
+    """Move every degree of freedom that has an unlocked joint; bounds that are reached are reached exactly."""
     for first in range(joints[0], joints[1]):
-        g = chain.joint_group[first]
-        if (group != ALL and g != group) or first_member(chain, joints[0], first) != first:
+        g = chain.joint_dof[first]
+        if (dof != ALL and g != dof) or first_member(chain, joints[0], first) != first:
             continue
         moves, bound = False, math.inf
         for j in range(first, joints[1]):
-            if chain.joint_group[j] == g and not locked[j]:
+            if chain.joint_dof[j] == g and not locked[j]:
                 moves, bound = True, min(bound, next_bound(chain, j, travel[g]))
-        if moves and travel[g] < chain.group_length[g]:
-            speed = chain.speed[g] if group == ALL else 1.0
+        if moves and travel[g] < chain.dof_length[g]:
+            speed = chain.speed[g] if dof == ALL else 1.0
             travel[g] = bound if moved >= (bound - travel[g]) / speed else travel[g] + speed * moved
 
 
 @kernel
 def lock_joints(chain: ChainArrays, joints: tuple[int, int], last: int, locked: Ints) -> None:
-    """Lock the joints up to `last`, and with each all of its group, unless the group's later joints break away."""
+    """Lock the joints up to `last`, and with each its degree of freedom, unless later joints of this break away."""
     for j in range(joints[0], last + 1):
         locked[j] = 1
-        if not chain.breaks[chain.joint_group[j]]:
+        if not chain.breaks[chain.joint_dof[j]]:
             for k in range(joints[0], joints[1]):
-                if chain.joint_group[k] == chain.joint_group[j]:
+                if chain.joint_dof[k] == chain.joint_dof[j]:
                     locked[k] = 1
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from clench.kernels.geometry.link_meshes import make_depth_work
 from clench.kernels.meetings.meeting_layout import make_meeting_work
-from clench.kernels.runtime.by_reference import whole
+from clench.kernels.runtime.by_reference import by_value
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.advance import make_work
 from clench.kernels.toi.toi_work import make_sweep_work
@@ -14,10 +14,10 @@ from clench.kernels.toi.toi_work import make_sweep_work
 from .bundles import answer_at
 from .choosing import choose_sets
 from .close_with_others import close_with_others
-from .contact_reading import TOUCH_FLOATS, TOUCH_INTEGERS, TouchArrays
+from .contact_reading import PALM_CONTACT_FLOATS, PALM_CONTACT_INTEGERS, PalmContactArrays
 from .free_closing import close_free, find_blocked
-from .layout import HIT_FLOATS, HIT_INTEGERS, ClosingArrays, Floats, ItemArrays
-from .picking import pick_items
+from .layout import CONTACT_FLOATS, CONTACT_INTEGERS, CandidateArrays, ClosingArrays, Floats
+from .picking import pick_candidates
 from .solve_layout import BLOCK, CHOOSE, CLOSE, FINISH, Arena, Closed, ProblemArrays, Solved, Workspace
 from .verdict import judge_pose
 
@@ -28,9 +28,10 @@ def solve_poses(
 ) -> None:
     """Run stages of a solve for the poses that are not solved yet.
 
-    `CLOSE` closes every item without the other fingers. `BLOCK` finds the fingers that cannot begin. `CHOOSE` chooses
-    an item for every finger. `FINISH` closes the chosen items with the other fingers in their way, and judges them.
-    A caller that closes or chooses in another way leaves out `CLOSE` or `CHOOSE` and writes the arrays itself.
+    `CLOSE` closes every candidate without the other fingers. `BLOCK` finds the fingers that cannot begin. `CHOOSE`
+    chooses a candidate for every finger. `FINISH` closes the chosen candidates with the other fingers in their way, and
+    judges them. A caller that closes or chooses in another way leaves out `CLOSE` or `CHOOSE` and writes the arrays
+    itself.
 
     Args:
         problem: hand, object and command. T_palm_objects: where the object is, (N, 3, 4). arena: scratch space.
@@ -49,7 +50,7 @@ def solve_poses(
             choose_sets(problem, T, free, space, solved.chosen[n])
         if stages & FINISH and overflow == 0:
             final = answer_at(found.final, n)
-            pick_items(problem, free, solved.chosen[n], space, final)
+            pick_candidates(problem, free, solved.chosen[n], space, final)
             overflow = close_with_others(problem, T, space, final, found, n, stages & CLOSE == 0)
             if overflow == 0:
                 judge_pose(problem, T, space, final, found, solved, n)
@@ -61,40 +62,44 @@ def make_workspace(problem: ProblemArrays, arena: Arena, found: Closed, solved: 
     """Allocate the scratch space of a solve."""
     hand, command, frames = problem.hand, problem.command, problem.frames
     joints, links = hand.chain.rate.shape[0], problem.across.shape[0]
-    entries, fingers, items = frames.posture.shape[0], command.thumb.shape[0], problem.items.entry.shape[0]
+    finger_postures, fingers, candidates = (
+        frames.posture.shape[0],
+        command.thumb.shape[0],
+        problem.candidates.finger_posture.shape[0],
+    )
     contacts = solved.number.shape[2]
-    numbers = np.empty((max(items, fingers), contacts, TOUCH_INTEGERS), dtype=np.int64)
+    numbers = np.empty((max(candidates, fingers), contacts, PALM_CONTACT_INTEGERS), dtype=np.int64)
     one = np.empty(fingers, dtype=np.int64)
     return Workspace(
-        whole(arena),
+        by_value(arena),
         make_work(joints, hand.outlines),
         make_sweep_work(joints, links),
         make_depth_work(),
-        make_answer(fingers, hand.chain.group_length.shape[0], joints, contacts, hand.family_pose.shape[0]),
-        ItemArrays(one, one.copy(), one.copy(), np.empty((fingers, joints))),
+        make_answer(fingers, hand.chain.dof_length.shape[0], joints, contacts, hand.axis_group_pose.shape[0]),
+        CandidateArrays(one, one.copy(), one.copy(), np.empty((fingers, joints))),
         one.copy(),
-        np.empty((entries, links, 3, 4)),
-        np.zeros(hand.chain.group_length.shape[0]),
+        np.empty((finger_postures, links, 3, 4)),
+        np.zeros(hand.chain.dof_length.shape[0]),
         command.start.copy(),
         command.start.copy(),
         np.empty((links + 2, 3, 4)),
-        TouchArrays(numbers, np.empty((max(items, fingers), contacts, TOUCH_FLOATS))),
+        PalmContactArrays(numbers, np.empty((max(candidates, fingers), contacts, PALM_CONTACT_FLOATS))),
         one.copy(),
         make_meeting_work(problem.fingers, fingers, joints),
     )
 
 
 @kernel(allocates=True)
-def make_answer(items: int, groups: int, joints: int, contacts: int, families: int) -> ClosingArrays:
-    """Allocate the answers of some items."""
-    counts = np.zeros(items, dtype=np.int64)
+def make_answer(candidates: int, dofs: int, joints: int, contacts: int, axis_groups: int) -> ClosingArrays:
+    """Allocate the answers of some candidates."""
+    counts = np.zeros(candidates, dtype=np.int64)
     return ClosingArrays(
-        np.zeros((items, groups)),
-        np.zeros((items, joints)),
+        np.zeros((candidates, dofs)),
+        np.zeros((candidates, joints)),
         counts,
-        np.zeros((items, contacts, HIT_INTEGERS), dtype=np.int64),
-        np.zeros((items, contacts, HIT_FLOATS)),
-        np.zeros((items, families, 3, 4)),
+        np.zeros((candidates, contacts, CONTACT_INTEGERS), dtype=np.int64),
+        np.zeros((candidates, contacts, CONTACT_FLOATS)),
+        np.zeros((candidates, axis_groups, 3, 4)),
         counts.copy(),
         counts.copy(),
         counts.copy(),

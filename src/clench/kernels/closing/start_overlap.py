@@ -37,7 +37,7 @@ def start_overlap(
     resting: Ints,
     solid: ObjectMesh,
     T_palm_object: Floats,
-    whole: bool,
+    full_width: bool,
     work: DepthWork,
 ) -> int:
     """Return whether links of a finger that the planes do not tell of overlap the object; see the codes above.
@@ -46,12 +46,12 @@ def start_overlap(
     object inside a link may lie between them.
 
     Args:
-        link_pose: see `ExactArrays`. meshes: of the links. own, resting: which are the finger's, and which of those
+        link_pose: see `FullWidthArrays`. meshes: of the links. own, resting: which are the finger's, and which of those
             closing does not move, (M,). solid: the object. T_palm_object: where it is, (3, 4).
-        whole: links close over their full width, and all of them are looked at: there may be no planes.
+        full_width: links close over their full width, and all of them are looked at: there may be no planes.
         work: scratch space.
     """
-    around = whole or may_hold_part(meshes, link_pose, solid, T_palm_object, work.points)
+    around = full_width or may_hold_part(meshes, link_pose, solid, T_palm_object, work.points)
     if not any_deep(meshes, own if around else resting, link_pose, solid, T_palm_object, work):
         return FREE
     return ANY_LINK if around else RESTING_LINK

@@ -1,4 +1,4 @@
-"""Rigid bodies for exact sweeps: triangles, segments and points, each with a radius, in trees of balls."""
+"""Rigid bodies for sweeps: triangles, segments and points, each with a radius, in trees of balls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compute the frames of a hand's links, and its joints' angles from the travel of groups: kinematics for kernels."""
+"""Compute the frames of a hand's links, and its joints' angles from the travels of degrees of freedom."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_po
 
 
 class FrameArrays(NamedTuple):
-    """The kinematics of a whole hand; L links, J joints, C couplings, E entries, G groups.
+    """The kinematics of a whole hand; L links, J joints, C couplings, E finger postures, G degrees of freedom.
 
     Args:
         parent: of each link, -1 for the root, (L,). joint: that moves it, -1 when fixed, (L,).
@@ -22,7 +22,8 @@ class FrameArrays(NamedTuple):
         palm: index of the palm, (1,).
         direction: in which joints close, (J,). lower, upper: limits [rad], (J,).
         leader, follower: of each coupling, (C,). ratio: [-], offset: [rad], (C,).
-        posture: open angles of each entry [rad], (E, J). group_leader: joint that leads each group, (G,).
+        posture: open angles of each finger posture [rad], (E, J). dof_leader: joint that leads each degree of freedom,
+            (G,).
         chain_joint: joint of the hand that each joint of `ChainArrays` is. chain_turn: +1 where its angle grows with
             its turn, else -1. breakaway: whether the follower of a coupling can stay behind, (C,).
     """
@@ -42,7 +43,7 @@ class FrameArrays(NamedTuple):
     ratio: Floats
     offset: Floats
     posture: Floats
-    group_leader: Ints
+    dof_leader: Ints
     chain_joint: Ints
     chain_turn: Floats
     breakaway: Ints
@@ -97,12 +98,12 @@ def put_link(frames: FrameArrays, i: int, q: Floats, R: Floats, turned: Floats, 
 
 
 @kernel
-def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: Floats, q: Floats) -> None:
-    """Write all joints' angles when the groups `first` to `last` of an entry have travelled (G,); see `FingerPlan`."""
+def put_angles(frames: FrameArrays, finger_posture: int, first: int, last: int, travel: Floats, q: Floats) -> None:
+    """Write all joints' angles when the degrees of freedom `first` to `last` have travelled (G,); see `FingerPlan`."""
     for j in range(q.shape[0]):
-        q[j] = frames.posture[entry, j]
+        q[j] = frames.posture[finger_posture, j]
     for g in range(first, last):
-        j = frames.group_leader[g]
+        j = frames.dof_leader[g]
         q[j] = inside(q[j] + frames.direction[j] * travel[g], frames.lower[j], frames.upper[j])
     couple(frames, q)
 
@@ -111,24 +112,24 @@ def put_angles(frames: FrameArrays, entry: int, first: int, last: int, travel: F
 def put_closed(
     frames: FrameArrays,
     chain: ChainArrays,
-    entry: int,
+    finger_posture: int,
     first: int,
     last: int,
     travel: Floats,
     turn: Floats,
     q: Floats,
 ) -> None:
-    """Do as `put_angles`, but by the turns of the joints (J,) where joints of an entry break away."""
+    """Do as `put_angles`, but by the turns of the joints (J,) where joints of a finger posture break away."""
     breaks = False
     for g in range(first, last):
         breaks = breaks or chain.breaks[g] != 0
     if not breaks:
-        put_angles(frames, entry, first, last, travel, q)
+        put_angles(frames, finger_posture, first, last, travel, q)
         return
     for j in range(q.shape[0]):
-        q[j] = frames.posture[entry, j]
+        q[j] = frames.posture[finger_posture, j]
     for k in range(turn.shape[0]):
-        if first <= chain.joint_group[k] < last:
+        if first <= chain.joint_dof[k] < last:
             j = frames.chain_joint[k]
             q[j] = inside(q[j] + frames.chain_turn[k] * turn[k], frames.lower[j], frames.upper[j])
 

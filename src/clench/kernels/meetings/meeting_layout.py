@@ -11,13 +11,13 @@ from clench.kernels.runtime.compiling import kernel
 
 
 class FingerLinks(NamedTuple):
-    """A plan's data of the links of its fingers; E entries, K links of them that can touch, J joints.
+    """A plan's data of the links of its fingers; E finger postures, K links of them that can touch, J joints.
 
     Args:
-        first: first link of each entry, (E + 1,). link: index in the hand, (K,).
+        first: first link of each finger posture, (E + 1,). link: index in the hand, (K,).
         joint: last closing joint that moves it, -1 for a resting link, (K,).
         arm: no point of the link gets farther from a joint's pivot [m], (K, J).
-        tilt: largest sine of the angle between two axes of an entry's joints [-], (E,).
+        tilt: largest sine of the angle between two axes of a finger posture's joints [-], (E,).
         apart: whether links of different fingers may not overlap each other, (L, L).
     """
 
@@ -34,7 +34,7 @@ class Meetings(NamedTuple):
 
     Args:
         size: how many there are, (1,).
-        number: item, link and held joint (of `ChainArrays`; -1: none is held) of either finger, (M, 6).
+        number: candidate, link and held joint (of `ChainArrays`; -1: none is held) of either finger, (M, 6).
         value: position [m], normal from the second link to the first, both in the palm frame, gap [m], and the motion
             so far, (M, 8).
     """
@@ -45,16 +45,16 @@ class Meetings(NamedTuple):
 
 
 class MeetingWork(NamedTuple):
-    """The scratch space of the search; K links, P pairs of them, I items, J joints, L links of the hand.
+    """The scratch space of the search; K links, P pairs of them, I candidates, J joints, L links of the hand.
 
     Args:
-        until: see `ItemArrays`, (I, J).
+        until: see `CandidateArrays`, (I, J).
         rate: how fast each joint turns in its part of the motion [rad], begin, end: that part, (J,).
         final, turns: of each joint at the end and at a place of the motion [rad], (J,).
         axis: of each joint at a place of the motion, in the palm frame, (J, 3).
         lane: extent of each link along a direction [m], (K, 2).
-        pair: the two items among those chosen, their links, whether the pair counts, how often it was looked at, and
-            its elements that were nearest, (P, 8). at: up to where it is free, infinite if to the end, (P,).
+        pair: the two candidates among those chosen, their links, whether the pair counts, how often it was looked at,
+            and its elements that were nearest, (P, 8). at: up to where it is free, infinite if to the end, (P,).
         plane: normal of a plane that separated it, (P, 3). reach: up to which gap it is measured [m], (P,).
         ahead: poses of two links further on, (2, 3, 4).
         touch: how the pair that was looked at last touches, as `Meetings.value`, (8,).
@@ -77,12 +77,12 @@ class MeetingWork(NamedTuple):
 
 
 @kernel(allocates=True)
-def make_meeting_work(fingers: FingerLinks, items: int, joints: int) -> MeetingWork:
+def make_meeting_work(fingers: FingerLinks, candidates: int, joints: int) -> MeetingWork:
     """Allocate the scratch space for a hand."""
     rows = fingers.link.shape[0]
     pairs = rows * rows // 2
     return MeetingWork(
-        np.empty((items, joints)),
+        np.empty((candidates, joints)),
         np.empty(joints),
         np.empty(joints),
         np.empty(joints),

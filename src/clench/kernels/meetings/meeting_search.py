@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import Floats, Ints, ItemArrays
+from clench.kernels.closing.layout import CandidateArrays, Floats, Ints
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.toi.full_width import ExactArrays
+from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.toi_work import SweepWork
 
 from .finger_motion import ROUNDING, approach_along, last_end, next_change, place_link, put_axes, speed_of
@@ -31,32 +31,39 @@ ON, FREE, MEETS = 0, 1, 2
 
 
 @kernel
-def list_pairs(exact: ExactArrays, fingers: FingerLinks, items: ItemArrays, chosen: Ints, room: MeetingWork) -> int:
-    """List the pairs of links of all chosen items' fingers that may not overlap, and return how many there are."""
+def list_pairs(
+    full_width: FullWidthArrays, fingers: FingerLinks, candidates: CandidateArrays, chosen: Ints, workspace: MeetingWork
+) -> int:
+    """List the pairs of links of all chosen candidates' fingers that may not overlap, and return how many there are."""
     count = 0
     for a in range(chosen.shape[0]):
         for b in range(a + 1, chosen.shape[0]):
-            one, other = items.entry[chosen[a]], items.entry[chosen[b]]
+            one, other = candidates.finger_posture[chosen[a]], candidates.finger_posture[chosen[b]]
             for m in range(fingers.first[one], fingers.first[one + 1]):
                 for r in range(fingers.first[other], fingers.first[other + 1]):
                     if fingers.apart[fingers.link[m], fingers.link[r]] == 0:
                         continue
-                    pair, plane, link, met = room.pair[count], room.plane[count], fingers.link[m], fingers.link[r]
+                    pair, plane, link, met = (
+                        workspace.pair[count],
+                        workspace.plane[count],
+                        fingers.link[m],
+                        fingers.link[r],
+                    )
                     pair[0], pair[1], pair[2], pair[3], pair[4], pair[5] = a, b, m, r, 1, 0
                     pair[6], pair[7] = -1, -1
-                    x, y, z = aside(exact, one, link, other, met)
+                    x, y, z = aside(full_width, one, link, other, met)
                     plane[0], plane[1], plane[2] = x, y, z
-                    room.reach[count] = REACH
+                    workspace.reach[count] = REACH
                     count += 1
     return count
 
 
 @kernel
-def aside(exact: ExactArrays, one: int, m: int, other: int, r: int) -> Vector:
-    """Return the direction from the middle of a link of one entry to that of another at their open postures."""
+def aside(full_width: FullWidthArrays, one: int, m: int, other: int, r: int) -> Vector:
+    """Return the direction from the middle of a link to that of a link of another finger, at their open postures."""
     here, there = (
-        point_at(exact.link_pose[one, m], exact.links.box[m]),
-        point_at(exact.link_pose[other, r], exact.links.box[r]),
+        point_at(full_width.link_pose[one, m], full_width.links.box[m]),
+        point_at(full_width.link_pose[other, r], full_width.links.box[r]),
     )
     n = plus(here, scaled(there, -1.0))
     size = math.sqrt(dot(n, n))
@@ -75,48 +82,50 @@ def point_at(T: Floats, p: Floats) -> Vector:
 
 @kernel
 def place_pair(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     fingers: FingerLinks,
     one: int,
     other: int,
     m: int,
     r: int,
     at: float,
-    room: MeetingWork,
+    workspace: MeetingWork,
     sweep: SweepWork,
 ) -> None:
-    """Write the poses of two links, of two entries, at a place of the motion to `sweep`, and their joints' turns."""
-    place_link(exact, fingers, one, m, at, room, sweep.moving)
-    place_link(exact, fingers, other, r, at, room, sweep.resting)
+    """Write the poses of two links, of two finger postures, at a place of the motion to `sweep`, and their joints'
+    turns.
+    """
+    place_link(full_width, fingers, one, m, at, workspace, sweep.moving)
+    place_link(full_width, fingers, other, r, at, workspace, sweep.resting)
 
 
 @kernel
 def step_by_plane(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     fingers: FingerLinks,
-    entries: tuple[int, int],
+    finger_postures: tuple[int, int],
     rows: tuple[int, int],
     n: Vector,
     margin: float,
     at: float,
     end: float,
-    room: MeetingWork,
+    workspace: MeetingWork,
     sweep: SweepWork,
 ) -> float:
     """Return how far two links advance from a place of the motion, kept apart by planes across one direction.
 
     Args:
-        entries, rows: of the links, which stand in `sweep`. n: unit vector from the second link to the first.
+        finger_postures, rows: of the links, which stand in `sweep`. n: unit vector from the second link to the first.
         margin: how far planes across it keep them apart there, above 0 [m]. end: of their motion.
 
     Returns:
         the step; infinite where it leads to the end.
     """
-    if approach_along(exact, fingers, entries, rows, n, at, end, room)[0] < margin:
+    if approach_along(full_width, fingers, finger_postures, rows, n, at, end, workspace)[0] < margin:
         return math.inf
-    until = next_change(exact, fingers, entries[0], rows[0], at, end, room)
-    until = next_change(exact, fingers, entries[1], rows[1], at, until, room)
-    _, speed, bend = approach_along(exact, fingers, entries, rows, n, at, until, room)
+    until = next_change(full_width, fingers, finger_postures[0], rows[0], at, end, workspace)
+    until = next_change(full_width, fingers, finger_postures[1], rows[1], at, until, workspace)
+    _, speed, bend = approach_along(full_width, fingers, finger_postures, rows, n, at, until, workspace)
     m, r, width = fingers.link[rows[0]], fingers.link[rows[1]], until - at
     if speed * width < margin:
         return width
@@ -126,8 +135,10 @@ def step_by_plane(
     for _ in range(LENGTHS):
         if step <= least:
             break
-        place_pair(exact, fingers, entries[0], entries[1], rows[0], rows[1], at + step, room, sweep)
-        left = plane_between(exact.links, m, r, n[0], n[1], n[2], sweep)
+        place_pair(
+            full_width, fingers, finger_postures[0], finger_postures[1], rows[0], rows[1], at + step, workspace, sweep
+        )
+        left = plane_between(full_width.links, m, r, n[0], n[1], n[2], sweep)
         if lowest_on(step, margin, left, bend) > level:
             return step
         step = shorter_step(step, margin - level, left - level, bend)
@@ -144,54 +155,59 @@ def put_touch(gap: float, n: Vector, point: Vector, at: float, touch: Floats) ->
 
 @kernel
 def look_at(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     fingers: FingerLinks,
-    entries: tuple[int, int],
+    finger_postures: tuple[int, int],
     p: int,
-    room: MeetingWork,
+    workspace: MeetingWork,
     sweep: SweepWork,
 ) -> int:
     """Let a pair of links go on by a step, and return `ON`, `FREE` or `MEETS`."""
-    pair, plane, at = room.pair[p], room.plane[p], room.at[p]
+    pair, plane, at = workspace.pair[p], workspace.plane[p], workspace.at[p]
     rows = (pair[2], pair[3])
     m, r = fingers.link[rows[0]], fingers.link[rows[1]]
-    end = last_end(exact, fingers, entries[0], rows[0], room)
-    end = max(end, last_end(exact, fingers, entries[1], rows[1], room))
+    end = last_end(full_width, fingers, finger_postures[0], rows[0], workspace)
+    end = max(end, last_end(full_width, fingers, finger_postures[1], rows[1], workspace))
     # Links that are held where they met touch at the end of their motion.
     if at >= (1.0 - ROUNDING) * end:
         return FREE
-    place_pair(exact, fingers, entries[0], entries[1], rows[0], rows[1], at, room, sweep)
-    put_axes(exact, fingers, entries[0], rows[0], room)
-    put_axes(exact, fingers, entries[1], rows[1], room)
-    margin, nx, ny, nz = find_plane(exact.links, m, r, plane[0], plane[1], plane[2], sweep)
+    place_pair(full_width, fingers, finger_postures[0], finger_postures[1], rows[0], rows[1], at, workspace, sweep)
+    put_axes(full_width, fingers, finger_postures[0], rows[0], workspace)
+    put_axes(full_width, fingers, finger_postures[1], rows[1], workspace)
+    margin, nx, ny, nz = find_plane(full_width.links, m, r, plane[0], plane[1], plane[2], sweep)
     plane[0], plane[1], plane[2] = nx, ny, nz
     step, pair[5] = 0.0, pair[5] + 1
     if margin <= NEAR or pair[5] == LOOKS:
-        reach = room.reach[p] if pair[5] < LOOKS else math.inf
-        gap = links_gap(exact.links, m, r, reach, (nx, ny, nz), pair[6:], sweep)
+        reach = workspace.reach[p] if pair[5] < LOOKS else math.inf
+        gap = links_gap(full_width.links, m, r, reach, (nx, ny, nz), pair[6:], sweep)
         if gap < reach:
-            _, n, point = elements_gap(exact.links, pair[6], pair[7], sweep)
+            _, n, point = elements_gap(full_width.links, pair[6], pair[7], sweep)
             if gap <= TOUCH or pair[5] == LOOKS:
-                put_touch(gap, n, point, at, room.touch)
+                put_touch(gap, n, point, at, workspace.touch)
                 return MEETS
-            step = step_by_elements(exact, fingers, entries, rows, gap, n, pair[6:], at, end, room, sweep)
+            step = step_by_elements(
+                full_width, fingers, finger_postures, rows, gap, n, pair[6:], at, end, workspace, sweep
+            )
             nx, ny, nz = n
-            margin = min(plane_between(exact.links, m, r, nx, ny, nz, sweep), gap)
+            margin = min(plane_between(full_width.links, m, r, nx, ny, nz, sweep), gap)
         else:
-            speed = speed_of(exact, fingers, entries[0], rows[0], at, room)
-            step = gap / (speed + speed_of(exact, fingers, entries[1], rows[1], at, room))
-        room.reach[p] = max(WIDER * gap, REACH)
+            speed = speed_of(full_width, fingers, finger_postures[0], rows[0], at, workspace)
+            step = gap / (speed + speed_of(full_width, fingers, finger_postures[1], rows[1], at, workspace))
+        workspace.reach[p] = max(WIDER * gap, REACH)
     if margin > 0.0:
-        step = max(step, step_by_plane(exact, fingers, entries, rows, (nx, ny, nz), margin, at, end, room, sweep))
-    room.at[p] = at + step
+        step = max(
+            step,
+            step_by_plane(full_width, fingers, finger_postures, rows, (nx, ny, nz), margin, at, end, workspace, sweep),
+        )
+    workspace.at[p] = at + step
     return ON if at + step < (1.0 - ROUNDING) * end else FREE
 
 
 @kernel
-def first_waiting(count: int, room: MeetingWork) -> int:
+def first_waiting(count: int, workspace: MeetingWork) -> int:
     """Return the pair that has come least far, or -1 where all are free to the end."""
     first, least = -1, math.inf
     for p in range(count):
-        if room.at[p] < least:
-            first, least = p, room.at[p]
+        if workspace.at[p] < least:
+            first, least = p, workspace.at[p]
     return first

@@ -10,7 +10,7 @@ from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import plane_gap
-from clench.kernels.toi.full_width import ExactArrays
+from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.separating_planes import span
 from clench.kernels.toi.toi_work import (
     SweepWork,
@@ -124,16 +124,16 @@ def shorter_step(step: float, margin: float, left: float, bend: float) -> float:
 
 @kernel
 def step_by_elements(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     fingers: FingerLinks,
-    entries: tuple[int, int],
+    finger_postures: tuple[int, int],
     rows: tuple[int, int],
     gap: float,
     n: Vector,
     near: Ints,
     at: float,
     end: float,
-    room: MeetingWork,
+    workspace: MeetingWork,
     sweep: SweepWork,
 ) -> float:
     """Return how far two links advance from a place of the motion, kept apart by planes between their elements.
@@ -141,22 +141,24 @@ def step_by_elements(
     Elements that are farther apart than links approach each other on the step do not count.
 
     Args:
-        entries, rows: of the links, which stand in `sweep`. gap: of the links [m].
+        finger_postures, rows: of the links, which stand in `sweep`. gap: of the links [m].
         n, near: unit vector between their nearest elements, and these. at: the place. end: of their motion.
     """
-    links, stack = exact.links, sweep.stack
-    until = next_change(exact, fingers, entries[0], rows[0], at, end, room)
-    until = next_change(exact, fingers, entries[1], rows[1], at, until, room)
-    speed = speed_of(exact, fingers, entries[0], rows[0], at, room)
-    speed += speed_of(exact, fingers, entries[1], rows[1], at, room)
-    _, across, _ = approach_along(exact, fingers, entries, rows, n, at, until, room)
+    links, stack = full_width.links, sweep.stack
+    until = next_change(full_width, fingers, finger_postures[0], rows[0], at, end, workspace)
+    until = next_change(full_width, fingers, finger_postures[1], rows[1], at, until, workspace)
+    speed = speed_of(full_width, fingers, finger_postures[0], rows[0], at, workspace)
+    speed += speed_of(full_width, fingers, finger_postures[1], rows[1], at, workspace)
+    _, across, _ = approach_along(full_width, fingers, finger_postures, rows, n, at, until, workspace)
     least = gap / speed
     step = min(until - at, AROUND * gap / max(across, FLAT * speed))
     if step <= least:
         return least
-    put_ahead(exact, fingers, entries, rows, at + step, room)
+    put_ahead(full_width, fingers, finger_postures, rows, at + step, workspace)
     # The nearest elements tell most.
-    step = step_of_elements(exact, fingers, entries, rows, near[0], near[1], at, until, step, room, sweep)
+    step = step_of_elements(
+        full_width, fingers, finger_postures, rows, near[0], near[1], at, until, step, workspace, sweep
+    )
     put_sides(n, sweep)
     waiting = push_roots(links, fingers.link[rows[0]], links, fingers.link[rows[1]], stack)
     while waiting > 0 and step > least:
@@ -165,7 +167,9 @@ def step_by_elements(
         if are_apart(links, a, b, speed * step, across * step, sweep):
             continue
         if a < 0 and b < 0:
-            step = step_of_elements(exact, fingers, entries, rows, -1 - a, -1 - b, at, until, step, room, sweep)
+            step = step_of_elements(
+                full_width, fingers, finger_postures, rows, -1 - a, -1 - b, at, until, step, workspace, sweep
+            )
             continue
         height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
         put_nearest_last(links, links, stack, waiting, height, sweep)
@@ -175,41 +179,41 @@ def step_by_elements(
 
 @kernel
 def put_ahead(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     fingers: FingerLinks,
-    entries: tuple[int, int],
+    finger_postures: tuple[int, int],
     rows: tuple[int, int],
     at: float,
-    room: MeetingWork,
+    workspace: MeetingWork,
 ) -> None:
-    """Write the poses of two links at a place of the motion to `room.ahead`."""
-    place_link(exact, fingers, entries[0], rows[0], at, room, room.ahead[0])
-    place_link(exact, fingers, entries[1], rows[1], at, room, room.ahead[1])
+    """Write the poses of two links at a place of the motion to `workspace.ahead`."""
+    place_link(full_width, fingers, finger_postures[0], rows[0], at, workspace, workspace.ahead[0])
+    place_link(full_width, fingers, finger_postures[1], rows[1], at, workspace, workspace.ahead[1])
 
 
 @kernel
 def step_of_elements(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     fingers: FingerLinks,
-    entries: tuple[int, int],
+    finger_postures: tuple[int, int],
     rows: tuple[int, int],
     i: int,
     k: int,
     at: float,
     until: float,
     step: float,
-    room: MeetingWork,
+    workspace: MeetingWork,
     sweep: SweepWork,
 ) -> float:
-    """Return how far of a step, to which `room.ahead` belongs, a plane is seen to keep two elements apart.
+    """Return how far of a step, to which `workspace.ahead` belongs, a plane is seen to keep two elements apart.
 
     Args:
         i, k: the elements. until: up to where every joint turns evenly.
     """
-    links, ahead = exact.links, sweep.placed
+    links, ahead = full_width.links, sweep.placed
     ka, kb, w = links.corners[i], links.corners[k], links.radius[i] + links.radius[k]
     gap, n, _ = elements_gap(links, i, k, sweep)
-    _, speed, bend = approach_along(exact, fingers, entries, rows, n, at, until, room)
+    _, speed, bend = approach_along(full_width, fingers, finger_postures, rows, n, at, until, workspace)
     level = min(0.5 * gap, 0.5 * TOUCH)
     if speed * step < gap - level:
         return step
@@ -217,13 +221,13 @@ def step_of_elements(
     for _ in range(LENGTHS):
         if step <= least:
             return step
-        put_core(links, i, room.ahead[0], ahead)
-        put_core(links, k, room.ahead[1], ahead[4:])
+        put_core(links, i, workspace.ahead[0], ahead)
+        put_core(links, k, workspace.ahead[1], ahead[4:])
         left = plane_gap(ahead, ka, ahead[4:], kb, n[0], n[1], n[2]) - w
         if lowest_on(step, gap, left, bend) > level:
             return step
         step = max(shorter_step(step, gap - level, left - level, bend), least)
-        put_ahead(exact, fingers, entries, rows, at + step, room)
+        put_ahead(full_width, fingers, finger_postures, rows, at + step, workspace)
     if step > least:
-        put_ahead(exact, fingers, entries, rows, at + least, room)
+        put_ahead(full_width, fingers, finger_postures, rows, at + least, workspace)
     return least

@@ -36,12 +36,12 @@ Content = TypeVar("Content")
 _WORD: Final = 8
 
 
-class Handed(types.Type):
+class ByReference(types.Type):
     """The type of a pointer to a tuple with names."""
 
     def __init__(self, content: types.NamedTuple) -> None:
         self.content = content
-        super().__init__(name=f"Handed({content.name})")
+        super().__init__(name=f"ByReference({content.name})")
 
     @property
     def key(self) -> Any:
@@ -61,62 +61,62 @@ class Handed(types.Type):
         return {name: value for name, value in self.__dict__.items() if name != "_hash"}
 
 
-@register_model(Handed)
-class HandedModel(models.PrimitiveModel):
+@register_model(ByReference)
+class ByReferenceModel(models.PrimitiveModel):
     """A pointer to the tuple as kernels hold it."""
 
-    def __init__(self, manager: Any, handed: Handed) -> None:
-        content = manager.lookup(handed.content).get_value_type()
-        super().__init__(manager, handed, content.as_pointer())
+    def __init__(self, manager: Any, by_reference: ByReference) -> None:
+        content = manager.lookup(by_reference.content).get_value_type()
+        super().__init__(manager, by_reference, content.as_pointer())
 
 
-def handed(kind: Any) -> Any:
+def by_reference(kind: Any) -> Any:
     """Return the type by which a kernel hands a value on: a pointer for tuples that have arrays."""
     if isinstance(kind, types.NamedTuple) and any(isinstance(t, types.Array | types.NamedTuple) for t in kind.types):
-        return Handed(kind)
+        return ByReference(kind)
     return types.unliteral(kind)
 
 
 @infer_getattr
-class HandedAttribute(AttributeTemplate):
+class ByReferenceAttribute(AttributeTemplate):
     """The fields of the tuple; a tuple inside is handed on, too."""
 
-    key = Handed
+    key = ByReference
 
-    def generic_resolve(self, pointer: Handed, name: str) -> Any:
+    def generic_resolve(self, pointer: ByReference, name: str) -> Any:
         """Return the type of a field, or None where there is none."""
         fields = pointer.content.fields
-        return handed(pointer.content.types[fields.index(name)]) if name in fields else None
+        return by_reference(pointer.content.types[fields.index(name)]) if name in fields else None
 
 
-@lower_getattr_generic(Handed)
-def read_field(context: Any, builder: ir.IRBuilder, pointer: Handed, value: Any, name: str) -> Any:
+@lower_getattr_generic(ByReference)
+def read_field(context: Any, builder: ir.IRBuilder, pointer: ByReference, value: Any, name: str) -> Any:
     """Read a field, or point to it."""
     index = pointer.content.fields.index(name)
     kind, place = pointer.content.types[index], cgutils.gep_inbounds(builder, value, 0, index)
-    if kind is not handed(kind) and isinstance(handed(kind), Handed):
+    if kind is not by_reference(kind) and isinstance(by_reference(kind), ByReference):
         return place
     return impl_ret_borrowed(context, builder, kind, builder.load(place))
 
 
-@lower_cast(types.NamedTuple, Handed)
-def hand_on(context: Any, builder: ir.IRBuilder, given: Any, wanted: Any, value: Any) -> Any:
+@lower_cast(types.NamedTuple, ByReference)
+def pass_on(context: Any, builder: ir.IRBuilder, given: Any, wanted: Any, value: Any) -> Any:
     """Put a tuple where it can be pointed to, for as long as the calling kernel runs."""
     return cgutils.alloca_once_value(builder, value)
 
 
-def whole(pointed: Any) -> Any:
+def by_value(pointed: Any) -> Any:
     """Return a tuple that was handed on as a value, to be a field of another one; without compiling it is one."""
     return pointed
 
 
-@overload(whole)
-def whole_of(pointed: Any) -> Any:
+@overload(by_value)
+def by_value_of(pointed: Any) -> Any:
     """Return how kernels do it."""
-    if isinstance(pointed, Handed):
+    if isinstance(pointed, ByReference):
 
         def read(pointed: Any) -> Any:
-            return read_whole(pointed)
+            return read_value(pointed)
 
         return read
 
@@ -127,7 +127,7 @@ def whole_of(pointed: Any) -> Any:
 
 
 @intrinsic
-def read_whole(context: Any, pointed: Handed) -> Any:
+def read_value(context: Any, pointed: ByReference) -> Any:
     """Read a tuple."""
 
     def read(context: Any, builder: ir.IRBuilder, signature: Any, given: Any) -> Any:
@@ -141,7 +141,7 @@ class Kept:
 
     def __init__(self, content: Any) -> None:
         self.content = content
-        self.kind = Handed(numba.typeof(content))
+        self.kind = ByReference(numba.typeof(content))
         self._room = np.frombuffer(laid_out(content)[0], dtype=np.uint8)
         self.address = self._room.__array_interface__["data"][0]
 
@@ -177,13 +177,13 @@ def laid_out(value: Any) -> tuple[bytes, int]:
 
 
 @typeof_impl.register(Kept)
-def type_of_kept(value: Kept, context: Any) -> Handed:
+def type_of_kept(value: Kept, context: Any) -> ByReference:
     """Return what kernels take it for."""
     return value.kind
 
 
-@unbox(Handed)
-def point_to(kind: Handed, value: Any, c: Any) -> Any:
+@unbox(ByReference)
+def point_to(kind: ByReference, value: Any, c: Any) -> Any:
     """Return the pointer to a tuple that is kept."""
     number = c.pyapi.object_getattr_string(value, "address")
     address = c.pyapi.long_as_longlong(number)

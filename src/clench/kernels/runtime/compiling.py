@@ -14,7 +14,7 @@ from numba.core.registry import CPUDispatcher
 
 from clench.core import tolerances
 
-from .by_reference import handed
+from .by_reference import by_reference
 from .kernel_cache import index_of, keep_on_disk
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
@@ -109,7 +109,9 @@ class CachedKernel(CPUDispatcher):
 
         Numba would compile it anew for every integer that the other kernel writes out in a call.
         """
-        return super().get_call_template(tuple(map(handed, args)), {name: handed(a) for name, a in kws.items()})
+        return super().get_call_template(
+            tuple(map(by_reference, args)), {name: by_reference(a) for name, a in kws.items()}
+        )
 
 
 class KernelForKernels(CachedKernel):

@@ -18,13 +18,13 @@ from typing import Any
 import numba
 import numpy as np
 
-from clench.kernels.closing.close_item import close_item
-from clench.kernels.closing.contact_reading import SurfaceArrays, TouchArrays, read_touches
+from clench.kernels.closing.close_candidate import close_candidate
+from clench.kernels.closing.contact_reading import PalmContactArrays, SurfaceArrays, read_contacts
 from clench.kernels.closing.layout import (
+    CandidateArrays,
     ChainArrays,
     ClosingArrays,
     HandArrays,
-    ItemArrays,
     OutlineArrays,
     RoundArrays,
     SectionArrays,
@@ -47,33 +47,33 @@ from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, Objec
 from clench.kernels.geometry.smallest_gap import smallest_gap
 from clench.kernels.meetings.meeting_layout import FingerLinks, Meetings, MeetingWork
 from clench.kernels.sections.advance import advance
-from clench.kernels.sections.plane_contact import describe_hit, settle_hit
-from clench.kernels.sections.plane_sections import cut_first_families
+from clench.kernels.sections.plane_contact import describe_contact, settle_contact
+from clench.kernels.sections.plane_sections import cut_first_axis_groups
 from clench.kernels.toi.full_width import planes_only
 from clench.kernels.toi.toi_links import sweep_stage
 from clench.kernels.toi.toi_work import SweepWork
 from clench.kernels.trees.bvh import MeshTree, build_tree
 
-from .by_reference import handed, kept
+from .by_reference import by_reference, kept
 from .compiling import is_kept
 
 #: The kernels that each process compiles, in this order: first the parts that both need.
 HERE: tuple[Any, ...] = (
     sweep_stage,
     settle_pair,
-    settle_hit,
-    describe_hit,
+    settle_contact,
+    describe_contact,
     judge_pose,
     relate_poses,
     place_links,
     measure_depths,
-    read_touches,
+    read_contacts,
     smallest_gap,
 )
-THERE: tuple[Any, ...] = (cut_first_families, advance, close_item, solve_poses)
+THERE: tuple[Any, ...] = (cut_first_axis_groups, advance, close_candidate, solve_poses)
 
 #: These have an entry from Python, but in a solve other kernels call them, or Python hands them pointers.
-_BY_POINTER: tuple[Any, ...] = (cut_first_families, close_item, place_links)
+_BY_POINTER: tuple[Any, ...] = (cut_first_axis_groups, close_candidate, place_links)
 
 #: The second process is given up after this long [s].
 PATIENCE = 300.0
@@ -113,7 +113,7 @@ def argument_types(kernel: Any, values: dict[str, Any]) -> tuple[Any, ...]:
     """Return the types of a kernel's arguments, which its parameters' names tell."""
     typeof: Any = numba.typeof
     kinds = (typeof(values[name]) for name in inspect.signature(kernel.py_func).parameters)
-    return tuple(map(handed, kinds) if is_inner(kernel) or kernel in _BY_POINTER else kinds)
+    return tuple(map(by_reference, kinds) if is_inner(kernel) or kernel in _BY_POINTER else kinds)
 
 
 def is_inner(kernel: Any) -> bool:
@@ -131,31 +131,33 @@ def sample_values() -> dict[str, Any]:
     values: dict[str, Any] = {
         "hand": HandArrays(*hand),
         "rounds": RoundArrays(*_arrays("i1 f2 f3")),
-        "items": ItemArrays(*_arrays("i1 i1 i1 f2")),
+        "candidates": CandidateArrays(*_arrays("i1 i1 i1 f2")),
         "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1 i1")),
-        "exact": planes_only(0, 0),
+        "full_width": planes_only(0, 0),
         "chain": chain,
         "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 i1 i1 i1 i1 i1")),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
     }
-    values |= {"links": values["exact"].links, "target": values["exact"].object}
+    values |= {"links": values["full_width"].links, "target": values["full_width"].object}
     values["frames"] = FrameArrays(*_arrays("i1 i1 f3 f2 f2 f1 i1 f1 f1 f1 i1 i1 f1 f1 f2 i1 i1 f1 i1"))
     owners = _arrays("b1")[0]
     values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1"), tree, owners])
     values["solid"] = ObjectMesh(tree, owners, True, _arrays("f2")[0])
     values["mesh"] = values["solid"]
     values["surface"] = SurfaceArrays(*[*_arrays("f2 s1"), values["rounds"], *_arrays("s1 s1 i1")])
-    values["touches"] = TouchArrays(*_arrays("i3 f3"))
+    values["palm_contacts"] = PalmContactArrays(*_arrays("i3 f3"))
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values["tree"] = tree
     values |= dict.fromkeys(("closed", "together"), True)
-    values |= dict.fromkeys(("family", "start", "base", "low", "high", "times", "group", "plane", "entry", "i", "n"), 0)
+    values |= dict.fromkeys(
+        ("axis_group", "start", "base", "low", "high", "times", "dof", "plane", "finger_posture", "i", "n"), 0
+    )
     values |= _solve_values(values)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
         "f2": ("T_palm_object", "first", "second", "out", "postures"),
-        "i1": ("overlaps", "hit", "which", "blocked"),
-        "f3": ("poses", "placed", "two", "families"),
+        "i1": ("overlaps", "contact", "which", "blocked"),
+        "f3": ("poses", "placed", "two", "axis_groups"),
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])
@@ -164,9 +166,9 @@ def sample_values() -> dict[str, Any]:
 
 def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
     """Return values of the arguments of `solve_poses`, and of its scratch space."""
-    target = ObjectArrays(values["tree"], values["rounds"], True, values["exact"].object)
+    target = ObjectArrays(values["tree"], values["rounds"], True, values["full_width"].object)
     counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 i1 i1 f1 i1 i1"), 0.0, 0, *[True] * 6, 0, True]
-    parts: list[Any] = [values[name] for name in ("hand", "exact", "items")]
+    parts: list[Any] = [values[name] for name in ("hand", "full_width", "candidates")]
     parts += [target, target, *(values[name] for name in ("frames", "surface", "mesh", "meshes")), *_arrays("i2 i2")]
     answers = ClosingArrays(*_arrays("f3 f3 i2 i4 f4 f5 i2 i2 i2"))
     command, fingers = CommandArrays(*counts), FingerLinks(*_arrays("i1 i1 i1 f2 f1 i2"))
@@ -174,14 +176,14 @@ def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
     arena, closed = Arena(*[values["sections"]] * 4), [answers, *_arrays("i2 i2 i1"), answers, *_arrays("i2 i2")]
     closed += [Meetings(*_arrays("i2 i3 f3")), *_arrays("i1")]
     written: list[Any] = [values["work"], values["sweep"], DepthWork(*_arrays("f1 s1 f3 f2 s2")), values["answer"]]
-    written += [values["items"], *_arrays("i1 f4 f1 f1 f1 f3"), values["touches"], *_arrays("i1")]
+    written += [values["candidates"], *_arrays("i1 f4 f1 f1 f1 f3"), values["palm_contacts"], *_arrays("i1")]
     written.append(meeting := MeetingWork(*_arrays("f2 f1 f1 f1 f1 f1 f2 f2 i2 f1 f2 f1 f3 f1")))
     return {
         "obj": target,
         "problem": kept(ProblemArrays(*parts)),
         "command": command,
         "fingers": fingers,
-        "room": meeting,
+        "workspace": meeting,
         "arena": kept(arena),
         "space": Workspace(arena, *written),
         "found": Closed(*closed),

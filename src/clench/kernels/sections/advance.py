@@ -50,11 +50,11 @@ def make_work(joints: int, outlines: OutlineArrays) -> Work:
 
 
 @kernel
-def place_joints(chain: ChainArrays, family: int, turns: Floats, place: Floats) -> None:
-    """Write where the joints of a family are when each has turned by `turns` [rad]; see `Work`."""
+def place_joints(chain: ChainArrays, axis_group: int, turns: Floats, place: Floats) -> None:
+    """Write where the joints of an axis group are when each has turned by `turns` [rad]; see `Work`."""
     x, z, angle, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
     for j in range(turns.shape[0]):
-        if chain.joint_family[j] == family:
+        if chain.joint_axis_group[j] == axis_group:
             x += c * chain.pivot[j, 0] - s * chain.pivot[j, 1]
             z += s * chain.pivot[j, 0] + c * chain.pivot[j, 1]
             angle += turns[j]
@@ -115,7 +115,7 @@ def advance_outline(
     chain: ChainArrays,
     outlines: OutlineArrays,
     o: int,
-    family: int,
+    axis_group: int,
     sections: SectionArrays,
     row: int,
     closed: bool,
@@ -148,7 +148,7 @@ def advance_outline(
     while begun < best:
         for j in range(turns.shape[0]):
             work.turns[j] = turns[j] + rates[j] * begun
-        place_joints(chain, family, work.turns, work.moved)
+        place_joints(chain, axis_group, work.turns, work.moved)
         count, last, rate, speed = fill_chain(joint, first, rates, work.moved, work)
         outline = put_outline(outlines, o, joint, work.moved, work.moved[last, 0], work.moved[last, 1], 1.0, work)
         x, z = work.moved[last, 0], work.moved[last, 1]
@@ -169,7 +169,7 @@ def advance_outline(
 @kernel
 def advance(
     hand: HandArrays,
-    family: int,
+    axis_group: int,
     sections: SectionArrays,
     base: int,
     low: int,
@@ -183,7 +183,7 @@ def advance(
     """Return how far a finger gets along a path segment before its first contact, and the plane of that contact.
 
     Args:
-        hand: the fingers. family: the family of the active joints.
+        hand: the fingers. axis_group: the axis group of the active joints.
         sections: whose row `plane - base` belongs to `plane`. low, high: the range of planes in use.
         closed: the object's winding is known, so that only its outer side counts.
         turns: of every joint at the start [rad], (J,). rates: turn per unit of travel, 0 for resting joints, (J,).
@@ -197,18 +197,18 @@ def advance(
         if rates[j] != 0.0:
             first = j
             break
-    best, hit = length, -1
+    best, contact = length, -1
     if first < 0:
-        return best, hit
-    place_joints(hand.chain, family, turns, work.place)
-    touch = TOUCH_FRACTION * hand.family_length[family]
+        return best, contact
+    place_joints(hand.chain, axis_group, turns, work.place)
+    touch = TOUCH_FRACTION * hand.axis_group_length[axis_group]
     for plane in range(low, high):
         for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
             found = advance_outline(
                 hand.chain,
                 hand.outlines,
                 o,
-                family,
+                axis_group,
                 sections,
                 plane - base,
                 closed,
@@ -220,7 +220,7 @@ def advance(
                 work,
             )
             if found < best:
-                best, hit = found, plane
+                best, contact = found, plane
                 if best == 0.0:
-                    return best, hit
-    return best, hit
+                    return best, contact
+    return best, contact

@@ -34,7 +34,9 @@ def side_ends(side: Floats, i: int) -> tuple[float, float, float, float]:
 
 @kernel
 def outline_distance(outline: Outline, sections: SectionArrays, row: int, touch: float, work: Work) -> float:
-    """Return the least distance of an outline (put in family coordinates) to a section; `work.best` gets the pair."""
+    """Return the least distance of an outline (in coordinates of the axis group) to a section; `work.best` gets the
+    pair.
+    """
     best = math.inf
     segments, pair = sections.segments, work.best
     for i in range(sections.counts[row, 0]):

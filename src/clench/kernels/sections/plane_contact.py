@@ -6,22 +6,22 @@ import math
 
 from clench.core.tolerances import PASSED_GAP, TOUCH_FRACTION
 from clench.kernels.closing.layout import (
-    HIT_CURVE_X,
-    HIT_CURVE_Z,
-    HIT_FAMILY,
-    HIT_FEATURE,
-    HIT_GAP,
-    HIT_GROUP,
-    HIT_JOINT,
-    HIT_KIND,
-    HIT_NX,
-    HIT_NZ,
-    HIT_OUTLINE,
-    HIT_PLANE,
-    HIT_SOURCE,
-    HIT_WHICH,
-    HIT_X,
-    HIT_Z,
+    CONTACT_AXIS_GROUP,
+    CONTACT_CURVE_X,
+    CONTACT_CURVE_Z,
+    CONTACT_DOF,
+    CONTACT_FEATURE,
+    CONTACT_GAP,
+    CONTACT_JOINT,
+    CONTACT_KIND,
+    CONTACT_NX,
+    CONTACT_NZ,
+    CONTACT_OUTLINE,
+    CONTACT_PLANE,
+    CONTACT_SOURCE,
+    CONTACT_WHICH,
+    CONTACT_X,
+    CONTACT_Z,
     KIND_SIDE,
     ChainArrays,
     Floats,
@@ -118,22 +118,22 @@ def touch_round(
 
 
 @kernel
-def describe_hit(
+def describe_contact(
     hand: HandArrays,
     sections: SectionArrays,
     base: int,
-    family: int,
+    axis_group: int,
     plane: int,
-    group: int,
+    dof: int,
     turns: Floats,
     work: Work,
-    hit: Ints,
+    contact: Ints,
     point: Floats,
 ) -> None:
     """Write where and how the winner of `advance` touches, at the posture it was stopped in."""
-    place_joints(hand.chain, family, turns, work.place)
-    hit[HIT_PLANE], hit[HIT_GROUP], hit[HIT_FAMILY] = plane, group, family
-    describe_touch(hand, sections, plane - base, work, hit, point)
+    place_joints(hand.chain, axis_group, turns, work.place)
+    contact[CONTACT_PLANE], contact[CONTACT_DOF], contact[CONTACT_AXIS_GROUP] = plane, dof, axis_group
+    describe_touch(hand, sections, plane - base, work, contact, point)
 
 
 @kernel
@@ -148,40 +148,44 @@ def touch_found(
 
 
 @kernel
-def describe_touch(hand: HandArrays, sections: SectionArrays, row: int, work: Work, hit: Ints, point: Floats) -> None:
+def describe_touch(
+    hand: HandArrays, sections: SectionArrays, row: int, work: Work, contact: Ints, point: Floats
+) -> None:
     """Write where and how the pair in `work.best` touches with the joints where they are placed."""
     source, shape = work.best[3], work.best[5]
-    hit[HIT_OUTLINE], hit[HIT_KIND] = work.best[1], work.best[0]
-    hit[HIT_FEATURE], hit[HIT_WHICH] = work.best[2], work.best[4]
+    contact[CONTACT_OUTLINE], contact[CONTACT_KIND] = work.best[1], work.best[0]
+    contact[CONTACT_FEATURE], contact[CONTACT_WHICH] = work.best[2], work.best[4]
     if shape == 0:
-        hit[HIT_SOURCE] = sections.sources[row, source]
+        contact[CONTACT_SOURCE] = sections.sources[row, source]
     else:
-        hit[HIT_SOURCE] = sections.disk_sources[row, source] if shape == 1 else sections.ellipse_sources[row, source]
+        contact[CONTACT_SOURCE] = (
+            sections.disk_sources[row, source] if shape == 1 else sections.ellipse_sources[row, source]
+        )
     x, z, nx, nz, cx, cz = touch_found(hand, sections, row, work)
-    point[HIT_X], point[HIT_Z], point[HIT_NX], point[HIT_NZ] = x, z, nx, nz
-    point[HIT_CURVE_X], point[HIT_CURVE_Z] = cx, cz
+    point[CONTACT_X], point[CONTACT_Z], point[CONTACT_NX], point[CONTACT_NZ] = x, z, nx, nz
+    point[CONTACT_CURVE_X], point[CONTACT_CURVE_Z] = cx, cz
 
 
 @kernel
-def still_touches(outline: Outline, hit: Ints, point: Floats, work: Work) -> bool:
+def still_touches(outline: Outline, contact: Ints, point: Floats, work: Work) -> bool:
     """Say whether the feature that touched a point is still where the touch's normal says, to `PASSED_GAP`."""
-    x, z = point[HIT_X] + outline.radius * point[HIT_NX], point[HIT_Z] + outline.radius * point[HIT_NZ]
-    if hit[HIT_KIND] != KIND_SIDE:
-        vertex = work.vertex[hit[HIT_FEATURE]]
+    x, z = point[CONTACT_X] + outline.radius * point[CONTACT_NX], point[CONTACT_Z] + outline.radius * point[CONTACT_NZ]
+    if contact[CONTACT_KIND] != KIND_SIDE:
+        vertex = work.vertex[contact[CONTACT_FEATURE]]
         return bool(math.hypot(vertex[0] - x, vertex[1] - z) <= PASSED_GAP)
-    side = work.side[hit[HIT_FEATURE]]
-    turned = abs(side[0] * point[HIT_NZ] - side[1] * point[HIT_NX])
+    side = work.side[contact[CONTACT_FEATURE]]
+    turned = abs(side[0] * point[CONTACT_NZ] - side[1] * point[CONTACT_NX])
     along, away = side[0] * z - side[1] * x, abs(side[0] * x + side[1] * z - side[2])
     inside = side[3] - PASSED_GAP <= along <= side[4] + PASSED_GAP
     return bool(inside and turned <= PASSED_GAP and away <= PASSED_GAP)
 
 
 @kernel
-def holds(chain: ChainArrays, hit: Ints, x: float, z: float, nx: float, nz: float, place: Floats) -> bool:
+def holds(chain: ChainArrays, contact: Ints, x: float, z: float, nx: float, nz: float, place: Floats) -> bool:
     """Say whether a touch with this outward normal holds what a contact stopped: it would not be left by going on."""
     slope, lever = 0.0, 0.0
-    for j in range(hit[HIT_JOINT] + 1):
-        if chain.joint_group[j] == hit[HIT_GROUP] and chain.joint_family[j] == hit[HIT_FAMILY]:
+    for j in range(contact[CONTACT_JOINT] + 1):
+        if chain.joint_dof[j] == contact[CONTACT_DOF] and chain.joint_axis_group[j] == contact[CONTACT_AXIS_GROUP]:
             dx, dz = x - place[j, 0], z - place[j, 1]
             slope += chain.rate[j] * (dx * nz - dz * nx)
             lever += abs(chain.rate[j]) * math.hypot(dx, dz)
@@ -189,13 +193,13 @@ def holds(chain: ChainArrays, hit: Ints, x: float, z: float, nx: float, nz: floa
 
 
 @kernel
-def settle_hit(
+def settle_contact(
     hand: HandArrays,
     start: int,
     shared: SectionArrays,
     own: SectionArrays,
     turns: Floats,
-    hit: Ints,
+    contact: Ints,
     point: Floats,
     work: Work,
 ) -> None:
@@ -203,20 +207,20 @@ def settle_hit(
 
     Where the link only touches something else by now, which does not hold what was stopped, the contact is left behind.
     """
-    family, plane, o = hit[HIT_FAMILY], hit[HIT_PLANE], hit[HIT_OUTLINE]
+    axis_group, plane, o = contact[CONTACT_AXIS_GROUP], contact[CONTACT_PLANE], contact[CONTACT_OUTLINE]
     sections, row = shared, plane
-    if family > start:
-        sections, row = own, plane - hand.family_plane[start]
-    place_joints(hand.chain, family, turns, work.place)
+    if axis_group > start:
+        sections, row = own, plane - hand.axis_group_plane[start]
+    place_joints(hand.chain, axis_group, turns, work.place)
     outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
-    touch = TOUCH_FRACTION * hand.family_length[family]
-    gap, _, _ = core_distance(outline, point[HIT_X], point[HIT_Z], work)
-    point[HIT_GAP] = gap - outline.radius
-    if abs(point[HIT_GAP]) > touch or not still_touches(outline, hit, point, work):
-        left, point[HIT_GAP] = point[HIT_GAP], outline_distance(outline, sections, row, touch, work)
-        if point[HIT_GAP] <= PASSED_GAP:
+    touch = TOUCH_FRACTION * hand.axis_group_length[axis_group]
+    gap, _, _ = core_distance(outline, point[CONTACT_X], point[CONTACT_Z], work)
+    point[CONTACT_GAP] = gap - outline.radius
+    if abs(point[CONTACT_GAP]) > touch or not still_touches(outline, contact, point, work):
+        left, point[CONTACT_GAP] = point[CONTACT_GAP], outline_distance(outline, sections, row, touch, work)
+        if point[CONTACT_GAP] <= PASSED_GAP:
             x, z, nx, nz, _, _ = touch_found(hand, sections, row, work)
-            if holds(hand.chain, hit, x, z, nx, nz, work.place):
-                describe_touch(hand, sections, row, work, hit, point)
+            if holds(hand.chain, contact, x, z, nx, nz, work.place):
+                describe_touch(hand, sections, row, work, contact, point)
             else:
-                point[HIT_GAP] = left
+                point[CONTACT_GAP] = left

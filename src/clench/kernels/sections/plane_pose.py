@@ -1,4 +1,4 @@
-"""Compute the pose of a family of curl planes from the turns of the joints before it."""
+"""Compute the pose of an axis group from the turns of the joints before it."""
 
 from __future__ import annotations
 
@@ -58,34 +58,35 @@ def compose_inverse(a: Floats, b: Floats, out: Floats) -> None:
 
 
 @kernel
-def pose_family(hand: HandArrays, family: int, first: bool, turns: Floats, work: Work, poses: Floats) -> None:
-    """Write `T_palm_family` of a family from that of the family before and the turns of its joints.
+def pose_axis_group(hand: HandArrays, axis_group: int, first: bool, turns: Floats, work: Work, poses: Floats) -> None:
+    """Write `T_palm_axis_group` from that of the axis group before and the turns of its joints.
 
     Args:
-        hand: the fingers. family: its index. first: it is its entry's first family, which nothing moves.
+        hand: the fingers. axis_group: its index. first: it is its finger posture's first axis group, which nothing
+            moves.
         turns: of every joint [rad]. work: scratch space. poses: (F, 3, 4), read and written.
     """
     if first:
         for r in range(3):
             for k in range(4):
-                poses[family, r, k] = hand.family_pose[family, r, k]
+                poses[axis_group, r, k] = hand.axis_group_pose[axis_group, r, k]
         return
     place, step, before = work.place, work.pose[0], work.pose[1]
-    place_joints(hand.chain, family - 1, turns, place)
+    place_joints(hand.chain, axis_group - 1, turns, place)
     last = 0
     for j in range(turns.shape[0]):
-        if hand.chain.joint_family[j] == family - 1:
+        if hand.chain.joint_axis_group[j] == axis_group - 1:
             last = j
     c, s = place[last, 3], place[last, 4]
     step[0, 0], step[0, 1], step[0, 2], step[0, 3] = c, 0.0, -s, place[last, 0]
     step[1, 0], step[1, 1], step[1, 2], step[1, 3] = 0.0, 1.0, 0.0, 0.0
     step[2, 0], step[2, 1], step[2, 2], step[2, 3] = s, 0.0, c, place[last, 1]
-    compose(poses[family - 1], step, before)
-    compose(before, hand.family_pose[family], poses[family])
+    compose(poses[axis_group - 1], step, before)
+    compose(before, hand.axis_group_pose[axis_group], poses[axis_group])
 
 
 @kernel
-def pose_families(hand: HandArrays, entry: int, turns: Floats, work: Work, poses: Floats) -> None:
-    """Write `T_palm_family` of all families of an entry after the first, which has been written; see `pose_family`."""
-    for family in range(hand.entry_family[entry] + 1, hand.entry_family[entry + 1]):
-        pose_family(hand, family, False, turns, work, poses)
+def pose_axis_groups(hand: HandArrays, finger_posture: int, turns: Floats, work: Work, poses: Floats) -> None:
+    """Write `T_palm_axis_group` of a finger posture's axis groups after the first, which has been written."""
+    for axis_group in range(hand.first_axis_group[finger_posture] + 1, hand.first_axis_group[finger_posture + 1]):
+        pose_axis_group(hand, axis_group, False, turns, work, poses)

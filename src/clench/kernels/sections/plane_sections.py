@@ -1,4 +1,6 @@
-"""The object's sections with the curl planes of a family: triangles and round primitives (docs/method.md section 2)."""
+"""The object's sections with the curl planes of an axis group: triangles and round primitives (docs/method.md
+section 2).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,7 @@ import math
 
 import numpy as np
 
-from clench.kernels.closing.layout import RUN, Floats, HandArrays, ItemArrays, RoundArrays, SectionArrays
+from clench.kernels.closing.layout import RUN, CandidateArrays, Floats, HandArrays, RoundArrays, SectionArrays
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.trees.bvh import MeshTree
 
@@ -72,7 +74,7 @@ def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections
 @kernel
 def cut_planes(
     hand: HandArrays,
-    family: int,
+    axis_group: int,
     low: int,
     high: int,
     tree: MeshTree,
@@ -82,10 +84,10 @@ def cut_planes(
     base: int,
     pose: Floats,
 ) -> int:
-    """Cut the object by the planes `low` to `high` of a family; row `plane - base` of the arena is written.
+    """Cut the object by the planes `low` to `high` of an axis group; row `plane - base` of the arena is written.
 
     Args:
-        T: `T_family_object`, shape (3, 4). pose: scratch space, (3, 4).
+        T: `T_axis_group_object`, shape (3, 4). pose: scratch space, (3, 4).
 
     Returns:
         0, or the capacity that the arena should have had.
@@ -97,7 +99,7 @@ def cut_planes(
         hand.plane_offset,
         low,
         high,
-        hand.family_reach[family],
+        hand.axis_group_reach[axis_group],
         sections.segments,
         sections.sources,
         sections.counts,
@@ -112,16 +114,16 @@ def cut_planes(
 
 
 @entry_kernel
-def needs_planes(items: ItemArrays) -> bool:
-    """Say whether any item has planes; the full width has none around exactly swept shapes."""
+def needs_planes(candidates: CandidateArrays) -> bool:
+    """Say whether any candidate has planes; the full width has none around exactly swept shapes."""
     planes = 0
-    for i in range(items.entry.shape[0]):
-        planes += items.high[i] - items.low[i]
+    for i in range(candidates.finger_posture.shape[0]):
+        planes += candidates.high[i] - candidates.low[i]
     return bool(planes > 0)
 
 
 @entry_kernel
-def cut_first_families(
+def cut_first_axis_groups(
     hand: HandArrays,
     tree: MeshTree,
     rounds: RoundArrays,
@@ -129,18 +131,18 @@ def cut_first_families(
     sections: SectionArrays,
     two: Floats,
 ) -> int:
-    """Cut the object by the planes of every entry's first family, which no turn moves; row = global plane.
+    """Cut the object by the planes of every finger posture's first axis group, which no turn moves; row = global plane.
 
     Args:
-        two: poses, overwritten, (2, 3, 4). The others as for `close_items`.
+        two: poses, overwritten, (2, 3, 4). The others as for `close_candidates`.
 
     Returns:
         0, or the capacity that the arena should have had.
     """
     wanted, T = 0, two[0]
-    for entry in range(hand.entry_family.shape[0] - 1):
-        family = hand.entry_family[entry]
-        compose_inverse(hand.family_pose[family], T_palm_object, T)
-        low, high = hand.family_plane[family], hand.family_plane[family + 1]
-        wanted = max(wanted, cut_planes(hand, family, low, high, tree, rounds, T, sections, 0, two[1]))
+    for finger_posture in range(hand.first_axis_group.shape[0] - 1):
+        axis_group = hand.first_axis_group[finger_posture]
+        compose_inverse(hand.axis_group_pose[axis_group], T_palm_object, T)
+        low, high = hand.axis_group_plane[axis_group], hand.axis_group_plane[axis_group + 1]
+        wanted = max(wanted, cut_planes(hand, axis_group, low, high, tree, rounds, T, sections, 0, two[1]))
     return wanted

@@ -30,21 +30,21 @@ class _Triangles(Protocol):
 
 
 def cut_mesh(
-    mesh: MeshTree | _Triangles, T_family_object: ArrayLike, offset: float, reach: float = np.inf
+    mesh: MeshTree | _Triangles, T_axis_group_object: ArrayLike, offset: float, reach: float = np.inf
 ) -> tuple[Floats, Ints]:
     """Cut a mesh by a plane and return segments and their triangles: `cut`, with buffers that grow.
 
     Args:
         mesh: a tree, or anything with `vertices` and `triangles`.
-        T_family_object: maps the mesh's coordinates to the plane family's, shape (3, 4) or (4, 4).
-        offset: the plane is `y_family = offset` [m].
+        T_axis_group_object: maps the mesh's coordinates to the axis group's, shape (3, 4) or (4, 4).
+        offset: the plane is `y_axis_group = offset` [m].
         reach: see `cut` [m].
 
     Returns:
         segments as `cut` writes them, shape (S, 6); triangles of the mesh in the order of the input, shape (S,).
     """
     tree = mesh if isinstance(mesh, MeshTree) else build_tree(mesh.vertices, mesh.triangles)
-    T = np.ascontiguousarray(np.asarray(T_family_object, dtype=np.float64)[:3])
+    T = np.ascontiguousarray(np.asarray(T_axis_group_object, dtype=np.float64)[:3])
     offsets, counts, wanted = np.array([offset], dtype=np.float64), np.zeros((1, 3), dtype=np.int64), 256
     while wanted:
         capacity = wanted
@@ -68,7 +68,7 @@ def cut(
     base: int,
     capacity: int,
 ) -> int:
-    """Cut a mesh by parallel planes `y_family = offset`; write one segment per plane and triangle that crosses it.
+    """Cut a mesh by parallel planes `y_axis_group = offset`; write one segment per plane and triangle that crosses it.
 
     The sign of each vertex against a plane decides (a above, o on, b below; any order of the three):
 
@@ -92,9 +92,9 @@ def cut(
 
     Args:
         tree: the mesh in the object's frame.
-        T: `T_family_object`, shape (3, 4).
+        T: `T_axis_group_object`, shape (3, 4).
         offsets: of all planes [m], (P,). low, high: the range of those that cut.
-        reach: segments farther than this from the family's origin, in the plane, are left out [m].
+        reach: segments farther than this from the axis group's origin, in the plane, are left out [m].
         segments: row `plane - base` gets rows `[ax, az, bx, bz, nx, nz]`, normal unit and outward, shape (P, C, 6).
         sources: written with each segment's triangle in tree order, shape (P, C).
         counts: whose first column gets the number of segments; 0 where there were too many, shape (P, >= 1).
@@ -186,7 +186,7 @@ def _span(row: Row, hx: float, hy: float, hz: float) -> float:
 def _out_of_reach(
     center: Point, hx: float, hy: float, hz: float, x_row: Row, z_row: Row, reach: float, slack: float
 ) -> bool:
-    """Say whether a box stays farther than `reach` from the family's origin, in the plane."""
+    """Say whether a box stays farther than `reach` from the axis group's origin, in the plane."""
     if reach == np.inf:
         return False
     x = max(abs(_map(x_row, center)) - _span(x_row, hx, hy, hz) - slack, 0.0)

@@ -119,10 +119,10 @@ def inside_round(rounds: RoundArrays, i: int, p: Point) -> bool:
 
 @kernel
 def starts_inside(
-    tree: MeshTree, rounds: RoundArrays, closed: bool, T_family_object: Floats, x: float, y: float, z: float
+    tree: MeshTree, rounds: RoundArrays, closed: bool, T_axis_group_object: Floats, x: float, y: float, z: float
 ) -> bool:
-    """Say whether a point given in a family's frame lies inside the object's mesh or one of its round primitives."""
-    p = back(T_family_object, x, y, z)
+    """Say whether a point in an axis group's frame lies inside the object's mesh or one of its round primitives."""
+    p = back(T_axis_group_object, x, y, z)
     for i in range(rounds.kind.shape[0]):
         if inside_round(rounds, i, p):
             return True
@@ -143,7 +143,7 @@ def outline_overlaps(
     tree: MeshTree,
     rounds: RoundArrays,
     closed: bool,
-    T_family_object: Floats,
+    T_axis_group_object: Floats,
     sections: SectionArrays,
     row: int,
     work: Work,
@@ -151,7 +151,7 @@ def outline_overlaps(
     """Say whether an outline of a plane overlaps the object with the joints where they are placed."""
     outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
     x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
-    if starts_inside(tree, rounds, closed, T_family_object, x, hand.plane_offset[plane], z) and not closer_than(
+    if starts_inside(tree, rounds, closed, T_axis_group_object, x, hand.plane_offset[plane], z) and not closer_than(
         outline, sections, row, 4.0 * touch, work
     ):
         return True
@@ -169,22 +169,22 @@ def look_for_overlaps(
     overlaps: Ints,
     work: Work,
 ) -> None:
-    """Write, for every entry, an outline that overlaps the object before anything moves, or -1, shape (E,)."""
+    """Write, for every finger posture, an outline that overlaps the object before anything moves, or -1, shape (E,)."""
     turns, T = work.turns, work.pose[0]
     for j in range(turns.shape[0]):
         turns[j] = 0.0
-    for entry in range(hand.entry_family.shape[0] - 1):
-        overlaps[entry] = -1
-        family = hand.entry_family[entry]
-        touch = TOUCH_FRACTION * hand.family_length[family]
-        place_joints(hand.chain, family, turns, work.place)
-        compose_inverse(hand.family_pose[family], T_palm_object, T)
-        for plane in range(hand.family_plane[family], hand.family_plane[family + 1]):
+    for finger_posture in range(hand.first_axis_group.shape[0] - 1):
+        overlaps[finger_posture] = -1
+        axis_group = hand.first_axis_group[finger_posture]
+        touch = TOUCH_FRACTION * hand.axis_group_length[axis_group]
+        place_joints(hand.chain, axis_group, turns, work.place)
+        compose_inverse(hand.axis_group_pose[axis_group], T_palm_object, T)
+        for plane in range(hand.axis_group_plane[axis_group], hand.axis_group_plane[axis_group + 1]):
             for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
                 if outline_overlaps(hand, o, plane, touch, tree, rounds, closed, T, sections, plane, work):
-                    overlaps[entry] = o
+                    overlaps[finger_posture] = o
                     break
-            if overlaps[entry] >= 0:
+            if overlaps[finger_posture] >= 0:
                 break
 
 

@@ -1,4 +1,4 @@
-"""How the corners of a moving core move, and when one comes down to a plane (docs/method.md section 5, exact width)."""
+"""How the corners of a moving core move, and when one comes down to a plane (docs/method.md section 5, full width)."""
 
 from __future__ import annotations
 

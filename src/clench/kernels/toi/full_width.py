@@ -1,4 +1,4 @@
-"""The exact width: where the links are, what overlaps, and how a pair touches (docs/method.md section 5)."""
+"""The full width: where the links are, what overlaps, and how a pair touches (docs/method.md section 5)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from clench.kernels.closing.layout import (
-    HIT_FAMILY,
-    HIT_FEATURE,
-    HIT_GAP,
-    HIT_GROUP,
-    HIT_KIND,
-    HIT_OUTLINE,
-    HIT_PLANE,
-    HIT_SOURCE,
-    HIT_WHICH,
+    CONTACT_AXIS_GROUP,
+    CONTACT_DOF,
+    CONTACT_FEATURE,
+    CONTACT_GAP,
+    CONTACT_KIND,
+    CONTACT_OUTLINE,
+    CONTACT_PLANE,
+    CONTACT_SOURCE,
+    CONTACT_WHICH,
     KIND_SIDE,
     KIND_TIP,
     KIND_VERTEX,
@@ -41,23 +41,23 @@ from .toi_work import SweepWork, bodies_overlap, make_sweep_work, put_core
 PRESSED = 1e-8
 
 
-class ExactArrays(NamedTuple):
-    """The input of the exact sweeps; L links of the hand, M moving links of all entries, J joints.
+class FullWidthArrays(NamedTuple):
+    """The input of the full-width sweeps; L links of the hand, M moving links of all finger postures, J joints.
 
     Args:
-        joint_first: first joint of each entry, (E + 1,).
-        wanted: whether each item sweeps exactly, (I,).
+        joint_first: first joint of each finger posture, (E + 1,).
+        requested: whether each candidate sweeps the full width, (I,).
         links: one body per link of the hand, in link frames. object: one body, in the object's frame.
-        mover_first: first moving link of each entry, (E + 1,). mover_link: index in the hand, (M,).
+        mover_first: first moving link of each finger posture, (E + 1,). mover_link: index in the hand, (M,).
         mover_joint: last joint that moves it, (M,). mover_pose: `T_palm_link` at the open posture, (M, 3, 4).
         axis, anchor: of every joint in the palm frame at the open posture [m], (J, 3) each; a positive turn is
             right-handed about the axis.
-        link_pose: `T_palm_link` of every link at each entry's open posture, (E, L, 3, 4).
+        link_pose: `T_palm_link` of every link at each finger posture's open posture, (E, L, 3, 4).
         checked: whether a moving link (row) must not overlap a resting one, (L, L).
     """
 
     joint_first: Ints
-    wanted: Ints
+    requested: Ints
     links: BodyArrays
     object: BodyArrays
     mover_first: Ints
@@ -70,21 +70,21 @@ class ExactArrays(NamedTuple):
     checked: Ints
 
 
-def planes_only(items: int, entries: int) -> ExactArrays:
-    """Return what closes so many items of so many entries on their planes alone."""
+def planes_only(candidates: int, finger_postures: int) -> FullWidthArrays:
+    """Return what closes so many candidates of so many finger postures on their planes alone."""
     nothing = pack_bodies([])
-    return ExactArrays(
-        joint_first=np.zeros(entries + 1, np.int64),
-        wanted=np.zeros(items, np.int64),
+    return FullWidthArrays(
+        joint_first=np.zeros(finger_postures + 1, np.int64),
+        requested=np.zeros(candidates, np.int64),
         links=nothing,
         object=nothing,
-        mover_first=np.zeros(entries + 1, np.int64),
+        mover_first=np.zeros(finger_postures + 1, np.int64),
         mover_link=np.zeros(0, np.int64),
         mover_joint=np.zeros(0, np.int64),
         mover_pose=np.zeros((0, 3, 4)),
         axis=np.zeros((0, 3)),
         anchor=np.zeros((0, 3)),
-        link_pose=np.zeros((entries, 0, 3, 4)),
+        link_pose=np.zeros((finger_postures, 0, 3, 4)),
         checked=np.zeros((0, 0), np.int64),
     )
 
@@ -105,27 +105,29 @@ def turn_about(axis: Floats, anchor: Floats, turn: float, T: Floats) -> None:
 
 
 @kernel
-def pose_movers(exact: ExactArrays, chain: ChainArrays, entry: int, turns: Floats, poses: Floats) -> None:
-    """Write `T_palm_link` of an entry's moving links at the present turns to `poses`, (L, 3, 4)."""
-    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
-        T = poses[exact.mover_link[n]]
-        copy_pose(exact.mover_pose[n], T)
-        for j in range(exact.mover_joint[n], exact.joint_first[entry] - 1, -1):
+def pose_movers(
+    full_width: FullWidthArrays, chain: ChainArrays, finger_posture: int, turns: Floats, poses: Floats
+) -> None:
+    """Write `T_palm_link` of a finger posture's moving links at the present turns to `poses`, (L, 3, 4)."""
+    for n in range(full_width.mover_first[finger_posture], full_width.mover_first[finger_posture + 1]):
+        T = poses[full_width.mover_link[n]]
+        copy_pose(full_width.mover_pose[n], T)
+        for j in range(full_width.mover_joint[n], full_width.joint_first[finger_posture] - 1, -1):
             if turns[j] != 0.0:
-                turn_about(exact.axis[j], exact.anchor[j], turns[j], T)
+                turn_about(full_width.axis[j], full_width.anchor[j], turns[j], T)
 
 
 @kernel
-def place_axes(exact: ExactArrays, entry: int, turns: Floats, sweep: SweepWork) -> None:
-    """Write the axes and anchors of an entry's joints at the present turns to `sweep`, in the palm frame."""
-    begin, end = exact.joint_first[entry], exact.joint_first[entry + 1]
+def place_axes(full_width: FullWidthArrays, finger_posture: int, turns: Floats, sweep: SweepWork) -> None:
+    """Write the axes and anchors of a finger posture's joints at the present turns to `sweep`, in the palm frame."""
+    begin, end = full_width.joint_first[finger_posture], full_width.joint_first[finger_posture + 1]
     for j in range(begin, end):
-        axis = (exact.axis[j, 0], exact.axis[j, 1], exact.axis[j, 2])
-        at = (exact.anchor[j, 0], exact.anchor[j, 1], exact.anchor[j, 2])
+        axis = (full_width.axis[j, 0], full_width.axis[j, 1], full_width.axis[j, 2])
+        at = (full_width.anchor[j, 0], full_width.anchor[j, 1], full_width.anchor[j, 2])
         for k in range(j - begin):
             i = j - 1 - k
-            about = (exact.axis[i, 0], exact.axis[i, 1], exact.axis[i, 2])
-            pivot = (exact.anchor[i, 0], exact.anchor[i, 1], exact.anchor[i, 2])
+            about = (full_width.axis[i, 0], full_width.axis[i, 1], full_width.axis[i, 2])
+            pivot = (full_width.anchor[i, 0], full_width.anchor[i, 1], full_width.anchor[i, 2])
             axis = turned_about(axis, about, turns[i])
             at = plus(pivot, turned_about(plus(at, scaled(pivot, -1.0)), about, turns[i]))
         sweep.axis[j, 0], sweep.axis[j, 1], sweep.axis[j, 2] = axis
@@ -140,11 +142,11 @@ def keep_pair(sweep: SweepWork) -> None:
 
 
 @kernel
-def last_mover(exact: ExactArrays, entry: int, link: int, last: int) -> int:
-    """Return the last joint of an entry that moves a link; `last` where that is later, or none does."""
-    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
-        if exact.mover_link[n] == link:
-            last = max(last, exact.mover_joint[n])
+def last_mover(full_width: FullWidthArrays, finger_posture: int, link: int, last: int) -> int:
+    """Return the last joint of a finger posture that moves a link; `last` where that is later, or none does."""
+    for n in range(full_width.mover_first[finger_posture], full_width.mover_first[finger_posture + 1]):
+        if full_width.mover_link[n] == link:
+            last = max(last, full_width.mover_joint[n])
     return int(last)
 
 
@@ -213,53 +215,63 @@ def face_across(a: Floats, ka: int, b: Floats, kb: int, number: int) -> tuple[bo
 
 
 @entry_kernel(allocates=True)
-def find_link_overlap(exact: ExactArrays, poses: Floats, T_palm_object: Floats, allowed: float) -> tuple[int, int]:
+def find_link_overlap(
+    full_width: FullWidthArrays, poses: Floats, T_palm_object: Floats, allowed: float
+) -> tuple[int, int]:
     """Return a link that overlaps the object (whose number is that of all links) or another link, or -1 and -1.
 
     Args:
-        exact: the hand and the object. poses: `T_palm_link` of every link, (L, 3, 4). T_palm_object: (3, 4).
+        full_width: the hand and the object. poses: `T_palm_link` of every link, (L, 3, 4). T_palm_object: (3, 4).
         allowed: how far round bodies may overlap [m].
     """
-    links = exact.checked.shape[0]
+    links = full_width.checked.shape[0]
     sweep = make_sweep_work(0, links)
     for m in range(links):
         copy_pose(poses[m], sweep.moving)
         copy_pose(T_palm_object, sweep.resting)
-        if overlap_truly(exact.links, m, exact.object, 0, allowed, True, sweep):
+        if overlap_truly(full_width.links, m, full_width.object, 0, allowed, True, sweep):
             return m, links
         for r in range(m):
-            if exact.checked[m, r] != 0 and boxes_meet(exact.links.box, poses, m, r):
+            if full_width.checked[m, r] != 0 and boxes_meet(full_width.links.box, poses, m, r):
                 copy_pose(poses[r], sweep.resting)
-                if overlap_truly(exact.links, m, exact.links, r, allowed, False, sweep):
+                if overlap_truly(full_width.links, m, full_width.links, r, allowed, False, sweep):
                     return m, r
     return -1, -1
 
 
 @kernel
 def describe_pair(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     T_palm_object: Floats,
     met: int,
-    group: int,
-    family: int,
+    dof: int,
+    axis_group: int,
     sweep: SweepWork,
-    hit: Ints,
+    contact: Ints,
     point: Floats,
 ) -> None:
     """Write how the winning pair touches with the links at `sweep.poses`; the point is in the palm frame."""
     i, k, m = sweep.winner[0], sweep.winner[1], sweep.winner[2]
-    resting = exact.object if met == exact.checked.shape[0] else exact.links
-    T = T_palm_object if met == exact.checked.shape[0] else sweep.poses[met]
-    put_core(exact.links, i, sweep.poses[m], sweep.core)
+    resting = full_width.object if met == full_width.checked.shape[0] else full_width.links
+    T = T_palm_object if met == full_width.checked.shape[0] else sweep.poses[met]
+    put_core(full_width.links, i, sweep.poses[m], sweep.core)
     put_core(resting, k, T, sweep.fixed)
-    d, nx, ny, nz, feature, _, x, y, z = separation(sweep.core, exact.links.corners[i], sweep.fixed, resting.corners[k])
+    d, nx, ny, nz, feature, _, x, y, z = separation(
+        sweep.core, full_width.links.corners[i], sweep.fixed, resting.corners[k]
+    )
     w = resting.radius[k]
-    hit[HIT_PLANE], hit[HIT_OUTLINE], hit[HIT_SOURCE], hit[HIT_GROUP], hit[HIT_FAMILY] = -1, m, k, group, family
-    hit[HIT_FEATURE], hit[HIT_WHICH] = i, met
-    if exact.links.radius[i] > 0.0:
-        hit[HIT_KIND] = KIND_TIP if feature == AT_CORNER else KIND_SIDE
+    (
+        contact[CONTACT_PLANE],
+        contact[CONTACT_OUTLINE],
+        contact[CONTACT_SOURCE],
+        contact[CONTACT_DOF],
+        contact[CONTACT_AXIS_GROUP],
+    ) = -1, m, k, dof, axis_group
+    contact[CONTACT_FEATURE], contact[CONTACT_WHICH] = i, met
+    if full_width.links.radius[i] > 0.0:
+        contact[CONTACT_KIND] = KIND_TIP if feature == AT_CORNER else KIND_SIDE
     else:
-        hit[HIT_KIND] = KIND_VERTEX + feature
+        contact[CONTACT_KIND] = KIND_VERTEX + feature
     point[0], point[1], point[2] = x + w * nx, y + w * ny, z + w * nz
     point[3], point[4], point[5] = nx, ny, nz
-    point[HIT_GAP] = d - w - exact.links.radius[i]
+    point[CONTACT_GAP] = d - w - full_width.links.radius[i]

@@ -1,6 +1,6 @@
 """Find where a hand that moves along a path first overlaps itself or the object (docs/method.md section 7).
 
-The exact sweep takes a pair of bodies along every segment of the path until the two touch. From there on the pair is
+The sweep takes a pair of bodies along every segment of the path until the two touch. From there on the pair is
 looked at in steps so short that it cannot overlap by more than `OVERLAP` between two looks, until it is apart again.
 Thus no deeper overlap is missed.
 """

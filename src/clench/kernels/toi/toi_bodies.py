@@ -1,4 +1,4 @@
-"""First contact of a moving body with a resting one, through their trees (docs/method.md section 5, exact width)."""
+"""First contact of a moving body with a resting one, through their trees (docs/method.md section 5, full width)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The exact width of one path segment: moving links against object and resting links (docs/method.md section 5).
+"""The full width of one path segment: moving links against object and resting links (docs/method.md section 5).
 
-A link that joints of one family move turns about parallel axes, in the family's frame. One that joints of several
-families move at once is seen in the palm frame, with a chain that has an axis per joint.
+A link that joints of one axis group move turns about parallel axes, in the axis group's frame. One that joints of
+several axis groups move at once is seen in the palm frame, with a chain that has an axis per joint.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.advance import fill_chain, place_joints
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
 
-from .full_width import ExactArrays, keep_pair, last_mover, place_axes, pose_movers
+from .full_width import FullWidthArrays, keep_pair, last_mover, place_axes, pose_movers
 from .separating_planes import lanes_apart
 from .toi_work import SweepWork
 
@@ -28,7 +28,7 @@ def sweep_turning(
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
-    T_palm_family: Floats,
+    T_palm_axis_group: Floats,
     first: int,
     joint: int,
     rates: Floats,
@@ -37,12 +37,12 @@ def sweep_turning(
     work: Work,
     sweep: SweepWork,
 ) -> float:
-    """Return what `sweep_link` does where the active joints are of one family."""
+    """Return what `sweep_link` does where the active joints are of one axis group."""
     place, moving, other = work.place, sweep.moving, sweep.resting
     count, last, _, _ = fill_chain(joint, first, rates, place, work)
-    compose_inverse(T_palm_family, sweep.poses[m], moving)
-    compose_inverse(T_palm_family, T_palm_resting, other)
-    # Told before from what `put_lanes` wrote, but for segments in which other families move as well.
+    compose_inverse(T_palm_axis_group, sweep.poses[m], moving)
+    compose_inverse(T_palm_axis_group, T_palm_resting, other)
+    # Told before from what `put_lanes` wrote, but for segments in which other axis groups move as well.
     if lanes_apart(lane_of(links.box[m], moving, 0.0, 1.0, 0.0), lane_of(resting.box[r], other, 0.0, 1.0, 0.0)):
         return best
     moving[0, 3], moving[2, 3] = moving[0, 3] - place[last, 0], moving[2, 3] - place[last, 1]
@@ -80,7 +80,7 @@ def sweep_spatially(
     best: float,
     sweep: SweepWork,
 ) -> float:
-    """Return what `sweep_link` does where the active joints are of several families."""
+    """Return what `sweep_link` does where the active joints are of several axis groups."""
     count, last = fill_spatial(first, joint, rates, sweep)
     copy_pose(sweep.poses[m], sweep.moving)
     copy_pose(T_palm_resting, sweep.resting)
@@ -103,9 +103,9 @@ def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float
 
 @kernel
 def sweep_link(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     chain: ChainArrays,
-    families: Floats,
+    axis_groups: Floats,
     m: int,
     resting: BodyArrays,
     r: int,
@@ -129,17 +129,17 @@ def sweep_link(
     last = joint
     while rates[last] == 0.0:
         last -= 1
-    family, links = chain.joint_family[first], exact.links
-    if chain.joint_family[last] == family:
-        T = families[family]
+    axis_group, links = chain.joint_axis_group[first], full_width.links
+    if chain.joint_axis_group[last] == axis_group:
+        T = axis_groups[axis_group]
         return sweep_turning(links, m, resting, r, T_palm_resting, T, first, joint, rates, touch, best, work, sweep)
     return sweep_spatially(links, m, resting, r, T_palm_resting, first, joint, rates, touch, best, sweep)
 
 
 @kernel
-def first_after(exact: ExactArrays, entry: int, link: int, first: int, rates: Floats) -> int:
+def first_after(full_width: FullWidthArrays, finger_posture: int, link: int, first: int, rates: Floats) -> int:
     """Return the first active joint that does not move a link, or how many joints there are."""
-    j = last_mover(exact, entry, link, first - 1) + 1
+    j = last_mover(full_width, finger_posture, link, first - 1) + 1
     while j < rates.shape[0] and rates[j] == 0.0:
         j += 1
     return j
@@ -147,35 +147,35 @@ def first_after(exact: ExactArrays, entry: int, link: int, first: int, rates: Fl
 
 @kernel
 def put_lanes(
-    exact: ExactArrays,
-    entry: int,
-    T_palm_family: Floats,
+    full_width: FullWidthArrays,
+    finger_posture: int,
+    T_palm_axis_group: Floats,
     T_palm_object: Floats,
     several: bool,
     first: int,
     rates: Floats,
     sweep: SweepWork,
 ) -> None:
-    """Write `lane` and `after` of every link at `sweep.poses`; where `several` families move there are no lanes."""
-    links, lane = exact.checked.shape[0], sweep.lane
-    x, y, z = T_palm_family[0, 1], T_palm_family[1, 1], T_palm_family[2, 1]
+    """Write `lane` and `after` of every link at `sweep.poses`; where `several` axis groups move there are no lanes."""
+    links, lane = full_width.checked.shape[0], sweep.lane
+    x, y, z = T_palm_axis_group[0, 1], T_palm_axis_group[1, 1], T_palm_axis_group[2, 1]
     for r in range(links):
-        sweep.after[r] = first_after(exact, entry, r, first, rates)
+        sweep.after[r] = first_after(full_width, finger_posture, r, first, rates)
     for r in range(links + 1):
         if several:
             lane[r, 0], lane[r, 1] = -math.inf, math.inf
         elif r < links:
-            lane[r, 0], lane[r, 1] = lane_of(exact.links.box[r], sweep.poses[r], x, y, z)
+            lane[r, 0], lane[r, 1] = lane_of(full_width.links.box[r], sweep.poses[r], x, y, z)
         else:
-            lane[r, 0], lane[r, 1] = lane_of(exact.object.box[0], T_palm_object, x, y, z)
+            lane[r, 0], lane[r, 1] = lane_of(full_width.object.box[0], T_palm_object, x, y, z)
 
 
 @kernel
 def sweep_links(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     chain: ChainArrays,
-    entry: int,
-    families: Floats,
+    finger_posture: int,
+    axis_groups: Floats,
     m: int,
     first: int,
     joint: int,
@@ -191,15 +191,28 @@ def sweep_links(
         m: the moving link. first, joint: first active joint, and the last joint that moves it; see `sweep_link`.
     """
     met, lane = -1, sweep.lane
-    for r in range(exact.checked.shape[0]):
-        if exact.checked[m, r] == 0:
+    for r in range(full_width.checked.shape[0]):
+        if full_width.checked[m, r] == 0:
             continue
         # Seen from a link that moves as well, only the joints after its own turn.
         after = sweep.after[r]
         if after > joint or lanes_apart((lane[m, 0], lane[m, 1]), (lane[r, 0], lane[r, 1])):
             continue
         found = sweep_link(
-            exact, chain, families, m, exact.links, r, sweep.poses[r], after, joint, rates, touch, best, work, sweep
+            full_width,
+            chain,
+            axis_groups,
+            m,
+            full_width.links,
+            r,
+            sweep.poses[r],
+            after,
+            joint,
+            rates,
+            touch,
+            best,
+            work,
+            sweep,
         )
         if found < 0.0:
             sweep.skipped[0] += 1
@@ -211,10 +224,10 @@ def sweep_links(
 
 @kernel
 def sweep_stage(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     chain: ChainArrays,
-    entry: int,
-    families: Floats,
+    finger_posture: int,
+    axis_groups: Floats,
     T_palm_object: Floats,
     length: float,
     turns: Floats,
@@ -226,7 +239,8 @@ def sweep_stage(
     """Return how far a path segment goes before a moving link meets anything it must not overlap, at most `best`.
 
     Args:
-        exact, chain: the hand. entry: of the item. families: `T_palm_family` of those with active joints, (F, 3, 4).
+        full_width, chain: the hand. finger_posture: of the candidate. axis_groups: `T_palm_axis_group` of those with
+            active joints, (F, 3, 4).
         T_palm_object: (3, 4). length: of the finger [m]. turns: of every joint [rad], (J,). rates: (J,).
 
     Returns:
@@ -240,25 +254,49 @@ def sweep_stage(
     if first == rates.shape[0]:
         return best, -1
     touch = SWEEP_FRACTION * length
-    met, links, lane = -1, exact.checked.shape[0], sweep.lane
-    several = place_active(exact, chain, entry, first, turns, rates, work, sweep)
-    pose_movers(exact, chain, entry, turns, sweep.poses)
-    put_lanes(exact, entry, families[chain.joint_family[first]], T_palm_object, several, first, rates, sweep)
-    for n in range(exact.mover_first[entry], exact.mover_first[entry + 1]):
-        m, joint = exact.mover_link[n], exact.mover_joint[n]
-        if joint < first or exact.links.root[m] < 0:
+    met, links, lane = -1, full_width.checked.shape[0], sweep.lane
+    several = place_active(full_width, chain, finger_posture, first, turns, rates, work, sweep)
+    pose_movers(full_width, chain, finger_posture, turns, sweep.poses)
+    put_lanes(
+        full_width,
+        finger_posture,
+        axis_groups[chain.joint_axis_group[first]],
+        T_palm_object,
+        several,
+        first,
+        rates,
+        sweep,
+    )
+    for n in range(full_width.mover_first[finger_posture], full_width.mover_first[finger_posture + 1]):
+        m, joint = full_width.mover_link[n], full_width.mover_joint[n]
+        if joint < first or full_width.links.root[m] < 0:
             continue
         found = best
         if not lanes_apart((lane[m, 0], lane[m, 1]), (lane[links, 0], lane[links, 1])):
             found = sweep_link(
-                exact, chain, families, m, exact.object, 0, T_palm_object, first, joint, rates, touch, best, work, sweep
+                full_width,
+                chain,
+                axis_groups,
+                m,
+                full_width.object,
+                0,
+                T_palm_object,
+                first,
+                joint,
+                rates,
+                touch,
+                best,
+                work,
+                sweep,
             )
         if found < best:
             best, met = found, links
             keep_pair(sweep)
             if best < 0.0:
                 return best, met
-        best, other = sweep_links(exact, chain, entry, families, m, first, joint, rates, touch, best, work, sweep)
+        best, other = sweep_links(
+            full_width, chain, finger_posture, axis_groups, m, first, joint, rates, touch, best, work, sweep
+        )
         if other >= 0:
             met = other
     return best, met
@@ -266,27 +304,27 @@ def sweep_stage(
 
 @kernel
 def place_active(
-    exact: ExactArrays,
+    full_width: FullWidthArrays,
     chain: ChainArrays,
-    entry: int,
+    finger_posture: int,
     first: int,
     turns: Floats,
     rates: Floats,
     work: Work,
     sweep: SweepWork,
 ) -> bool:
-    """Place the joints of every family that has active ones in its frame, and in the palm's where they are several.
+    """Place the joints of every axis group that has active ones in its frame, and in the palm's where they are several.
 
     Returns:
-        whether several families have active joints.
+        whether several axis groups have active joints.
     """
     before, several = -1, False
     for j in range(first, rates.shape[0]):
-        family = chain.joint_family[j]
-        if rates[j] != 0.0 and family != before:
-            place_joints(chain, family, turns, work.place)
+        axis_group = chain.joint_axis_group[j]
+        if rates[j] != 0.0 and axis_group != before:
+            place_joints(chain, axis_group, turns, work.place)
             several = before >= 0
-            before = family
+            before = axis_group
     if several:
-        place_axes(exact, entry, turns, sweep)
+        place_axes(full_width, finger_posture, turns, sweep)
     return several

@@ -1,4 +1,4 @@
-"""First contact of two convex cores, one of which turns (docs/method.md section 5, exact width).
+"""First contact of two convex cores, one of which turns (docs/method.md section 5, full width).
 
 A plane between the two cores, fixed with the resting one, keeps them apart until a corner of the moving core meets it:
 the vertex-on-face event, whose root has a closed form. There the next plane is laid, through the closest points, until

@@ -29,14 +29,14 @@ def owned_features(triangles: Ints, vertices: int) -> NDArray[np.uint8]:
     return masks
 
 
-def connected_parts(groups: NDArray[np.integer[Any]], count: int) -> Ints:
+def connected_parts(dofs: NDArray[np.integer[Any]], count: int) -> Ints:
     """Return for each of so many nodes the smallest node of the part that it is in, (N,).
 
     Args:
-        groups: nodes that are connected, one group per row, (G, K). count: how many nodes there are.
+        dofs: nodes that are connected, one degree of freedom per row, (G, K). count: how many nodes there are.
     """
     part = np.arange(count, dtype=np.int32)
-    connect(np.ascontiguousarray(groups, dtype=np.int32), part)
+    connect(np.ascontiguousarray(dofs, dtype=np.int32), part)
     return part
 
 
@@ -96,15 +96,16 @@ def end_of(triangles: Ints, side: int, lower: int) -> int:
 
 
 @entry_kernel
-def connect(groups: Ints, part: Ints) -> None:
+def connect(dofs: Ints, part: Ints) -> None:
     """Write for each node the smallest node of its part.
 
     Args:
-        groups: nodes that are connected, one group per row, (G, K). part: each node's own number at the start, (N,).
+        dofs: nodes that are connected, one degree of freedom per row, (G, K). part: each node's own number at the
+            start, (N,).
     """
-    for g in range(groups.shape[0]):
-        for k in range(1, groups.shape[1]):
-            a, b = _root(part, groups[g, 0]), _root(part, groups[g, k])
+    for g in range(dofs.shape[0]):
+        for k in range(1, dofs.shape[1]):
+            a, b = _root(part, dofs[g, 0]), _root(part, dofs[g, k])
             if a < b:
                 part[b] = a
             else:

@@ -1,8 +1,8 @@
 """Torques of the hand's degrees of freedom for given contact forces: `tau = J^T f`, through coupling.
 
 A degree of freedom is a joint that follows none, with its followers `q_f = a q_l + b`. A follower at its limit does not
-move with its leader, so it carries its share by itself. Breakaway is left aside: groups are taken as rigid. Stops of
-joints at their limits are not counted on.
+move with its leader, so it carries its share by itself. Breakaway is left aside: degrees of freedom are taken as rigid.
+Stops of joints at their limits are not counted on.
 """
 
 from __future__ import annotations

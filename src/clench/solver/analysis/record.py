@@ -182,8 +182,8 @@ class Record:
         """
         if status is not None and status not in list(SolutionStatus):
             raise UnknownNameError("status", str(status), "solutions", [s.value for s in SolutionStatus])
-        wanted = {"hand": hand, "object": object, "status": status, "geometry_hash": geometry_hash, "seed": seed}
-        given = {column: value for column, value in wanted.items() if value is not None}
+        requested = {"hand": hand, "object": object, "status": status, "geometry_hash": geometry_hash, "seed": seed}
+        given = {column: value for column, value in requested.items() if value is not None}
         condition = " AND ".join(f"{column} = ?" for column in given) or "1"
         query = f"SELECT {', '.join(_COLUMNS)} FROM solves WHERE {condition} ORDER BY id DESC LIMIT ?"
         values = [*(str(v) if isinstance(v, str) else v for v in given.values()), -1 if limit is None else limit]

@@ -138,7 +138,7 @@ def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -
         if solution.rounds != 1:
             return "its joints were gone through more than once; changes are known for one round alone"
         if any(c.breakaway and c.follower in finger.joints for c in hand.couplings):
-            return f"joints of {finger.name} break away; changes are known for groups that stop as one"
+            return f"joints of {finger.name} break away; changes are known for joints that stop as one"
     return ""
 
 

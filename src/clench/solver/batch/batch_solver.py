@@ -137,7 +137,7 @@ class BatchSolver:
         """Name the columns that the kernels computed, except the contacts."""
         assert self.candidates is not None
         plan = self.candidates.plan
-        chosen = np.where(np.array(plan.whole), -1, plan.items.low)[solved.chosen]
+        chosen = np.where(np.array(plan.is_full_width), -1, plan.candidates.low)[solved.chosen]
         idle = np.full((len(hand_rows), len(self._idle)), FINGER_STATUSES.index(FingerStatus.NO_MOTION))
         return {
             **self.names,
@@ -229,31 +229,31 @@ def _contacts_of(solved: Solved, palms: FloatArray) -> BatchContacts:
     """
     from clench.core.tolerances import PASSED_GAP
     from clench.kernels.closing.contact_reading import (
-        TOUCH_BODY,
-        TOUCH_GAP,
-        TOUCH_JOINT,
-        TOUCH_LINK,
-        TOUCH_NORMAL,
-        TOUCH_PLANE,
+        PALM_CONTACT_BODY,
+        PALM_CONTACT_GAP,
+        PALM_CONTACT_JOINT,
+        PALM_CONTACT_LINK,
+        PALM_CONTACT_NORMAL,
+        PALM_CONTACT_PLANE,
     )
 
     slots = np.arange(solved.number.shape[2])
     # As in a solution, contacts with the hand's own links are left out.
-    found = (slots < solved.contacts[:, :, None]) & (solved.number[..., TOUCH_BODY] >= 0)
+    found = (slots < solved.contacts[:, :, None]) & (solved.number[..., PALM_CONTACT_BODY] >= 0)
     pose, finger, slot = np.nonzero(found)
     number, value = solved.number[pose, finger, slot], solved.value[pose, finger, slot]
     R = rotations(palms[pose])
     return BatchContacts(
         first=np.concatenate([[0], np.cumsum(found.sum(axis=(1, 2)))]),
         finger=finger,
-        link=number[:, TOUCH_LINK],
-        body=number[:, TOUCH_BODY],
-        joint=number[:, TOUCH_JOINT],
-        plane=number[:, TOUCH_PLANE],
-        passed=value[:, TOUCH_GAP] > PASSED_GAP,
+        link=number[:, PALM_CONTACT_LINK],
+        body=number[:, PALM_CONTACT_BODY],
+        joint=number[:, PALM_CONTACT_JOINT],
+        plane=number[:, PALM_CONTACT_PLANE],
+        passed=value[:, PALM_CONTACT_GAP] > PASSED_GAP,
         position=turned(R, value[:, :3]) + palms[pose, 4:],
-        normal=turned(R, value[:, TOUCH_NORMAL : TOUCH_NORMAL + 3]),
-        gap=value[:, TOUCH_GAP],
+        normal=turned(R, value[:, PALM_CONTACT_NORMAL : PALM_CONTACT_NORMAL + 3]),
+        gap=value[:, PALM_CONTACT_GAP],
     )
 
 

@@ -86,12 +86,12 @@ class Tracker:
         candidates = self._solver.candidates
         assert candidates is not None
         plan = candidates.plan
-        if any(plan.whole) or not self._margin:
+        if any(plan.is_full_width) or not self._margin:
             return
         from clench.kernels.closing.choosing import SAME_TOTAL
 
-        entries = np.arange(len(plan.fingers))
-        planes = answer.planes[0, : len(entries)]
-        here = (plan.items.entry == entries[:, None]) & (plan.items.low == planes[:, None])
+        finger_postures = np.arange(len(plan.fingers))
+        planes = answer.planes[0, : len(finger_postures)]
+        here = (plan.candidates.finger_posture == finger_postures[:, None]) & (plan.candidates.low == planes[:, None])
         problem = candidates.problem.staying(here.argmax(axis=1), self._margin / SAME_TOTAL)
         self._solver.candidates = replace(candidates, problem=problem)

@@ -206,18 +206,18 @@ def import_(
         the_hand.link_index(root)  # refuses a name that is no link's
     if grasp is not None and grasp not in [g.name for g in found]:
         raise UnknownNameError("grasp", grasp, f"'{grasps}'", [g.name for g in found])
-    wanted = [g for g in found if grasp in (None, g.name)]
-    for g in wanted:
+    requested = [g for g in found if grasp in (None, g.name)]
+    for g in requested:
         if not g.name or Path(g.name).name != g.name:
             raise FileError(grasps, f"grasp '{g.name}': the name cannot be that of a file.")
-    commands = {out / f"{g.name}.json": command_to_dict(g.command(the_hand)) for g in wanted}
+    commands = {out / f"{g.name}.json": command_to_dict(g.command(the_hand)) for g in requested}
     make_folder(out)
     for file, document in commands.items():
         write_json(file, document, "command")
     if json:
         written = [
             {"name": g.name, "file": str(file), "confidence": g.confidence}
-            for g, file in zip(wanted, commands, strict=True)
+            for g, file in zip(requested, commands, strict=True)
         ]
         print_json({"schema": "clench.import/1", "commands": written})
     else:

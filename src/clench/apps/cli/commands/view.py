@@ -176,14 +176,14 @@ def _given(
     the_command = None if command is None else read_command(command, the_hand)
     placed = the_object, None if the_command is None else the_command.object_pose, table, obstacle
     enums = {"order": ClosingOrder, "collision_source": CollisionSource}
-    wanted = {name: enums.get(name, str)(value) for name, value in asked.items() if value is not None}
+    requested = {name: enums.get(name, str)(value) for name, value in asked.items() if value is not None}
     code = {name: str(v.resolve()) if isinstance(v, Path) else v for name, v in loaded.items()}
     size = None if scale == 1.0 else scale
     return Given(
         the_hand,
         with_scene(*placed),
         the_command,
-        wanted,
+        requested,
         **forces,
         hand_model=loadable(hand),
         object_model=loadable(object),

@@ -112,13 +112,15 @@ def _map_finger(hand: Hand, finger: Finger, source: CollisionSource, half: float
 
 
 def _in_planes(hand: Hand, finger: Finger, source: CollisionSource, path: FloatArray) -> FloatArray:
-    """Return the tip's path carried over to every curl plane, shape (P, S, 3); several families keep the path alone."""
-    families = plan_finger(hand, finger, hand.open_angles(), _PLANES, source).families
-    if len(families) > 1:
+    """Return the tip's path carried over to every curl plane, shape (P, S, 3); with several axis groups the path
+    alone.
+    """
+    axis_groups = plan_finger(hand, finger, hand.open_angles(), _PLANES, source).axis_groups
+    if len(axis_groups) > 1:
         return path[None]
-    T = families[0].T_palm_family
+    T = axis_groups[0].T_palm_axis_group
     own = (path - T[:3, 3]) @ T[:3, 1]
-    return np.stack([path + (offset - own)[:, None] * T[:3, 1] for offset in families[0].offsets])
+    return np.stack([path + (offset - own)[:, None] * T[:3, 1] for offset in axis_groups[0].offsets])
 
 
 def _directions(hand: Hand, maps: list[FingerMap]) -> tuple[list[FloatArray], FloatArray]:

@@ -30,14 +30,16 @@ _MARGIN: Final = 62
 
 def draw_finger(scenes: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
     """Write the curl-plane figure of a finger's chosen set."""
-    shown = [scenes.scene(family, plane) for family, plane in scenes.touched_planes(MOST_PANELS)]
+    shown = [scenes.scene(axis_group, plane) for axis_group, plane in scenes.touched_planes(MOST_PANELS)]
     text = 370.0 + 37.0 * len(scenes.plan.joints) + 54.0 * len(scenes.contacts)
     figure, panels = _panels(shown, text)
     low, high = bounds(shown)
     for axes, scene in zip(panels, shown, strict=True):
         draw_plane(axes, scene)
         frame_plane(axes, low, high)
-        axes.set_title(plane_title(scene, len(scenes.plan.families)), fontsize=10.5, loc="left", color=style.INK, y=1.0)
+        axes.set_title(
+            plane_title(scene, len(scenes.plan.axis_groups)), fontsize=10.5, loc="left", color=style.INK, y=1.0
+        )
         axes.set_xlabel("x, in the plane [mm]", fontsize=9)
     panels[0].set_ylabel("z, the way the finger closes [mm]", fontsize=9)
     width = figure.get_figwidth() * style.DPI
@@ -67,9 +69,9 @@ def _panels(shown: Sequence[PlaneScene], text: float) -> tuple[Figure, list[Axes
     return figure, panels
 
 
-def plane_title(scene: PlaneScene, families: int) -> str:
+def plane_title(scene: PlaneScene, axis_groups: int) -> str:
     """Return a title that says which plane is seen."""
-    if families == 1:
+    if axis_groups == 1:
         return scene.place
     names = ", ".join(j.name for j in scene.joints)
     short = names if len(names) < 40 else f"{len(scene.joints)} joints from {scene.joints[0].name}"
@@ -284,7 +286,7 @@ def _explain(
         top -= step
 
     line("Joint angles", fontsize=11, fontweight="bold")
-    for joint in (j for f in range(len(scenes.plan.families)) for j in scenes.scene(f, 0, with_open=False).joints):
+    for joint in (j for f in range(len(scenes.plan.axis_groups)) for j in scenes.scene(f, 0, with_open=False).joints):
         color = style.mixed(style.joint_color(joint.position), "#000000", 0.2)
         line(f"joint {joint.name}", 17.0, color=color, fontweight="bold")
         line(

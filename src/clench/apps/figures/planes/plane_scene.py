@@ -73,14 +73,14 @@ class PlaneScene:
     """The content of the picture of one plane.
 
     Args:
-        family, plane: which plane, as in `PlaneContact`. place: which one, in words. offset: along y [m].
+        axis_group, plane: which plane, as in `PlaneContact`. place: which one, in words. offset: along y [m].
         section: of the object. palm: loops of the links that do not move.
-        open_links, closed_links: sections of the links that the family's joints move.
-        joints: of this family, palm side first.
-        contacts: contacts of the set on this plane. others: contacts on other planes of the family.
+        open_links, closed_links: sections of the links that the axis group's joints move.
+        joints: of this axis group, palm side first.
+        contacts: contacts of the set on this plane. others: contacts on other planes of the axis group.
     """
 
-    family: int
+    axis_group: int
     plane: int
     place: str
     offset: float

@@ -44,8 +44,10 @@ def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str
     alike = [c for c in result.candidates if c.posture == chosen.posture]
     shown = _selected(alike, chosen)
     made = [scenes_of.showing(c) for c in shown]
-    family = _busiest_family(made[0])
-    scenes = [m.scene(family, dict(m.touched_planes(len(m.plan.families)))[family], with_open=False) for m in made]
+    axis_group = _busiest_axis_group(made[0])
+    scenes = [
+        m.scene(axis_group, dict(m.touched_planes(len(m.plan.axis_groups)))[axis_group], with_open=False) for m in made
+    ]
     low, high = bounds(scenes)
     columns = min(_COLUMNS, len(shown))
     rows = math.ceil(len(shown) / columns)
@@ -94,10 +96,10 @@ def _selected(alike: list[Candidate], chosen: Candidate) -> list[Candidate]:
     return [c for c in alike if id(c) in wanted]
 
 
-def _busiest_family(scenes: FingerScenes) -> int:
-    """Return the family of planes with most joints, the first of several."""
-    families = [p.family for p in scenes.plan.joints]
-    return max(sorted(set(families)), key=families.count)
+def _busiest_axis_group(scenes: FingerScenes) -> int:
+    """Return the axis group with most joints, the first of several."""
+    axis_groups = [p.axis_group for p in scenes.plan.joints]
+    return max(sorted(set(axis_groups)), key=axis_groups.count)
 
 
 def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) -> None:
@@ -163,10 +165,10 @@ def _verdict(candidate: Candidate) -> list[str]:
 
 
 def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, chosen: Candidate) -> list[str]:
-    family = ""
-    if len(scenes.plan.families) > 1:
-        family = f" Its joints lie in {len(scenes.plan.families)} families of planes; drawn are those of "
-        family += f"{', '.join(j.name for j in scene.joints)}."
+    axis_group = ""
+    if len(scenes.plan.axis_groups) > 1:
+        axis_group = f" Its joints form {len(scenes.plan.axis_groups)} axis groups; drawn are planes of "
+        axis_group += f"{', '.join(j.name for j in scene.joints)}."
     first = "One set per curl plane, closed as if only that plane existed"
     if all(c.plane is None for c in result.candidates):
         first = "One set, over the full width: joints about axes that are not parallel move at once, in no plane"
@@ -177,7 +179,7 @@ def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, 
         False: "it scores best among the sets",
     }[chosen.plane is None]
     second = f"Chosen: {set_name(chosen)}: {why}."
-    return [f"{first}.{family}", second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
+    return [f"{first}.{axis_group}", second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
 
 
 def _scale_bar(axes: Axes) -> None:

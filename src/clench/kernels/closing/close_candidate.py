@@ -1,0 +1,327 @@
+"""Close a finger, one degree of freedom after another, or all at once (docs/method.md section 4).
+
+The degrees of freedom of a finger are gone through up to `times` over, fewer where nothing moves any more. If joints of
+several axis groups move simultaneously, or in several rounds, a candidate has no planes: the planes of later axis
+groups are cut with the earlier joints at rest.
+"""
+
+from __future__ import annotations
+
+from clench.core.tolerances import TOUCH_FRACTION
+from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.sections.advance import advance
+from clench.kernels.sections.later_planes import enter_axis_group, is_held
+from clench.kernels.sections.plane_contact import describe_contact, settle_contact
+from clench.kernels.sections.plane_pose import copy_pose, pose_axis_groups
+from clench.kernels.toi.full_width import FullWidthArrays, describe_pair, last_mover, pose_movers
+from clench.kernels.toi.toi_links import sweep_stage
+from clench.kernels.toi.toi_work import SweepWork
+
+from .layout import (
+    CONTACT_DOF,
+    CONTACT_GAP,
+    CONTACT_JOINT,
+    SUNK,
+    CandidateArrays,
+    ChainArrays,
+    ClosingArrays,
+    Floats,
+    HandArrays,
+    Ints,
+    SectionArrays,
+    Work,
+)
+from .segments import ALL, lock_held, lock_joints, move_dofs, next_segment
+from .settling import settle
+from .solve_layout import ObjectArrays
+
+
+@kernel
+def close_dof(
+    hand: HandArrays,
+    full_width: FullWidthArrays,
+    T_palm_object: Floats,
+    sections: SectionArrays,
+    base: int,
+    axis_group: int,
+    dof: int,
+    closed: bool,
+    start: int,
+    candidates: CandidateArrays,
+    i: int,
+    work: Work,
+    sweep: SweepWork,
+    answer: ClosingArrays,
+) -> bool:
+    """Move one degree of freedom, or all at once, until a contact or a limit holds every joint.
+
+    The travel at which a follower starts or stops moving (its own limit) splits the motion into path segments. On each
+    of them the planes of the candidate, if it has any, give a first bound, and the full-width sweep, where requested,
+    what comes before it.
+
+    Args:
+        sections, base: whose row `plane - base` belongs to `plane`. axis_group: of the planes. dof: or `ALL`.
+        start: the finger posture's first axis group. work: whose `locked` says which joints stand still; written.
+
+    Returns:
+        False where a link overlaps the object already.
+    """
+    chain, finger_posture, turns, rates, locked = (
+        hand.chain,
+        candidates.finger_posture[i],
+        answer.turn[i],
+        work.rates,
+        work.locked,
+    )
+    joints = finger_posture_joints(hand, finger_posture)
+    low, high = (
+        hand.axis_group_plane[axis_group] + candidates.low[i],
+        hand.axis_group_plane[axis_group] + candidates.high[i],
+    )
+    along = 0.0
+    while True:
+        lock_held(chain, joints, candidates.until[i], along, locked)
+        end = next_segment(chain, joints, dof, answer.travel[i], locked, candidates.until[i], along, rates)
+        if end <= 0.0:
+            return True
+        # A little further, so that a touch just at the end is one; no point moves by more than the touch tolerance.
+        fastest = 0.0
+        for j in range(joints[0], joints[1]):
+            fastest += abs(rates[j])
+        reach = end + TOUCH_FRACTION / max(fastest, 1.0)
+        moved, plane = advance(hand, axis_group, sections, base, low, high, closed, turns, rates, reach, work)
+        met = -1
+        if full_width.requested[i]:
+            axis_groups, size = answer.pose[i], hand.axis_group_length[axis_group]
+            pose_axis_groups(hand, finger_posture, turns, work, axis_groups)
+            moved, met = sweep_stage(
+                full_width, chain, finger_posture, axis_groups, T_palm_object, size, turns, rates, moved, work, sweep
+            )
+            if moved < 0.0:
+                answer.overlap[i] = sweep.winner[2]
+                return False
+        moved = min(moved, end)
+        for j in range(joints[0], joints[1]):
+            turns[j] += rates[j] * moved
+        move_dofs(chain, joints, dof, answer.travel[i], locked, moved)
+        along += moved
+        if plane >= 0 or met >= 0:
+            last = moving_joint(hand, full_width, finger_posture, met, work, sweep)
+            lock_joints(chain, joints, last, locked)
+            while last > joints[0] and rates[last] == 0.0:
+                last -= 1
+            write_contact(
+                hand,
+                full_width,
+                T_palm_object,
+                sections,
+                base,
+                last,
+                plane,
+                met,
+                start,
+                i,
+                work,
+                sweep,
+                candidates,
+                answer,
+            )
+
+
+@kernel
+def finger_posture_joints(hand: HandArrays, finger_posture: int) -> tuple[int, int]:
+    """Return the range of a finger posture's joints."""
+    first, dofs = 0, hand.chain.joint_dof
+    while first < dofs.shape[0] and dofs[first] < hand.first_dof[finger_posture]:
+        first += 1
+    last = first
+    while last < dofs.shape[0] and dofs[last] < hand.first_dof[finger_posture + 1]:
+        last += 1
+    return first, last
+
+
+@kernel
+def moving_joint(
+    hand: HandArrays, full_width: FullWidthArrays, finger_posture: int, met: int, work: Work, sweep: SweepWork
+) -> int:
+    """Return the last joint that moves the touching link: by the full-width sweep where `met` says so, else a plane."""
+    if met < 0:
+        return int(hand.outlines.joint[work.best[1]])
+    return last_mover(full_width, finger_posture, sweep.winner[2], full_width.joint_first[finger_posture])
+
+
+@kernel
+def dof_axis_group(hand: HandArrays, dof: int) -> int:
+    """Return the axis group of the joints of a degree of freedom."""
+    for j in range(hand.chain.joint_dof.shape[0]):
+        if hand.chain.joint_dof[j] == dof:
+            return int(hand.chain.joint_axis_group[j])
+    return -1
+
+
+@kernel
+def stops_same(chain: ChainArrays, contact: Ints, dof: int, joint: int) -> bool:
+    """Say whether two contacts stop the same joints: a degree of freedom, or its part before joints that break away."""
+    return contact[CONTACT_DOF] == dof and (not chain.breaks[dof] or contact[CONTACT_JOINT] == joint)
+
+
+@kernel
+def write_contact(
+    hand: HandArrays,
+    full_width: FullWidthArrays,
+    T_palm_object: Floats,
+    sections: SectionArrays,
+    base: int,
+    joint: int,
+    plane: int,
+    met: int,
+    start: int,
+    i: int,
+    work: Work,
+    sweep: SweepWork,
+    candidates: CandidateArrays,
+    answer: ClosingArrays,
+) -> None:
+    """Write a contact that stops a degree of freedom up to `joint`; in a further round it replaces the earlier one.
+
+    If a contact on a plane and one of the full width are the same, the plane describes it, because it has more data.
+    """
+    axis_group, dof = hand.chain.joint_axis_group[joint], hand.chain.joint_dof[joint]
+    n = 0
+    while n < answer.contacts[i] and not stops_same(hand.chain, answer.contact[i, n], dof, joint):
+        n += 1
+    if n == answer.contact.shape[1]:
+        return
+    contact, point = answer.contact[i, n], answer.point[i, n]
+    contact[CONTACT_JOINT] = joint
+    answer.contacts[i] = max(answer.contacts[i], n + 1)
+    if plane >= 0:
+        describe_contact(hand, sections, base, axis_group, plane, dof, answer.turn[i], work, contact, point)
+        if met < 0:
+            return
+        settle_contact(hand, start, sections, sections, answer.turn[i], contact, point, work)
+        if abs(point[CONTACT_GAP]) <= 2.0 * TOUCH_FRACTION * hand.axis_group_length[axis_group]:
+            return
+    pose_movers(full_width, hand.chain, candidates.finger_posture[i], answer.turn[i], sweep.poses)
+    describe_pair(full_width, T_palm_object, met, dof, axis_group, sweep, contact, point)
+
+
+@entry_kernel
+def close_candidate(
+    hand: HandArrays,
+    full_width: FullWidthArrays,
+    obj: ObjectArrays,
+    T_palm_object: Floats,
+    shared: SectionArrays,
+    own: SectionArrays,
+    candidates: CandidateArrays,
+    i: int,
+    times: int,
+    together: bool,
+    work: Work,
+    sweep: SweepWork,
+    answer: ClosingArrays,
+) -> None:
+    """Close one candidate: its degrees of freedom from the palm outwards, up to `times` over, or all at once; see the
+    module.
+
+    Args:
+        hand: the fingers. full_width: for full-width sweeps. obj: the object in its own frame, at `T_palm_object` (3,
+            4).
+        shared, own: sections with every finger posture's first axis group, by global plane; arena for a finger
+            posture's later axis groups.
+        candidates, i: the candidate. times, together: as above. work, sweep: scratch space. answer: written, cleared at
+            row `i`.
+    """
+    finger_posture = candidates.finger_posture[i]
+    if full_width.requested[i]:
+        for link in range(sweep.poses.shape[0]):
+            copy_pose(full_width.link_pose[finger_posture, link], sweep.poses[link])
+    sweep.skipped[0] = 0
+    # Travels of other finger postures' joints are never written: they would continue with the values of the candidate
+    # before.
+    for j in range(work.rates.shape[0]):
+        work.rates[j] = 0.0
+    for _ in range(times):
+        for j in range(work.before.shape[0]):
+            work.before[j] = answer.turn[i, j]
+        if not close_dofs(
+            hand, full_width, obj, T_palm_object, shared, own, candidates, i, together, work, sweep, answer
+        ):
+            return
+        moved = False
+        for j in range(work.before.shape[0]):
+            moved = moved or answer.turn[i, j] != work.before[j]
+        if not moved:
+            break
+    answer.skipped[i] = sweep.skipped[0]
+    pose_axis_groups(hand, finger_posture, answer.turn[i], work, answer.pose[i])
+    settle(
+        hand,
+        full_width,
+        T_palm_object,
+        hand.first_axis_group[finger_posture],
+        shared,
+        own,
+        candidates,
+        i,
+        work,
+        sweep,
+        answer,
+    )
+
+
+@kernel
+def close_dofs(
+    hand: HandArrays,
+    full_width: FullWidthArrays,
+    obj: ObjectArrays,
+    T_palm_object: Floats,
+    shared: SectionArrays,
+    own: SectionArrays,
+    candidates: CandidateArrays,
+    i: int,
+    together: bool,
+    work: Work,
+    sweep: SweepWork,
+    answer: ClosingArrays,
+) -> bool:
+    """Close every degree of freedom of a candidate once, palm side first, or all at once; False: it cannot begin."""
+    finger_posture, swept = candidates.finger_posture[i], full_width.requested[i] != 0
+    start = hand.first_axis_group[finger_posture]
+    axis_group = start - 1
+    for dof in range(hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]):
+        wanted = dof_axis_group(hand, dof)
+        while axis_group < wanted and answer.overlap[i] > SUNK:
+            axis_group += 1
+            enter_axis_group(hand, axis_group, start, obj, T_palm_object, own, candidates, i, swept, work, answer)
+        if answer.overlap[i] <= SUNK:
+            break
+        if axis_group > start and not swept and is_held(hand, axis_group, dof, candidates, i, work, answer):
+            continue
+        sections, base = shared, 0
+        if axis_group > start:
+            sections, base = own, hand.axis_group_plane[start]
+        for j in range(work.locked.shape[0]):
+            work.locked[j] = 0
+        moving = ALL if together else dof
+        if not close_dof(
+            hand,
+            full_width,
+            T_palm_object,
+            sections,
+            base,
+            axis_group,
+            moving,
+            obj.closed,
+            start,
+            candidates,
+            i,
+            work,
+            sweep,
+            answer,
+        ):
+            return False
+        if together:
+            break
+    return True
