@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from clench.apps.cli.command_table import export_import as exchange
-from clench.apps.cli.command_table import generate
+from clench.apps.cli.commands import export_import as exchange
+from clench.apps.cli.commands import generate
 from clench.apps.cli.main import main
 from clench.core.exceptions import CommandError, UnknownNameError
 from clench.dataset.access.exporting import DatasetFormat

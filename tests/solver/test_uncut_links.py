@@ -1,9 +1,9 @@
 """A solve cuts links by curl planes only where it sweeps planes, or where somebody reads them."""
 
 import pytest
-from clench.apps.cli.command_table.demo import MUG_POSE
 
 import clench
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.closing import curl_planes
 
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from clench.apps.cli.command_table.export_import import Format
 
 import clench
+from clench.apps.cli.commands.export_import import Format
 from clench.apps.cli.inputs import actuators
 from clench.apps.cli.main import main
 from clench.closing.collision.packed_object import hash_bodies, hash_hand

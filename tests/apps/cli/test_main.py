@@ -11,10 +11,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from clench.apps.cli.command_table.demo import MUG_POSE
 
 import clench
 from clench.apps.cli.command_table import COMMANDS
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.apps.cli.inputs import choices
 from clench.apps.cli.inputs.command_files import loadable
 from clench.apps.cli.main import main

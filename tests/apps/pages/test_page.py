@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clench.apps.cli.command_table.demo import MUG_POSE
 
 import clench
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.apps.cli.main import main
 from clench.apps.pages.packed_scene import Motion, packed_motion, packed_solid
 from clench.apps.pages.page import hand_page_html, page_html

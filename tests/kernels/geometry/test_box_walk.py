@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernels.geometry.test_obb import below, to_segment
 
 from clench.kernels.geometry import box_walk
 from clench.kernels.geometry.bodies import Elements, pack_bodies
@@ -16,6 +15,7 @@ from clench.kernels.trees import obb as slabs
 from clench.kernels.trees.node_boxes import SLAB
 from kernels.kernel_entries import entry
 from kernels.toi.test_toi_bodies import KINDS, drawn_chain, patch, pose
+from kernels.trees.test_obb import below, to_segment
 
 put_box, off_box, walk_to_box = entry(box_walk.put_box), entry(box_walk.off_box), entry(box_walk.walk_to_box)
 put_rectangle, walk_rectangle = entry(box_walk.put_rectangle), entry(box_walk.walk_rectangle)

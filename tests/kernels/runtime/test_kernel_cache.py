@@ -7,7 +7,7 @@ import sys
 SOLVE = """
 import sys
 import clench
-from clench.apps.cli.command_table.demo import MUG_POSE
+from clench.apps.cli.commands.demo import MUG_POSE
 hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
 solution = clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE))
 solution.to_dict()

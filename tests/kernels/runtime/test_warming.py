@@ -4,9 +4,9 @@ import subprocess
 import sys
 
 import pytest
-from clench.apps.cli.command_table.demo import MUG_POSE
 
 import clench
+from clench.apps.cli.commands.demo import MUG_POSE
 from clench.core.pose import Pose
 from clench.kernels.closing import contact_reading as touches
 from clench.kernels.closing import solve_poses
