@@ -18,25 +18,38 @@ ROOT = Path(__file__).parents[3]
 UNTRIED = "0.69"
 #: What is imported from modules that the manual of Numba does not describe.
 IMPORTED = {
+    "llvmlite.binding",
     "llvmlite.ir",
+    "numba.core.caching.CompileResultCacheImpl",
+    "numba.core.caching.FunctionCache",
+    "numba.core.caching.IndexDataCacheFile",
     "numba.core.cgutils",
+    "numba.core.codegen.JITCodeLibrary",
+    "numba.core.compiler.compile_result",
     "numba.core.imputils.impl_ret_borrowed",
     "numba.core.registry.CPUDispatcher",
+    "numba.core.runtime.nrt.rtsys",
     "numba.core.typing.templates.AttributeTemplate",
 }
 #: Attributes of these, of compiled functions, and of what the extension interface passes to functions.
 ATTRIBUTES = {
-    "llvmlite.ir.IRBuilder": {"extract_value", "insert_value", "inttoptr", "load", "store"},
+    "llvmlite.ir.IRBuilder": {"inttoptr", "load"},
     "llvmlite.ir.Type": {"as_pointer"},
-    "numba.core.base.BaseContext": {"get_abi_sizeof", "get_constant", "get_dummy_value", "get_value_type"},
+    "numba.core.base.BaseContext": {"get_executable", "get_value_type"},
+    "numba.core.caching.FunctionCache": {"_guard_against_spurious_io_errors", "_index_key"},
+    "numba.core.caching.IndexDataCacheFile": {"_load_index", "load"},
     "numba.core.cgutils": {"alloca_once_value", "gep_inbounds"},
+    "numba.core.codegen.JITCPUCodegen": {"set_env", "unserialize_library"},
+    "numba.core.codegen.JITCodeLibrary": {"_finalize_final_module", "_set_compiled_object", "enable_object_caching"},
+    "numba.core.codegen.JitEngine": {"_load_defined_symbols", "get_function_address"},
+    "numba.core.cpu.CPUContext": {"codegen"},
     "numba.core.cpu.CPUTargetOptions": {"_nrt", "no_cfunc_wrapper", "no_cpython_wrapper"},
     "numba.core.datamodel.manager.DataModelManager": {"lookup"},
     "numba.core.pythonapi.PythonAPI": {"decref", "long_as_longlong", "object_getattr_string"},
     "numba.core.registry.CPUDispatcher": {"get_call_template"},
 }
 #: Attributes of compiled functions and of their index on disk, which only objects have.
-OF_KERNELS = {"_cache", "_cache_file", "_load_index", "_source_stamp"}
+OF_KERNELS = {"_cache", "_cache_file", "_engine", "_load_index", "typing_context"}
 SOURCES = [path for folder in ("src", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
 FUTURE = "from __future__ import annotations\n"
 RUNTIME = sorted((ROOT / "src" / "clench" / "kernels" / "runtime").glob("*.py"))
