@@ -66,3 +66,14 @@ def test_the_box_around_a_hull_holds_its_corners(seed, kind):
     assert np.allclose(box[:, :3].T @ box[:, :3], np.eye(3), atol=1e-12)
     assert (inside <= box[:, 4] + 1e-12).all()
     assert (box[:, 4] <= inside.max(axis=0) + 1e-9).all()
+
+
+def test_a_body_with_a_part_that_is_too_large_has_no_hulls(monkeypatch):
+    rng = np.random.default_rng(1)
+    small, large = cloud("sphere", 30, rng), cloud("sphere", 50, rng)
+    for limit in ("MOST_POINTS", "MOST_CORNERS"):
+        monkeypatch.setattr(hulls_module, limit, 40)
+        hulls = pack_hulls([[(small, 0.0)], [(small, 0.0), (large, 0.0)], [(small, 0.0), (small, 0.1)]])
+        assert list(hulls.body) == [0, 1, 1, 3]
+        assert len(hulls.points) == 90
+        monkeypatch.undo()

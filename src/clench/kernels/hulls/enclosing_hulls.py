@@ -25,6 +25,9 @@ FEW: Final = 16
 MANY: Final = 200
 COARSE: Final = 8
 FINE: Final = 16
+#: A part with more points, or more corners of its hull, has no hull.
+MOST_POINTS: Final = 60_000
+MOST_CORNERS: Final = 8_000
 #: More than rounding, as a fraction of a hull's size [-].
 ROUNDING: Final = 1e-12
 #: Points are taken to lie in a plane if their box is thinner than this fraction of its size [-].
@@ -61,7 +64,10 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
     Args:
         bodies: of each body the parts: points [m], (P, 3), and the radius by which their hull is grown [m].
     """
-    hulls = [_corners(points, radius) for body in bodies for points, radius in body]
+    parts = [[_corners(points, radius) for points, radius in body] for body in bodies]
+    # A body whose parts are too large has no hulls.
+    enclosed = [[hull for hull in found if hull] if all(found) else [] for found in parts]
+    hulls = [hull for found in enclosed for hull in found]
     first = np.cumsum([0, *(len(points) for points, _ in hulls)])
     sides = [0 if len(p) <= FEW else COARSE if len(p) <= MANY else FINE for p, _ in hulls]
     listed = [
@@ -71,7 +77,7 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
         np.concatenate([np.empty((0, 3)), *(points for points, _ in hulls)]),
         first.astype(np.int64),
         np.array([radius for _, radius in hulls], dtype=np.float64),
-        np.cumsum([0, *(len(body) for body in bodies)]).astype(np.int64),
+        np.cumsum([0, *map(len, enclosed)]).astype(np.int64),
         np.array([_box(points) for points, _ in hulls], dtype=np.float64).reshape(-1, 3, 5),
         np.array(sides, dtype=np.int64),
         np.cumsum([0, *(6 * side * side for side in sides)])[:-1].astype(np.int64),
@@ -80,14 +86,18 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
     )
 
 
-def _corners(points: Floats, radius: float) -> tuple[Floats, float]:
+def _corners(points: Floats, radius: float) -> tuple[Floats, float] | None:
     """Return the points that can be corners of their hull, and the radius by which that is grown to hold all of them.
+
+    None stands for too many points or corners: a hull would take longer to make than it saves.
 
     Of points that nearly lie in a plane all are kept: rounding does not tell there which ones lie inside.
     """
     from scipy.spatial import ConvexHull, QhullError
 
     points = np.unique(points, axis=0)
+    if len(points) > MOST_POINTS:
+        return None
     radius += ROUNDING * float(np.abs(points).max(initial=0.0))
     if len(points) <= FEW or _box(points)[:, 4].min() < THIN * np.ptp(points, axis=0).max():
         return points, radius
@@ -97,12 +107,14 @@ def _corners(points: Floats, radius: float) -> tuple[Floats, float]:
         return points, radius
     outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1) > 0.0
     outside[hull.vertices] = True
-    return points[outside], radius
+    return (points[outside], radius) if outside.sum() <= MOST_CORNERS else None
 
 
 def _box(points: Floats) -> Floats:
     """Return the pose of a box around points along their principal axes, and half its sizes [m], (3, 5)."""
-    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2]
+    # Three rows at least, so that there are three axes.
+    about = np.vstack([points - points.mean(axis=0), np.zeros((3, 3))])
+    axes = np.linalg.svd(about, full_matrices=False)[2]
     low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     return np.column_stack([axes.T, axes.T @ middle, half + ROUNDING * np.abs(points).max(initial=0.0)])
