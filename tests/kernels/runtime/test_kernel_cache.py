@@ -1,11 +1,14 @@
 """A kernel from disk runs without a prepared compiler, and can still become part of another kernel."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 #: Solves, and prints whether Numba prepared its compiler.
 SOLVE = """
 import sys
+from pathlib import Path
 import clench
 from clench.apps.cli.commands.demo import MUG_POSE
 hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
@@ -38,3 +41,22 @@ def test_a_solve_with_kernels_from_disk_prepares_no_compiler() -> None:
 def test_a_kernel_from_disk_becomes_part_of_one_that_is_compiled() -> None:
     run(CALL)
     assert run(CALL) == "True True\n"
+
+
+def test_a_damaged_file_of_machine_code_is_compiled_anew(tmp_path: Path) -> None:
+    folder = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    program = "from clench.kernels.sections.coupled import cosine_and_sine; print(cosine_and_sine(0.5))"
+
+    def call() -> str:
+        return subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=folder
+        ).stdout
+
+    found = call()
+    files = list(tmp_path.rglob("coupled.cosine_and_sine-*.nbc"))
+    assert files
+    for size in (0, 100, 300):
+        for path in files:
+            path.write_bytes(path.read_bytes()[:size])
+        assert call() == found
+        assert all(path.stat().st_size > 300 for path in files), "the whole file is written again"

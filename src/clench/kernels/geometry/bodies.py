@@ -111,7 +111,7 @@ def _parts(body: Elements) -> list[tuple[Floats, float]]:
     """Return points and radius of every part of a body that has elements."""
     ends = (*body.parts[1:], len(body.elements))
     spans = [slice(first, end) for first, end in zip(body.parts, ends, strict=True) if end > first]
-    return [(body.vertices[body.elements[s].ravel()], float(body.radius[s].max())) for s in spans]
+    return [(body.vertices[np.unique(body.elements[s])], float(body.radius[s].max())) for s in spans]
 
 
 def pack_triangles(tree: MeshTree) -> BodyArrays:

@@ -22,12 +22,14 @@ Whole = NDArray[np.int64]
 #: Hulls with more corners than this have a table.
 FEW: Final = 16
 #: From so many corners on a table is finer; cones along an edge of the cube of directions in either case.
-MANY: Final = 200
+MANY: Final = 1500
 COARSE: Final = 8
-FINE: Final = 16
+FINE: Final = 12
 #: A part with more points, or more corners of its hull, has no hull.
 MOST_POINTS: Final = 60_000
 MOST_CORNERS: Final = 8_000
+#: Distances of points from faces that are in memory at once.
+AT_ONCE: Final = 2_000_000
 #: More than rounding, as a fraction of a hull's size [-].
 ROUNDING: Final = 1e-12
 #: Points are taken to lie in a plane if their box is thinner than this fraction of its size [-].
@@ -93,21 +95,29 @@ def _corners(points: Floats, radius: float) -> tuple[Floats, float] | None:
 
     Of points that nearly lie in a plane all are kept: rounding does not tell there which ones lie inside.
     """
-    from scipy.spatial import ConvexHull, QhullError
-
     points = np.unique(points, axis=0)
     if len(points) > MOST_POINTS:
         return None
     radius += ROUNDING * float(np.abs(points).max(initial=0.0))
-    if len(points) <= FEW or _box(points)[:, 4].min() < THIN * np.ptp(points, axis=0).max():
+    if len(points) <= FEW:
         return points, radius
+    everything = (points, radius) if len(points) <= MOST_CORNERS else None
+    if _box(points)[:, 4].min() < THIN * np.ptp(points, axis=0).max():
+        return everything
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         hull = ConvexHull(points)
     except QhullError:
-        return points, radius
-    outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1) > 0.0
+        return everything
+    outside = np.zeros(len(points), dtype=bool)
     outside[hull.vertices] = True
-    return (points[outside], radius) if outside.sum() <= MOST_CORNERS else None
+    if outside.sum() > MOST_CORNERS:
+        return None
+    left = np.flatnonzero(~outside)
+    for some in np.array_split(left, len(left) * len(hull.equations) // AT_ONCE + 1):
+        outside[some] = (points[some] @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1, initial=-1.0) > 0.0
+    return points[outside], radius
 
 
 def _box(points: Floats) -> Floats:

@@ -62,14 +62,17 @@ class KernelCache(FunctionCache):
         return _KernelIndex(self._cache_path, self._impl.filename_base, self._stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return a kernel from disk, or None; the compiler stays unprepared."""
+        """Return a kernel from disk, or None without one that can be read; the compiler stays unprepared."""
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         if not self._enabled:
             return None
-        content = self._cache_file.load(self._index_key(sig, target_context.codegen()))
+        try:
+            content = self._cache_file.load(self._index_key(sig, target_context.codegen()))
+        except _UNREADABLE:
+            return None
         return None if content is None else _rebuilt(target_context, *content)
 
 
