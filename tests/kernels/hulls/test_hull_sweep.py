@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.geometry.bodies import Elements, no_body, pack_bodies
-from clench.kernels.hulls import hull_motion, hull_sweep, near_elements
+from clench.kernels.hulls import body_sweep, hull_motion, hull_sweep, near_elements
 from clench.kernels.hulls.enclosing_hulls import pack_hulls
 from clench.kernels.toi import core_motion
 from clench.kernels.toi import toi_work as sweeping
@@ -17,6 +17,7 @@ from kernels.kernel_entries import entry
 from kernels.toi.test_toi_bodies import KINDS, TOUCH, cores, drawn_chain, patch, pose
 
 clear_travel, make_sweep_work = entry(hull_sweep.clear_travel), entry(sweeping.make_sweep_work)
+sweep_body = entry(body_sweep.sweep_body)
 list_near, list_touching = entry(near_elements.list_near), entry(near_elements.list_touching)
 lowest_between, move_core = entry(hull_motion.lowest_between), entry(core_motion.move_core)
 
@@ -99,7 +100,19 @@ def test_bodies_without_elements_or_hulls():
     assert clear_travel(bare, 0, resting, 0, chain, len(chain), TOUCH, best, work) == 0.0
     assert clear_travel(moving, 0, no_body(), 0, chain, len(chain), TOUCH, best, work) == math.inf
     assert list_touching(bare, 0, resting, 0, TOUCH, work) == -1
+    assert list_near(bare, 0, resting, 0, chain, len(chain), TOUCH, 0.05, work) == -1
     assert list_touching(no_body(), 0, resting, 0, TOUCH, work) == 0
+
+
+def test_a_body_without_hulls_meets_what_it_meets_with_them():
+    met = 0
+    for seed in range(30):
+        moving, resting, chain, best, work = drawn(seed, ("soup", "sheet"), bool(seed % 2))
+        bare = moving._replace(hulls=pack_hulls([()]))
+        found = sweep_body(bare, 0, resting, 0, chain, len(chain), TOUCH, best, work)
+        assert found == pytest.approx(sweep_body(moving, 0, resting, 0, chain, len(chain), TOUCH, best, work), abs=1e-6)
+        met += found < best
+    assert met >= 5
 
 
 @pytest.mark.parametrize("kind", KINDS)

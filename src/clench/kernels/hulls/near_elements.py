@@ -47,9 +47,11 @@ def list_near(
     """List the elements of body `r` that body `m` may come within `touch` of before `end` in `sweep.listed`.
 
     Returns:
-        how many there are, or -1 where there are too many.
+        how many there are, or -1 where there are too many, or where body `m` has no hulls: then any can be met.
     """
     found, window = 0, sweep.hull
+    if moving.hulls.body[m] == moving.hulls.body[m + 1]:
+        return -1
     for hull in range(moving.hulls.body[m], moving.hulls.body[m + 1]):
         motion = motion_of_hull(moving, hull, chain, count, sweep)
         forget_planes(window)
