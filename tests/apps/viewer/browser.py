@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -53,6 +54,18 @@ class Tab:
     def wait_for(self, what: str, seconds: float = 20.0) -> None:
         """Wait until the card is in a state: moving, rest, busy, failed."""
         self.page.wait_for_selector(f"[data-clench={what}]", timeout=1e3 * seconds)
+
+    def until(self, came: Callable[[], bool], seconds: float = 30.0) -> None:
+        """Wait until what the page sent has come, and is answered.
+
+        Raises:
+            AssertionError: it did not come in time.
+        """
+        end = time.monotonic() + seconds
+        while not came():
+            assert time.monotonic() < end, "what the page sent did not come"
+            self.page.wait_for_timeout(20)
+        assert self.session.wait()
 
     def card(self) -> str:
         return self.page.locator("[data-clench]").inner_text()
