@@ -29,7 +29,7 @@ def copied(tmp_path, monkeypatch):
     runtime = tmp_path / "runtime"
     runtime.mkdir()
     copy = shutil.copy(compiling.__file__, runtime)
-    for name in ("by_reference", "kernel_cache"):
+    for name in ("by_reference", "kernel_cache", "symbols"):
         Path(runtime, f"{name}.py").write_text("HANDED = 1\n")
     spec = importlib.util.spec_from_file_location("clench.kernels.runtime.copied", copy)
     module = importlib.util.module_from_spec(spec)

@@ -25,6 +25,7 @@ IMPORTED = {
     "numba.core.caching.IndexDataCacheFile",
     "numba.core.cgutils",
     "numba.core.codegen.JITCodeLibrary",
+    "numba.core.compiler.Compiler",
     "numba.core.compiler.compile_result",
     "numba.core.imputils.impl_ret_borrowed",
     "numba.core.registry.CPUDispatcher",
@@ -36,12 +37,19 @@ ATTRIBUTES = {
     "llvmlite.ir.IRBuilder": {"inttoptr", "load"},
     "llvmlite.ir.Type": {"as_pointer"},
     "numba.core.base.BaseContext": {"get_executable", "get_value_type"},
+    "numba.core.caching.CompileResultCacheImpl": {"check_cachable", "reduce"},
     "numba.core.caching.FunctionCache": {"_guard_against_spurious_io_errors", "_index_key"},
-    "numba.core.caching.IndexDataCacheFile": {"_load_index", "load"},
+    "numba.core.caching.IndexDataCacheFile": {"_load_index", "load", "save"},
     "numba.core.cgutils": {"alloca_once_value", "gep_inbounds"},
-    "numba.core.codegen.JITCPUCodegen": {"set_env", "unserialize_library"},
-    "numba.core.codegen.JITCodeLibrary": {"_finalize_final_module", "_set_compiled_object", "enable_object_caching"},
+    "numba.core.codegen.JITCPUCodegen": {"_create_empty_module", "set_env", "unserialize_library"},
+    "numba.core.codegen.JITCodeLibrary": {
+        "_finalize_final_module",
+        "_get_compiled_object",
+        "_set_compiled_object",
+        "enable_object_caching",
+    },
     "numba.core.codegen.JitEngine": {"_load_defined_symbols", "get_function_address"},
+    "numba.core.compiler.Compiler": {"_compile_bytecode"},
     "numba.core.cpu.CPUContext": {"codegen"},
     "numba.core.cpu.CPUTargetOptions": {"_nrt", "no_cfunc_wrapper", "no_cpython_wrapper"},
     "numba.core.datamodel.manager.DataModelManager": {"lookup"},
@@ -49,7 +57,7 @@ ATTRIBUTES = {
     "numba.core.registry.CPUDispatcher": {"get_call_template"},
 }
 #: Attributes of compiled functions and of their index on disk, which only objects have.
-OF_KERNELS = {"_cache", "_cache_file", "_engine", "_load_index", "typing_context"}
+OF_KERNELS = {"_cache", "_cache_file", "_engine", "_final_module", "_load_index", "_shared_module", "typing_context"}
 SOURCES = [path for folder in ("src", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
 FUTURE = "from __future__ import annotations\n"
 RUNTIME = sorted((ROOT / "src" / "clench" / "kernels" / "runtime").glob("*.py"))

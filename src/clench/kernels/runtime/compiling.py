@@ -16,6 +16,7 @@ from clench.core import tolerances
 
 from .by_reference import by_reference
 from .kernel_cache import index_of, keep_on_disk
+from .symbols import named
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -128,12 +129,13 @@ class KernelForKernels(CachedKernel):
 
 def _compiled(function: Callable[..., Any], *, from_python: bool, allocates: bool) -> Any:
     """Return the kernel of a function, which is compiled or loaded on its first call."""
+    stamp = source_stamp(Path(function.__code__.co_filename))
     settings: Any = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": allocates}
     if not from_python:
         settings["no_cpython_wrapper"] = True
-    dispatcher: Any = njit(**settings)(function)
+    dispatcher: Any = njit(pipeline_class=named(stamp), **settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return dispatcher
     dispatcher.__class__ = CachedKernel if from_python else KernelForKernels
-    keep_on_disk(dispatcher, source_stamp(Path(function.__code__.co_filename)))
+    keep_on_disk(dispatcher, stamp)
     return dispatcher

@@ -18,6 +18,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import compile_result
 from numba.core.runtime.nrt import rtsys
 
+from .symbols import LARGE, Needed, bring, has_a_fixed_symbol, keep_apart, needed_by
+
 #: Errors of reading a damaged file, or one that names modules or classes which this version does not have.
 _UNREADABLE = (ImportError, AttributeError, pickle.UnpicklingError, EOFError, TypeError, ValueError, IndexError)
 
@@ -73,7 +75,33 @@ class KernelCache(FunctionCache):
             content = self._cache_file.load(self._index_key(sig, target_context.codegen()))
         except _UNREADABLE:
             return None
-        return None if content is None else _rebuilt(target_context, *content)
+        if content is None:
+            return None
+        apart, needed, parts = content
+        if not bring(needed):
+            return None
+        result = _rebuilt(target_context, *parts)
+        if apart is not None:
+            keep_apart(apart)
+        return result
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled kernel on disk; from here on its callers refer to it if it is large."""
+        library, apart = data.library, None
+        if len(library._get_compiled_object()) >= LARGE and has_a_fixed_symbol(self._py_func):
+            apart = Needed(data.fndesc.llvm_func_name, self._py_func.__module__, self._py_func.__name__, sig)
+            # What is linked into callers is empty: they only declare the function.
+            library._shared_module = binding.parse_assembly(str(data.codegen._create_empty_module(library.name)))
+            keep_apart(apart)
+        with self._guard_against_spurious_io_errors():
+            self._save_parts(sig, data, apart)
+
+    def _save_parts(self, sig: Any, data: Any, apart: Needed | None) -> None:
+        if not self._impl.check_cachable(data):
+            return
+        self._impl.locator.ensure_cache_path()
+        parts = self._impl.reduce(data)
+        self._cache_file.save(self._index_key(sig, data.codegen), (apart, needed_by(data.library), parts))
 
 
 class _KernelIndex(IndexDataCacheFile):

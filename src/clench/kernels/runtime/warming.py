@@ -1,7 +1,7 @@
 """Compile the kernels of a solve ahead of it, in two processes at once.
 
-A first solve compiles for minutes, one kernel after another. Half of it is the closing, so a second process compiles
-that into the cache on disk, from where this one loads it. Nothing depends on the second process: kernels that it does
+A first solve compiles for about two minutes, one kernel after another. Half of it is the closing, so a second process
+compiles that into the cache on disk, from where this one loads it. Nothing depends on the second process: kernels that it does
 not deliver are compiled when they are called.
 """
 
@@ -204,7 +204,7 @@ def _arrays(kinds: str) -> list[Any]:
 def announce() -> None:
     """Say on standard error that what comes compiles, where it does; once per process."""
     if _is_cold():
-        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
+        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes about a minute.\n")
 
 
 def _is_cold() -> bool:

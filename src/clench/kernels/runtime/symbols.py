@@ -1,0 +1,83 @@
+"""Call large kernels by their symbol, so that each is compiled once.
+
+Numba links a kernel into every kernel that calls it, and optimizes and translates it there again. That makes short
+kernels fast, which become part of their callers. A large kernel stays a call in any case, and each level above it
+compiled it anew: two thirds of the time of a first solve.
+
+A kernel whose machine code takes `LARGE` bytes or more is therefore not linked. Its callers refer to its symbol, and
+the engine that holds all machine code of a process joins them. For this the symbol has the same name in every process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from typing import Any, Final, NamedTuple
+
+from numba.core.compiler import Compiler
+
+#: Machine code from this size on stays apart [bytes]. Half of it compiled hardly faster, and loaded slower.
+LARGE: Final = 40_000
+
+
+class Needed(NamedTuple):
+    """A kernel that the machine code of another one calls by its symbol."""
+
+    symbol: str
+    module: str
+    name: str
+    #: Types of its arguments.
+    arguments: Any
+
+
+#: The kernels of this process that stay apart, by symbol.
+_APART: Final[dict[str, Needed]] = {}
+
+
+def has_a_fixed_symbol(function: Callable[..., Any]) -> bool:
+    """Say whether a function is the only one of its name in its module; one within a function need not be."""
+    return "<locals>" not in function.__qualname__ and function.__closure__ is None
+
+
+def named(stamp: bytes) -> type[Compiler]:
+    """Return a compiler that names symbols by the function and by its sources; Numba's counts the functions.
+
+    Args:
+        stamp: digest that changes when the function has to be compiled again.
+    """
+
+    class NamingCompiler(Compiler):
+        """Numba's compiler, with names of symbols that are equal in all processes."""
+
+        def _compile_bytecode(self) -> Any:
+            identity = self.state.func_id
+            if has_a_fixed_symbol(identity.func):
+                digest = hashlib.sha256(stamp + identity.modname.encode()).hexdigest()[:16]
+                identity.unique_id = digest
+                identity.unique_name = f"{identity.func_qualname}${digest}"
+            compiled: Any = super()._compile_bytecode()  # type: ignore[no-untyped-call]
+            return compiled
+
+    return NamingCompiler
+
+
+def needed_by(library: Any) -> tuple[Needed, ...]:
+    """Return the kernels that the machine code of a library calls by their symbols."""
+    declared = (f.name for f in library._final_module.functions if f.is_declaration)
+    return tuple(_APART[name] for name in declared if name in _APART)
+
+
+def keep_apart(needed: Needed) -> None:
+    """Note that the callers of a kernel refer to its symbol; its machine code is there."""
+    _APART[needed.symbol] = needed
+
+
+def bring(kernels: Iterable[Needed]) -> bool:
+    """Load or compile kernels that machine code refers to; return whether all their symbols are there now."""
+    for needed in kernels:
+        if needed.symbol not in _APART:
+            getattr(import_module(needed.module), needed.name).compile(needed.arguments)
+        if needed.symbol not in _APART:
+            return False
+    return True

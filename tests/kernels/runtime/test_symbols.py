@@ -1,0 +1,106 @@
+"""Large kernels are compiled once: their callers refer to a symbol that is the same in every process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+#: A kernel that stays apart, one that is linked in, and a kernel that calls both.
+MODULE = """
+from clench.kernels.runtime.compiling import entry_kernel, kernel
+
+@kernel
+def large(x):
+    return x * 2.0 + {offset}
+
+@kernel
+def small(x):
+    return x + 1.0
+
+@entry_kernel
+def caller(x):
+    return large(small(x))
+
+@entry_kernel
+def caller_of_caller(x):
+    return caller(x) - 1.0
+"""
+
+#: Calls a kernel; prints the answer, and how often each kernel was loaded from disk.
+CALL = """
+import sys
+from clench.kernels.runtime import kernel_cache
+kernel_cache.LARGE = 0 if "apart" in sys.argv else 10**9
+import some_kernels as m
+x = m.caller_of_caller(3.0)
+kernels = (m.large, m.small, m.caller, m.caller_of_caller)
+print(x, *(sum(k.stats.cache_hits.values()) for k in kernels), *(len(k.overloads) for k in kernels))
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "some_kernels.py").write_text(MODULE.format(offset="0.5"))
+    return tmp_path
+
+
+def call(folder: Path, *words: str) -> str:
+    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    run = subprocess.run(
+        [sys.executable, "-c", CALL, *words], capture_output=True, text=True, check=True, env=environment
+    )
+    return run.stdout.strip()
+
+
+def data_files(folder: Path, kernel: str) -> list[Path]:
+    return sorted((folder / "cache").rglob(f"some_kernels.{kernel}-*.nbc"))
+
+
+def test_kernels_that_are_linked_in_are_not_loaded_again(folder: Path) -> None:
+    assert call(folder) == "7.5 0 0 0 0 1 1 1 1"
+    assert call(folder) == "7.5 0 0 0 1 0 0 0 1"
+
+
+def test_machine_code_brings_the_kernels_that_it_refers_to(folder: Path) -> None:
+    assert call(folder, "apart") == "7.5 0 0 0 0 1 1 1 1"
+    assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
+
+
+@pytest.mark.parametrize("lost", ["large", "caller"])
+def test_a_lost_kernel_is_compiled_anew_under_the_same_symbol(folder: Path, lost: str) -> None:
+    call(folder, "apart")
+    for path in data_files(folder, lost):
+        path.unlink()
+    first = call(folder, "apart").split()
+    assert first[0] == "7.5"
+    assert first[5:] == ["1"] * 4
+    assert data_files(folder, lost), "it is on disk again"
+    assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
+
+
+def test_a_change_of_the_source_changes_the_symbols(folder: Path) -> None:
+    call(folder, "apart")
+    (folder / "some_kernels.py").write_text(MODULE.format(offset="10.5"))
+    assert call(folder, "apart").startswith("17.5 0 0 0 0")
+
+
+def test_a_kernel_that_was_linked_in_may_stay_apart_later(folder: Path) -> None:
+    call(folder)
+    for path in data_files(folder, "caller_of_caller"):
+        path.unlink()
+    assert call(folder, "apart").startswith("7.5 ")
+    assert call(folder).startswith("7.5 ")
+
+
+def test_processes_that_compile_at_once_refer_to_the_same_symbols(folder: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    running = [
+        subprocess.Popen([sys.executable, "-c", CALL, "apart"], stdout=subprocess.PIPE, text=True, env=environment)
+        for _ in range(4)
+    ]
+    assert all(process.communicate()[0].startswith("7.5 ") and process.returncode == 0 for process in running)
+    assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
