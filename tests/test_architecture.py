@@ -415,15 +415,15 @@ def test_a_kernel_that_allocates_unmarked_is_found() -> None:
     assert not makers_of_arrays("@kernel(allocates=True)\ndef f(a):\n    return np.zeros(3)\n")
 
 
-def test_import_is_light_and_quick() -> None:
+def test_import_loads_four_modules_and_no_other_package() -> None:
+    # Names of the root load their modules when they are first used. So the import takes a hundredth of a second.
     program = (
-        "import sys, time; t = time.process_time(); import clench; t = time.process_time() - t; "
-        f"print(t, sorted({HEAVY!r} & set(sys.modules)))"
+        "import sys; before = set(sys.modules); import clench; new = set(sys.modules) - before; "
+        "packages = {name.partition('.')[0] for name in new} - set(sys.stdlib_module_names); "
+        "print(sorted(packages), len([name for name in new if name.startswith('clench.')]))"
     )
-    runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True) for _ in "123"]
-    times, loaded = zip(*(r.stdout.strip().split(" ", 1) for r in runs), strict=True)
-    assert set(loaded) == {"[]"}
-    assert min(float(t) for t in times) <= 0.3
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "['clench'] 4"
 
 
 def test_a_solve_loads_only_what_it_needs() -> None:

@@ -2,6 +2,7 @@
 
 import io
 import struct
+import sys
 
 import numpy as np
 import pytest
@@ -54,3 +55,48 @@ def test_groups_of_an_obj_file_do_not_change_its_surface(groups):
     mesh = parse_mesh(text.encode(), ".obj")
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(0.1**3 / 6.0)
+
+
+TEXT_STL = (
+    b"solid part\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    b"endsolid part\n"
+)
+BINARY_STL = bytes(80) + struct.pack("<I", 1) + struct.pack("<12fH", *[0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], 0)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (TEXT_STL[:60], "the text ends before 'endsolid'"),
+        (BINARY_STL[:100], "its header counts 1 triangles, which take 134 bytes, but the file has 100"),
+        (b"solid" + BINARY_STL[5:100], "its header counts 1 triangles, which take 134 bytes, but the file has 100"),
+        (BINARY_STL[:40], "neither text with 'solid' nor a binary header of 84 bytes, it has 40 bytes"),
+        (b"h\xe9llo", "neither text with 'solid' nor a binary header of 84 bytes, it has 5 bytes"),
+    ],
+)
+def test_what_is_wrong_with_a_damaged_stl_file(data, words, monkeypatch):
+    monkeypatch.setitem(sys.modules, "charset_normalizer", None)
+    with pytest.raises(MeshError, match=words):
+        parse_mesh(data, ".stl")
+
+
+@pytest.mark.parametrize(
+    ("data", "suffix"),
+    [
+        (TEXT_STL, ".stl"),
+        (TEXT_STL.replace(b"part", b"St\xfcck"), ".stl"),
+        (BINARY_STL, ".stl"),
+        (b"\xfc" * 80 + BINARY_STL[80:], ".stl"),
+        (b"# St\xfcck\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ".obj"),
+        (b"OFF\n# St\xfcck\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", ".off"),
+    ],
+)
+def test_text_in_another_encoding_is_read_without_a_library_that_guesses(data, suffix, monkeypatch):
+    monkeypatch.setitem(sys.modules, "charset_normalizer", None)
+    vertices, triangles = arrays_of(parse_mesh(data, suffix))
+    np.testing.assert_array_equal(vertices[triangles[0]], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
+def test_a_face_without_its_vertex_is_named():
+    with pytest.raises(MeshError, match="face 1, line 4: names vertex 9, but there are 3 vertices"):
+        parse_mesh(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", ".obj")

@@ -39,7 +39,7 @@ def test_the_sentence_names_what_decided_and_by_how_much():
     assert finger["runner_up"] == 0
     assert finger["lead"] == pytest.approx(0.3)
     assert finger["text"] == (
-        "plane 3 leads the full width by 0.3; range_of_motion decided it: 0.3 against 0.5 rad, worth 0.2."
+        "plane 2 leads the full width by 0.3; range_of_motion decided it: 0.3 against 0.5 rad, worth 0.2."
     )
     assert document["text"] == (
         "The chosen sets lead the next best (the full width for index) by 0.3; "
@@ -52,7 +52,7 @@ def test_the_sentence_names_what_decided_and_by_how_much():
 
 def test_a_set_that_wins_by_what_it_fulfils_says_so():
     finger = explained([[candidate((0.1, 0.0), feasible=False), candidate((0.5, 0.0), plane=0)]])["fingers"]["index"]
-    assert finger["text"] == "plane 1 comes before the full width because it alone may be taken."
+    assert finger["text"] == "plane 0 comes before the full width because it alone may be taken."
     finger = explained([[candidate((0.1, 0.0), touches=()), candidate((0.5, 0.0), plane=0)]])["fingers"]["index"]
     assert finger["text"].endswith("because it alone touches the object.")
 
@@ -107,5 +107,5 @@ def test_a_criterion_of_the_hand_that_overrules_a_finger_is_said(monkeypatch):
     assert document["hand_scores"] == {"far": 0.5}
     assert document["runner_up"]["hand_scores"] == {"far": 0.1}
     assert document["fingers"]["index"]["text"] == (
-        "plane 1 is 0.4 behind the full width by itself; with the sets of the other fingers it is the best."
+        "plane 0 is 0.4 behind the full width by itself; with the sets of the other fingers it is the best."
     )

@@ -43,7 +43,7 @@ class GraspCommand:
         order, rounds: closing order, and how often it is gone through; 0 rounds: until nothing moves any more.
         orders: alternatives, used instead of `order`: each is solved by itself, and the best solution is kept.
         speeds: relative closing speeds for simultaneous closing, by name of a free joint; 1 if not named.
-        planes: number of curl planes per finger.
+        planes: number of curl planes per finger; the edges of narrower links are added to them.
         full_width: also compute the set that closes over all planes together.
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.

@@ -12,8 +12,12 @@ import numpy as np
 
 from clench.core.files.file_limits import LINE_BYTES, MESH_TRIANGLES, SCENE_PARTS
 
+from .face_indices import wrong_face
 from .gltf_scene import bare_glb
 
+#: Bytes of a binary STL file before its triangles, and of each triangle.
+_STL_HEADER: Final = 84
+_STL_TRIANGLE: Final = 50
 #: Lines that part an OBJ file; the parser's time grows with the square of their number.
 _GROUP: Final = re.compile(rb"^(?:o|g|s|usemtl|mtllib)\b.*$", re.MULTILINE)
 _GROUP_STARTS: Final = (b"\no ", b"\ng ", b"\ns ", b"\nusemtl", b"\nmtllib")
@@ -45,6 +49,9 @@ def parse_mesh(data: bytes, suffix: str) -> Any:
     except MeshError:
         raise
     except Exception as error:  # a damaged file can fail in any way
+        face = wrong_face(data, suffix)
+        if face is not None:
+            raise MeshError(face) from None
         reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else type(error).__name__
         raise MeshError(reason) from None
     if count > MESH_TRIANGLES:
@@ -56,10 +63,38 @@ def _as_it_is(data: bytes) -> bytes:
     return data
 
 
+def _text(data: bytes) -> bytes:
+    """Return text in UTF-8: the parser guesses other encodings with a library that need not be there."""
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode()
+    return data
+
+
+def _stl(data: bytes) -> bytes:
+    """Let only a complete file pass: the parser takes a damaged binary file for text, and finds nothing in it."""
+    count = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
+    expected = _STL_HEADER + _STL_TRIANGLE * count
+    if len(data) >= _STL_HEADER and len(data) == expected:
+        return data
+    lowered = data.lower()
+    if b"solid" in lowered and b"\0" not in data:
+        if b"endsolid" not in lowered:
+            raise MeshError("the text ends before 'endsolid'")
+        return _text(data)
+    if len(data) < _STL_HEADER:
+        raise MeshError(
+            f"neither text with 'solid' nor a binary header of {_STL_HEADER} bytes, it has {len(data)} bytes"
+        )
+    raise MeshError(f"its header counts {count} triangles, which take {expected} bytes, but the file has {len(data)}")
+
+
 def _obj(data: bytes) -> bytes:
     ends = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n"))
     if np.diff(ends, prepend=-1, append=len(data)).max() > LINE_BYTES:
         raise MeshError(f"a line has more than {LINE_BYTES} bytes")
+    data = _text(data)
     return data if sum(map(data.count, _GROUP_STARTS)) <= SCENE_PARTS else _GROUP.sub(b"", data)
 
 
@@ -86,9 +121,9 @@ _DAE_COPIES: Final = 16
 #: Suffixes of the parsed files, and functions that prepare their bytes for the parser.
 PARSED: Final[dict[str, Callable[[bytes], bytes]]] = {
     ".obj": _obj,
-    ".stl": _as_it_is,
+    ".stl": _stl,
     ".ply": _as_it_is,
-    ".off": _as_it_is,
+    ".off": _text,
     ".glb": _glb,
     ".dae": _dae,
 }

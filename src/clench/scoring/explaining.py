@@ -66,7 +66,7 @@ def pareto_front(values: FloatArray) -> list[int]:
 
 def set_name(c: FingerCandidate, group: Sequence[FingerCandidate]) -> str:
     """Return the display name of a set among the sets of its finger."""
-    name = "the full width" if c.plane is None else f"plane {c.plane + 1}"
+    name = "the full width" if c.plane is None else f"plane {c.plane}"
     return f"{name} of posture {c.posture}" if any(other.posture for other in group) else name
 
 

@@ -20,29 +20,41 @@ SOLVE = ["solve", "--hand", "robonaut2", "--object", "ball"]
         (["record", "absent.db"], "absent.db: no such record."),
         (["batch", "--hand", "robonaut2", "--object", "ball", "--count", "0"], "--count: expected at least 1, got 0."),
         (["bench", "nothing"], "Benchmark 'nothing' is not in clench bench."),
-        ([*SOLVE, "--oder", "together"], "clench solve: Unrecognized options: --oder, together."),
+        (
+            [*SOLVE, "--oder", "together"],
+            "clench solve: Unrecognized options: --oder, together. Did you mean '--order'? Options: ",
+        ),
         ([*SOLVE, "--planes", "many"], "clench solve: Error parsing --planes:"),
-        ([*SOLVE, "--order", "sideways"], "clench solve: invalid choice 'sideways' for argument '--order'."),
+        (
+            [*SOLVE, "--order", "sideways"],
+            "clench solve: Invalid choice 'sideways' for argument '--order'. Expected one of proximal-first, ",
+        ),
         (["solve"], "clench solve: Missing from clench solve: --hand STR --object STR."),
         (["hand"], "clench hand: Missing from clench hand: STR."),
     ],
 )
 @pytest.mark.parametrize("letters_alone", [False, True])
-def test_an_error_is_a_document_and_a_sentence(
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_error_is_a_sentence_and_beside_json_a_document(
     arguments: list[str],
     sentence: str,
     letters_alone: bool,
+    as_json: bool,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Boxes are drawn with lines or with letters alone, as standard output allows.
     monkeypatch.setattr("tyro._fmtlib._FORCE_UTF8_BOXES", not letters_alone)
-    assert main([*arguments, "--json"]) == 2
+    assert main([*arguments, *["--json"] * as_json]) == 2
     captured = capsys.readouterr()
-    document = json.loads(captured.out)
-    assert list(document) == ["error"]
-    assert document["error"].startswith(sentence)
-    assert captured.err == f"clench: error: {document['error']}\n"
+    assert captured.err.startswith(f"clench: error: {sentence}")
+    assert captured.err.count("\n") == 1
+    if as_json:
+        document = json.loads(captured.out)
+        assert list(document) == ["error"]
+        assert captured.err == f"clench: error: {document['error']}\n"
+    else:
+        assert captured.out == ""
 
 
 @pytest.mark.parametrize(("error", "code"), [(RuntimeError("a\nb"), 70), (KeyboardInterrupt(), 130)])

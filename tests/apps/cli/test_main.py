@@ -355,8 +355,8 @@ def test_solve_explains_its_choice(
     lines = [" ".join(line.replace("│", " ").split()) for line in capsys.readouterr().out.splitlines()]
     assert "range_of_motion rad less 1 2 3" in lines
     assert "*P full 0 0.3 -0.3000 touch" in lines
-    assert "2 plane 1 0 0.3 -0.4000 limit" in lines
-    assert "x plane 2 0 0.3 -0.9000 touch" in lines
+    assert "2 plane 0 0 0.3 -0.4000 limit" in lines
+    assert "x plane 1 0 0.3 -0.9000 touch" in lines
     assert "index: the full width leads plane 1 by [0.1]." in lines
     assert "said nothing about any set: next_step_time" in lines
     assert "The chosen sets lead." in lines

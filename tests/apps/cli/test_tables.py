@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 import clench
 from clench.apps.cli.output import choice_tables, printing
+from clench.apps.cli.output.plan_table import print_plan
 from clench.models.hand.hand_report import describe_hand
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+APPS = Path(clench.__file__).parent / "apps"
 #: Heads of columns whose numbers count or name something.
 COUNTS = {
     *("", "id", "seed", "touching", "posture", "step", "poses", "share", "set"),
@@ -62,3 +65,25 @@ def test_every_column_of_numbers_names_its_unit(shown: list[Table]) -> None:
     assert len(numeric) >= 20
     missing = [(t, h) for t, h in numeric if h not in COUNTS and not re.search(r"\[.+\]$", h)]
     assert missing == []
+
+
+@pytest.mark.parametrize(("length", "text"), [(-1e-9, "0.000"), (-2e-6, "-0.002"), (0.0, "0.000")])
+def test_a_number_that_rounds_to_zero_has_no_minus(length: float, text: str) -> None:
+    assert printing._millimetres(length) == text
+
+
+def test_every_fixed_number_of_the_command_line_and_of_pages_is_written_without_a_minus_before_zero() -> None:
+    # The option "z" of the format takes the minus away.
+    files = [file for folder in ("cli", "pages") for file in (APPS / folder).rglob("*.py")]
+    assert len(files) > 20
+    found = [(file.name, text) for file in files for text in re.findall(r":\.\df\}", file.read_text(encoding="utf-8"))]
+    assert found == []
+
+
+def test_the_table_of_a_plan_names_the_confidence_as_its_document_does(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    document = {"hand": "h", "object": "o", "grasps": [], "rejected": {}, "closed": 0, "force_closed": 0}
+    print_plan({**document, "seconds": {"total": 0.0}}, "Found none.")
+    assert re.search(r"epsilon\W+confidence\W+links", capsys.readouterr().out)

@@ -187,7 +187,7 @@ def test_a_contact_between_the_planes_has_a_plane_of_its_own(
         assert [link.name for link in scene.open_links] == [link.name for link in scene.closed_links]
     alone = next(c for c in result.candidates if c.plane is not None)
     assert not between_planes(scenes.showing(alone)), "planes through the contacts of one set are not those of another"
-    assert plane_title(scenes.showing(alone).scene(0, 1), 1).startswith("plane 2 of ")
+    assert plane_title(scenes.showing(alone).scene(0, 1), 1).startswith("plane 1 of 0 to ")
 
 
 def test_contacts_share_a_plane_where_nobody_sees_the_difference(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import clench
 from clench.closing.collision.depths import hand_depths
 from clench.closing.collision.packed_object import pack_object
+from clench.execution.simulation import simulated_hand
 from clench.execution.simulation.convex_pieces import in_pieces
 from clench.execution.simulation.hold import Hold
-from clench.execution.simulation.piece_hold import hold_as_collided
+from clench.execution.simulation.piece_hold import NO_GRASP_ON_PIECES, hold_as_collided
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -61,3 +64,40 @@ def test_an_object_that_is_convex_is_tested_as_it_is() -> None:
     solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=pose, preshape="open"))
     report = hold_as_collided(solution, hand, ball, Hold(duration=0.2), plan_trajectory(solution, hand, obj=ball))
     assert report.as_given is None
+
+
+def test_the_touch_is_that_of_the_pieces_where_they_stop_the_hand(
+    grip: tuple[Hand, GraspObject, GraspSolution],
+) -> None:
+    hand, obj, solution = grip
+    steps = ({"thumb_proximal": 0.2},)
+    times: list[float] = []
+    simulated = clench.SimulatedHand(hand, obj, angle_tolerance=1e-4, on_step=lambda time, _: times.append(time))
+    report = clench.execute(replace(solution, next_steps=steps), simulated, speed=0.5)
+    assert "solved again on the object's convex pieces; as given, it was: Not reached: joint" in report.reason
+    assert all(joint.error == pytest.approx(0.0, abs=1e-4) for joint in report.joints.values())
+    assert len(report.next_steps) == 1
+    # The observer sees one motion, at the speed that was asked for.
+    assert times == sorted(times)
+    given = plan_trajectory(solution, hand, obj=obj, speed=0.5)
+    assert times[-1] > given.duration
+
+
+def test_the_reason_says_that_there_is_no_grasp_on_the_pieces(
+    grip: tuple[Hand, GraspObject, GraspSolution], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulated_hand, "solve_on_pieces", lambda *_: None)
+    hand, obj, solution = grip
+    report = clench.execute(solution, clench.SimulatedHand(hand, obj, angle_tolerance=1e-4))
+    assert not report.success
+    assert report.reason.startswith("Not reached: joint ")
+    assert report.reason.endswith(NO_GRASP_ON_PIECES)
+
+
+def test_the_hold_test_is_of_the_grasp_that_reached_the_touch(grip: tuple[Hand, GraspObject, GraspSolution]) -> None:
+    hand, obj, solution = grip
+    simulated = clench.SimulatedHand(hand, obj, angle_tolerance=1e-4, hold=Hold(duration=0.2))
+    report = clench.execute(solution, simulated)
+    assert report.hold is not None
+    assert report.hold.as_given is None
+    assert report.reason.count("as given, it was") == 1

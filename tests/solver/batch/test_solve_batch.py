@@ -16,6 +16,7 @@ from clench.solver.batch import batch_progress
 from clench.solver.batch.batch_solver import BatchSolver
 from clench.solver.batch.grasp_batch import GraspBatch
 from clench.solver.preshapes import posture_choice
+from clench.solver.preshapes.posture_choice import PostureSolver
 
 HANDS = {name: clench.Hand.load(name) for name in ("robonaut2", "patent15")}
 BOX = "box:x=0.05,y=0.06,z=0.08"
@@ -261,7 +262,8 @@ def test_a_solution_of_a_batch_needs_no_other_solve(monkeypatch, asked):
     hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     poses = clench.approach_poses(hand, obj, 5, 0)
     batch = clench.solve_batch(hand, obj, poses, clench.GraspCommand(hand_pose=poses[0], **asked))
-    expected = [plain(clench.solve(hand, obj, batch.command(i))) for i in range(5)]
+    expected = [plain(clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, **asked))) for pose in poses]
+    assert all(("preshapes" in document["choice"]) == (not asked) for document in expected)
     some = batch.taken(np.array([3, 1]))
     copied = pickle.loads(pickle.dumps(batch))
     monkeypatch.setattr("clench.solver.solve.solve", lambda *args: pytest.fail("solved again"))
@@ -269,8 +271,24 @@ def test_a_solution_of_a_batch_needs_no_other_solve(monkeypatch, asked):
     assert plain(batch.solution(-1)) == expected[-1]
     assert [plain(some.solution(i)) for i in range(2)] == [expected[3], expected[1]]
     # A copy has no answers of the kernels.
-    monkeypatch.setattr("clench.solver.solve.solve", lambda *args: "solved")
-    assert copied.solution(0) == "solved"
+    again, solved = batch.solution(1), []
+    monkeypatch.setattr("clench.solver.solve.solve", lambda *args: solved.append(args[2]) or again)
+    copied.solution(1)
+    assert [command.hand_pose for command in solved] == [poses[1]]
+
+
+def test_the_reason_for_a_posture_is_found_when_it_is_read(monkeypatch):
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
+    poses = clench.approach_poses(hand, obj, 2, 0)
+    batch = clench.solve_batch(hand, obj, poses, clench.GraspCommand(hand_pose=poses[0]))
+    compared = []
+    choose = PostureSolver.choose_one
+    monkeypatch.setattr(PostureSolver, "choose_one", lambda self: compared.append(self) or choose(self))
+    solution = batch.solution(1)
+    assert solution.joint_angles
+    assert compared == []
+    assert solution.choice["preshapes"]["chosen"] == batch.preshape[1]
+    assert len(compared) == 1
 
 
 def test_a_batch_keeps_answers_up_to_a_limit(monkeypatch):

@@ -20,6 +20,9 @@ PRINT_COMPLETION: Final = "--tyro-print-completion"
 SHELLS: Final = ("bash", "zsh")
 #: The option that may be given several times, as well as once with several values.
 _REPEATED: Final = "--obstacle"
+#: How the parser lists choices, and the option that it takes for a misspelt one.
+_CHOICES: Final = re.compile(r"Expected one of \(([^)]*?),?\)")
+_LIKELY: Final = re.compile(r"Perhaps you meant:?\W+(--[\w-]+)")
 #: Lines of a box that are indented so far are the help of an option.
 _HELP_INDENT = 8
 
@@ -36,14 +39,14 @@ def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, flo
 
 
 def parse_call(program: str, command: Callable[..., int], arguments: Sequence[str]) -> Callable[[], int]:
-    """Return the call that the arguments ask for; a wrong argument gives exit code 2, `--help` gives 0.
+    """Return the call that the arguments ask for; after `--help`, one that returns 0.
 
     Args:
         program: start of the usage line. command: function whose parameters are the options.
         arguments: those after the program's name.
 
     Raises:
-        CommandError: a wrong argument beside `--json`; without it, a box on standard error names the error.
+        CommandError: a wrong argument.
     """
     import tyro
 
@@ -54,12 +57,12 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
 
     box = io.StringIO()
     try:
-        with contextlib.redirect_stderr(box) if "--json" in arguments else contextlib.nullcontext():
+        with contextlib.redirect_stderr(box):
             return tyro.cli(call, prog=program, args=_gathered(arguments), config=options_style())
     except SystemExit as finished:
         code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
-        if code and "--json" in arguments:
-            raise CommandError(f"{program}: {_sentence(box.getvalue())}") from None
+        if code:
+            raise CommandError(f"{program}: {_sentence(box.getvalue())} Options: {program} --help.") from None
         return lambda: code
 
 
@@ -127,4 +130,7 @@ def _sentence(box: str) -> str:
     start = 0 if box.startswith("╭") or not rules else rules[0] + 1
     first = itertools.takewhile(lambda line: line and not set(line.strip()) <= set("─-"), lines[start:])
     text = " ".join(line.strip() for line in first if not line.startswith(" " * _HELP_INDENT))
-    return (text or "expected other arguments, see --help").rstrip(".") + "."
+    text = _CHOICES.sub(lambda found: f"Expected one of {found[1].replace(chr(39), '')}", text)
+    likely = _LIKELY.search(box)
+    meant = f" Did you mean '{likely[1]}'?" if likely else ""
+    return (text[:1].upper() + text[1:] or "Expected other arguments").rstrip(".") + "." + meant

@@ -62,8 +62,8 @@ def contact_table(solution: GraspSolution) -> str:
     heads = ("", "finger", "link", "kind", "gap [m]", "x, y, z [mm]", "normal")
     rows = []
     for k, c in enumerate(solution.contacts):
-        place = ", ".join(f"{1e3 * x:.1f}" for x in c.position)
-        normal = ", ".join(f"{x:.2f}" for x in c.normal)
+        place = ", ".join(f"{1e3 * x:z.1f}" for x in c.position)
+        normal = ", ".join(f"{x:z.2f}" for x in c.normal)
         kind = f"{c.kind.value}{', opened again' if c.passed else ''}"
         cells = (k + 1, c.finger, c.link, kind, f"{c.gap:.1e}", place, normal)
         rows.append(f'<tr data-contact="{k}">{"".join(f"<td>{text(cell)}</td>" for cell in cells)}</tr>')
@@ -76,8 +76,8 @@ def hand_facts(hand: Hand) -> str:
     for finger in hand.fingers:
         for j in finger.joints:
             joint = hand.joints[j]
-            span = " to ".join(f"{np.rad2deg(x):.0f}" for x in (joint.lower, joint.upper))
-            rows.append((finger.name, joint.name, joint.role.value, f"{np.rad2deg(joint.open_value):.0f}", span))
+            span = " to ".join(f"{np.rad2deg(x):z.0f}" for x in (joint.lower, joint.upper))
+            rows.append((finger.name, joint.name, joint.role.value, f"{np.rad2deg(joint.open_value):z.0f}", span))
     closing = sum(row[2] == "closing" for row in rows)
     numbers = (("fingers", len(hand.fingers)), ("joints", len(hand.joints)), ("closing joints", closing))
     return "\n".join(
@@ -96,24 +96,25 @@ def _numbers(solution: GraspSolution, planned: PlannedGrasp | None) -> list[tupl
     found: list[tuple[str, Any]] = []
     if planned is not None:
         found += [("kind", planned.kind.value), ("preshape", planned.preshape)]
-        found += [("epsilon", f"{planned.epsilon:.4f}"), ("score", f"{planned.score:.4f}")]
+        found += [("epsilon", f"{planned.epsilon:z.4f}"), ("score", f"{planned.score:z.4f}")]
         if planned.confidence is not None:
-            found.append(("held in simulation", f"{100 * planned.confidence:.0f} % of grasps with such a score"))
+            share = f"{100 * planned.confidence:z.0f} %"
+            found.append(("confidence", f"{share} of grasps with such a score held in simulation"))
     elif solution.quality is not None:
-        found.append(("epsilon", f"{solution.quality['epsilon']:.4f}"))
+        found.append(("epsilon", f"{solution.quality['epsilon']:z.4f}"))
     gaps = [c.gap for c in solution.contacts if not c.passed]
     found.append(("contacts", len(gaps)))
     if gaps:
         found.append(("largest gap", f"{max(gaps):.1e} m"))
     if solution.max_penetration is not None:
-        found.append(("largest penetration", f"{1e3 * solution.max_penetration:.4f} mm"))
-    place = ", ".join(f"{1e3 * x:.1f}" for x in solution.hand_pose.position)
-    turn = ", ".join(f"{x:.4f}" for x in solution.hand_pose.wxyz)
+        found.append(("largest penetration", f"{1e3 * solution.max_penetration:z.4f} mm"))
+    place = ", ".join(f"{1e3 * x:z.1f}" for x in solution.hand_pose.position)
+    turn = ", ".join(f"{x:z.4f}" for x in solution.hand_pose.wxyz)
     found += [("palm at", f"[{place}] mm"), ("palm turned", f"[{turn}] wxyz")]
     geometry = f"hand {solution.collision_source}, object {solution.object_collision_source}"
     found.append(("geometry", geometry))
     if "total" in solution.timing:
-        found.append(("computed in", f"{1e3 * solution.timing['total']:.2f} ms"))
+        found.append(("computed in", f"{1e3 * solution.timing['total']:z.2f} ms"))
     return found
 
 
@@ -136,7 +137,7 @@ def _squeeze(solution: GraspSolution) -> list[str]:
     if not squeeze.get("text"):
         return []
     rows = [
-        (contact["finger"], contact["link"], f"{float(np.linalg.norm(force)):.2f}")
+        (contact["finger"], contact["link"], f"{float(np.linalg.norm(force)):z.2f}")
         for contact, force in zip(squeeze.get("contacts", ()), squeeze.get("forces", ()), strict=False)
     ]
     table = [_table(("finger", "link", "force [N]"), rows)] if rows else []
@@ -145,7 +146,7 @@ def _squeeze(solution: GraspSolution) -> list[str]:
 
 def _joints(solution: GraspSolution) -> str:
     rows = (
-        (name, f"{np.rad2deg(solution.open_angles.get(name, np.nan)):.2f}", f"{np.rad2deg(angle):.2f}")
+        (name, f"{np.rad2deg(solution.open_angles.get(name, np.nan)):z.2f}", f"{np.rad2deg(angle):z.2f}")
         for name, angle in solution.joint_angles.items()
     )
     return _table(("joint", "open [deg]", "closed [deg]"), rows)

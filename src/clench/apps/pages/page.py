@@ -150,7 +150,7 @@ def _shown(
     if way is None and planned is None:
         way, told = _planned_way(solution, hand, obj)
     if way is not None:
-        told = f"The animation goes along the planned path, which takes {way.duration:.2f} s."
+        told = f"The animation goes along the planned path, which takes {way.duration:z.2f} s."
     postures = _postures(hand, solution, way, frames)
     duration = _CLOSING if way is None else way.duration
     poses = []
@@ -160,7 +160,7 @@ def _shown(
     marks = tuple(Mark(c.position, c.normal) for c in solution.contacts)
     label, caption = solution.status.value.replace("_", " "), ""
     if planned is not None:
-        label, caption = planned.kind.value, f"epsilon {planned.epsilon:.3f}"
+        label, caption = planned.kind.value, f"epsilon {planned.epsilon:z.3f}"
     motion = Motion(np.array(poses).reshape(len(postures), -1, 4, 4), duration)
     return Shown(label, caption, motion, marks, solution_facts(solution, told, planned))
 

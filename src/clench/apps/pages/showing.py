@@ -53,7 +53,7 @@ def card(value: object) -> str | None:
     if isinstance(value, GraspSolution):
         return _grasps_card([value], _solution_words(value))
     if isinstance(value, PlannedGrasp):
-        words = f"<div>{text(value.kind.value)}, preshape {text(value.preshape)}, epsilon {value.epsilon:.3f}</div>"
+        words = f"<div>{text(value.kind.value)}, preshape {text(value.preshape)}, epsilon {value.epsilon:z.3f}</div>"
         return _grasps_card([value.solution], _solution_words(value.solution) + words)
     if isinstance(value, GraspPlan):
         return _plan_card(value)
@@ -167,7 +167,7 @@ def _grasps_card(solutions: Sequence[GraspSolution], words: str, size: tuple[int
 
 
 def _plan_card(plan: GraspPlan) -> str:
-    listed = [f"{k}: {text(g.kind.value)} {g.epsilon:.3f}" for k, g in enumerate(plan, start=1)]
+    listed = [f"{k}: {text(g.kind.value)} {g.epsilon:z.3f}" for k, g in enumerate(plan, start=1)]
     more = "" if len(listed) <= 8 else f" and {len(listed) - 8} more"
     words = f"<div><b>{text(plan.hand)} on {text(plan.object)}</b></div><div>{text(plan.text)}</div>"
     if not len(plan):

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from .grasp_posture import BASE, GraspPosture
 from .isaac_grasp import read_isaac_grasp, write_isaac_grasp
 from .moveit_grasp import read_moveit_grasp, write_moveit_grasp
 from .outgoing import ExportSettings, outgoing
+from .scene_files import ENDINGS as SCENES
 
 
 class GraspFormat(StrEnum):
@@ -37,7 +39,9 @@ class GraspFormat(StrEnum):
     """JSON in the shape of moveit_msgs/Grasp: many grasps"""
 
 
-_ENDINGS = {
+#: Endings of files that hold a whole dataset; `clench.dataset.export` writes them.
+DATASETS: Final = (".h5", ".hdf5")
+_ENDINGS: Final = {
     ".yaml": GraspFormat.ISAAC_GRASP,
     ".yml": GraspFormat.ISAAC_GRASP,
     ".npy": GraspFormat.DEXGRASPBENCH,
@@ -180,5 +184,6 @@ def format_of(path: str | Path, given: GraspFormat | str | None = None) -> Grasp
         return GraspFormat.DEXGRASPBENCH
     ending = Path(path).suffix.lower()
     if ending not in _ENDINGS:
-        raise FileError(path, f"the ending names no format; expected {', '.join(_ENDINGS)}, or a format by name.")
+        endings = [*_ENDINGS, *(f"{own} (a scene)" for own in SCENES), *(f"{own} (of a dataset)" for own in DATASETS)]
+        raise FileError(path, f"the ending names no format; expected {', '.join(endings)}, or a format by name.")
     return _ENDINGS[ending]

@@ -1,10 +1,11 @@
-"""The hold test of a mesh: the simulation collides convex pieces, so the grasp is solved again on them first."""
+"""Grasps of meshes that are not convex: the simulation collides convex pieces, and the command is solved on them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
+from clench.core.exceptions import MotionError
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.models.hand.hand import Hand
@@ -17,6 +18,20 @@ from .convex_pieces import in_pieces
 from .hold import Hold, HoldReport
 from .pulling import hold_and_pull
 from .simulated_actuators import Drive
+
+#: What is said if the command has no grasp on the pieces.
+NO_GRASP_ON_PIECES: Final = (
+    "The simulation collides convex pieces, which lie a little off the mesh, and this command has no grasp on them."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class CollidedGrasp:
+    """Name what the simulation carries out: a solution, the object at its pose, and the motion of the hand."""
+
+    solution: GraspSolution
+    obj: GraspObject
+    trajectory: Trajectory
 
 
 def hold_as_collided(
@@ -35,24 +50,49 @@ def hold_as_collided(
         HandError, ObjectError, CommandError: see `hold_and_pull`.
     """
     show = bool(options.get("show_progress", False))
-    collided = _collided(obj, show)
+    collided = as_collided(obj, show)
     if collided is None:
         return hold_and_pull(solution, hand, obj, hold, trajectory, **options)
-    again = solve(hand, collided, command_of(solution, hand))
-    if again.status is not SolutionStatus.GRASP:
+    again = solve_on_pieces(solution, hand, collided, trajectory)
+    if again is None:
         report = hold_and_pull(solution, hand, obj, hold, trajectory, **options)
-        note = "Solved again on the convex pieces that the simulation collides, it is no grasp: this is of the mesh's."
-        return replace(report, reason=f"{report.reason} {note}")
+        return replace(report, reason=f"{report.reason} {NO_GRASP_ON_PIECES} This is of the grasp as given.")
     drive = options.get("drive", Drive.SERVO)
     given = hold_and_pull(solution, hand, obj, hold, trajectory, show_progress=show, drive=drive)
-    way = plan_trajectory(again, hand, obj=collided)
-    report = hold_and_pull(again, hand, collided, hold, way, **options)
-    note = f"This is of the grasp solved again on the object's convex pieces; as given, it was: {given.reason}"
-    return replace(report, reason=f"{report.reason} {note}", as_given=given)
+    report = hold_and_pull(again.solution, hand, collided, hold, again.trajectory, **options)
+    return replace(report, reason=f"{report.reason} {told_as_given(given.reason)}", as_given=given)
 
 
-def _collided(obj: GraspObject, show_progress: bool) -> GraspObject | None:
-    """Return the object in the pieces that the simulation collides, None where these are its own shapes."""
+def told_as_given(reason: str) -> str:
+    """Return the sentence beside a result of a grasp on the pieces: the result of the grasp as given."""
+    return f"This is of the grasp solved again on the object's convex pieces; as given, it was: {reason}"
+
+
+def solve_on_pieces(
+    solution: GraspSolution, hand: Hand, collided: GraspObject, trajectory: Trajectory
+) -> CollidedGrasp | None:
+    """Solve the command of a solution again on convex pieces, and plan its motion at the speed of a trajectory.
+
+    Args:
+        solution: on the mesh. hand: the hand. collided: the object, see `as_collided`. trajectory: of the solution.
+
+    Returns:
+        the grasp on the pieces, with the next steps of the solution; None if the command has no grasp there, or the
+            grasp has no free path.
+    """
+    again = solve(hand, collided, command_of(solution, hand))
+    if again.status is not SolutionStatus.GRASP:
+        return None
+    again = replace(again, next_steps=solution.next_steps)
+    try:
+        way = plan_trajectory(again, hand, obj=collided, speed=trajectory.speed, acceleration=trajectory.acceleration)
+    except MotionError:
+        return None
+    return CollidedGrasp(again, collided, way)
+
+
+def as_collided(obj: GraspObject, show_progress: bool) -> GraspObject | None:
+    """Return the object in the pieces that the simulation collides; None if these are its own shapes."""
     graspable = [body for body in obj.bodies if body.role is BodyRole.GRASPABLE]
     if not any(shape.kind is ShapeKind.MESH for body in graspable for shape in body.shapes):
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -32,7 +32,14 @@ from clench.solver.solution import Contact, FingerStatus, GraspSolution
 from .filming import Film
 from .hold import Hold, HoldReport
 from .mujoco_scene import TIMESTEP, Scene, body_pose, build_scene
-from .piece_hold import hold_as_collided
+from .piece_hold import (
+    NO_GRASP_ON_PIECES,
+    CollidedGrasp,
+    as_collided,
+    hold_as_collided,
+    solve_on_pieces,
+    told_as_given,
+)
 from .simulated_actuators import Drive, check_drive, sentences
 from .stepping import Stepper
 from .touch_watch import TouchWatch
@@ -105,16 +112,81 @@ class SimulatedHand:
                 the trajectory does not fit the hand.
         """
         check_for_hand(trajectory, solution, self.hand)
-        computed = posture(solution.joint_angles, self.hand, "joint_angles")
-        obj = self.obj.posed(solution.object_pose)
-        start = trajectory.positions[0]
-        scene = build_scene(
-            self.hand, obj, solution.hand_pose, start, drive=self.drive, show_progress=self.show_progress
+        grasp = CollidedGrasp(solution, self.obj.posed(solution.object_pose), trajectory)
+        touch = self._close_as_collided(grasp)
+        grasp, success, reason = touch.grasp, touch.success, touch.reason
+        held: HoldReport | None = None
+        steps: tuple[NextStepReached, ...] = ()
+        if success and self.hold is not None:
+            held, steps = self._held(grasp, self.hold)
+            success, reason = held.held, f"{reason} {held.reason}"
+        elif success and solution.next_steps:
+            stepper = Stepper(grasp.solution, self.hand, grasp.trajectory.pace, self.angle_tolerance)
+            told = grasp.trajectory.positions[-1]
+            steps = stepper.in_place(touch.scene, touch.data, told, touch.watch.film, touch.samples.look)
+        touch.samples.end(touch.data)
+        if success:
+            success, reason = judge_steps(success, reason, steps)
+        return ExecutionReport(
+            actuator=self.name,
+            success=success,
+            reason=reason,
+            joints=touch.joints,
+            contacts=touch.contacts,
+            touched_links=touch.touched_links,
+            first_touch=touch.watch.first,
+            duration=float(touch.data.time),
+            largest_angle_error=max((abs(joint.error) for joint in touch.joints.values()), default=0.0),
+            angle_tolerance=self.angle_tolerance,
+            contact_tolerance=self.contact_tolerance,
+            notes=(
+                *_notes(touch.scene, solution),
+                *sentences(touch.scene.drives.driven, self.drive),
+                *self._notes_on_hold(held),
+                *notes_on_steps(solution, steps),
+            ),
+            driven_by=touch.scene.drives.driven.by,
+            history=touch.samples.history(),
+            hold=held,
+            next_steps=steps,
         )
-        watch = TouchWatch(scene, self.hand, self.film if self.hold is None else None)
-        samples = _Samples(scene, trajectory.joints, self.on_step)
-        data = self._run(scene, trajectory, watch, samples)
-        reached = np.array(data.qpos[scene.qpos])
+
+    def _close_as_collided(self, grasp: CollidedGrasp) -> _Touch:
+        """Close the hand; where convex pieces of the object stop it, close it as solved again on these pieces."""
+        scene = self._scene(grasp)
+        if not scene.approximated:
+            return self._close(scene, grasp, watched=True)
+        touch = given = self._close(scene, grasp, watched=False)
+        collided = None if given.success else as_collided(grasp.obj, self.show_progress)
+        if collided is not None:
+            again = solve_on_pieces(grasp.solution, self.hand, collided, grasp.trajectory)
+            touch = given if again is None else self._close(self._scene(again), again, watched=False)
+        if self.film is not None or self.on_step is not None:
+            touch = self._close(touch.scene, touch.grasp, watched=True)
+        if collided is None:
+            return touch
+        more = NO_GRASP_ON_PIECES if touch.grasp is grasp else told_as_given(given.reason)
+        return replace(touch, reason=f"{touch.reason} {more}")
+
+    def _scene(self, grasp: CollidedGrasp) -> Scene:
+        start = grasp.trajectory.positions[0]
+        return build_scene(
+            self.hand,
+            grasp.obj,
+            grasp.solution.hand_pose,
+            start,
+            drive=self.drive,
+            show_progress=self.show_progress,
+        )
+
+    def _close(self, scene: Scene, grasp: CollidedGrasp, watched: bool) -> _Touch:
+        """Simulate the motion to the touch, and compare with the solution; `watched` by the film and the observer."""
+        solution = grasp.solution
+        computed = posture(solution.joint_angles, self.hand, "joint_angles")
+        watch = TouchWatch(scene, self.hand, self.film if watched and self.hold is None else None)
+        samples = _Samples(scene, grasp.trajectory.joints, self.on_step if watched else None)
+        data = self._run(scene, grasp.trajectory, watch, samples)
+        reached = data.qpos[scene.qpos]
         joints = {
             name: JointReached(float(c), float(r))
             for name, c, r in zip(self.hand.joint_names, computed, reached, strict=True)
@@ -128,54 +200,18 @@ class SimulatedHand:
             for i, link in enumerate(self.hand.links)
             if nearest(scene, data, i, self.contact_tolerance)[0] <= self.contact_tolerance
         )
-        error = float(np.abs(reached - computed).max(initial=0.0))
         success, reason = self._judge(solution, joints, contacts, partial(simulated_blocker, scene, data, self.hand))
-        held: HoldReport | None = None
-        steps: tuple[NextStepReached, ...] = ()
-        if success and self.hold is not None:
-            held, steps = self._held(solution, obj, trajectory, self.hold)
-            success, reason = held.held, f"{reason} {held.reason}"
-        elif success and solution.next_steps:
-            stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
-            steps = stepper.in_place(scene, data, trajectory.positions[-1], watch.film, samples.look)
-        samples.end(data)
-        if success:
-            success, reason = judge_steps(success, reason, steps)
-        return ExecutionReport(
-            actuator=self.name,
-            success=success,
-            reason=reason,
-            joints=joints,
-            contacts=contacts,
-            touched_links=touched,
-            first_touch=watch.first,
-            duration=float(data.time),
-            largest_angle_error=error,
-            angle_tolerance=self.angle_tolerance,
-            contact_tolerance=self.contact_tolerance,
-            notes=(
-                *_notes(scene, solution),
-                *sentences(scene.drives.driven, self.drive),
-                *self._notes_on_hold(held),
-                *notes_on_steps(solution, steps),
-            ),
-            driven_by=scene.drives.driven.by,
-            history=samples.history(),
-            hold=held,
-            next_steps=steps,
-        )
+        return _Touch(grasp, scene, data, watch, samples, joints, contacts, touched, success, reason)
 
-    def _held(
-        self, solution: GraspSolution, obj: GraspObject, trajectory: Trajectory, hold: Hold
-    ) -> tuple[HoldReport, tuple[NextStepReached, ...]]:
+    def _held(self, grasp: CollidedGrasp, hold: Hold) -> tuple[HoldReport, tuple[NextStepReached, ...]]:
         steps: list[NextStepReached] = []
-        stepper = Stepper(solution, self.hand, trajectory.pace, self.angle_tolerance)
+        stepper = Stepper(grasp.solution, self.hand, grasp.trajectory.pace, self.angle_tolerance)
         report = hold_as_collided(
-            solution,
+            grasp.solution,
             self.hand,
-            obj,
+            grasp.obj,
             hold,
-            trajectory,
+            grasp.trajectory,
             drive=self.drive,
             film=self.film,
             show_progress=self.show_progress,
@@ -253,6 +289,29 @@ class SimulatedHand:
         if absent:
             return False, f"Finger '{absent[0]}' does not touch; tolerance {self.contact_tolerance:g} m."
         return True, f"Every joint is within {error:.2g} rad of its computed angle, and {len(wanted)} fingers touch."
+
+
+@dataclass(frozen=True, eq=False)
+class _Touch:
+    """The outcome of closing the hand around an object that is held in place.
+
+    Args:
+        grasp: what was carried out. scene, data: the simulation, and its state at the touch.
+        watch, samples: what was seen on the way.
+        joints: by name. contacts: those of the solution. touched_links: at the end.
+        success: the hand reached the grasp. reason: one sentence.
+    """
+
+    grasp: CollidedGrasp
+    scene: Scene
+    data: Any
+    watch: TouchWatch
+    samples: _Samples
+    joints: dict[str, JointReached]
+    contacts: tuple[ContactReached, ...]
+    touched_links: tuple[str, ...]
+    success: bool
+    reason: str
 
 
 @dataclass

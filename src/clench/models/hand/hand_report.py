@@ -216,4 +216,4 @@ def _joint_row(joint: JointReport) -> tuple[str, str, str, str, str, str, str]:
 
 
 def _vector(values: tuple[float, ...]) -> str:
-    return "[" + ", ".join(f"{v:.3f}" for v in values) + "]"
+    return "[" + ", ".join(f"{v:z.3f}" for v in values) + "]"

@@ -137,7 +137,10 @@ def mesh_arrays(vertices: ArrayLike, triangles: ArrayLike, name: str) -> tuple[F
         raise ObjectError(f"{name}: expected whole numbers as vertex indices of triangles.")
     outside = (faces < 0) | (faces >= len(points))
     if outside.any():
-        raise ObjectError(f"{name}: a triangle names vertex {faces[outside][0]}, but there are {len(points)} vertices.")
+        first = int(np.flatnonzero(outside.any(axis=1))[0])
+        raise ObjectError(
+            f"{name}: triangle {first} names vertex {faces[outside][0]}, but there are {len(points)} vertices."
+        )
     return points, faces
 
 

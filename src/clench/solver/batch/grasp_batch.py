@@ -193,14 +193,20 @@ class GraspBatch(LateFields):
     def solution(self, i: int) -> GraspSolution:
         """Return the whole answer for one pose, as `clench.solve` gives it for the command of the pose; see `command`.
 
+        If clench chose the posture, `choice["preshapes"]` has the reason, as of `clench.solve`. The postures are
+        compared again at this pose when the reason is first read.
+
         Of about two thousand poses, what the kernels found stays with the batch. For others, and for a batch from a
         file, the pose is solved again.
         """
+        from clench.solver.preshapes.posture_choice import with_reason
         from clench.solver.solve import solve
 
-        kept = self._kept_answers
+        asked, kept = self.question, self._kept_answers
         found = kept.solution(i) if kept is not None and -len(self) <= i < len(self) else None
-        return found if found is not None else solve(self.question.hand, self.question.obj, self.command(i))
+        if found is None:
+            found = solve(asked.hand, asked.obj, self.command(i))
+        return with_reason(found, asked.hand, asked.obj, asked.command, asked.options) if asked.options else found
 
     def keeping(self, kept: KeptAnswers | None) -> GraspBatch:
         """Return the same batch with answers from which `solution` reads; copies and files do not have them."""

@@ -76,6 +76,22 @@ def with_posture(solution: GraspSolution, said: Mapping[str, Any], seconds: floa
     )
 
 
+def with_reason(
+    solution: GraspSolution, hand: Hand, obj: GraspObject, command: GraspCommand, options: tuple[PostureOption, ...]
+) -> GraspSolution:
+    """Return a solution of a batch whose `choice` gives the reason for the posture, found when it is first read.
+
+    Args:
+        solution: from the best of the options at its pose. hand, obj, command, options: see `PostureSolver`.
+    """
+    there = command.at(solution.hand_pose, solution.object_pose)
+
+    def reason() -> Mapping[str, Any]:
+        return PostureSolver(hand, obj, there, options).choose_one()[1]
+
+    return with_posture(solution, DeferredMapping(reason), 0.0)
+
+
 class PostureSolver:
     """A solver for one command at many poses, from the best of several postures at each.
 

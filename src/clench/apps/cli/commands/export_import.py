@@ -65,13 +65,13 @@ def export(
     from clench.apps.cli.output.printing import print_exported
     from clench.apps.cli.output.results import print_json
     from clench.core.files.json_files import check_folder, check_writable
-    from clench.execution.formats.exchange import format_of
+    from clench.execution.formats.exchange import DATASETS, format_of
     from clench.execution.formats.scene_files import is_scene_file
 
     if len(solutions) == 1 and (solutions[0].is_dir() or solutions[0].suffix == ".parquet"):
         unused = (hand, object, hand_file, palm, scale, root, name, stiffness)
         return _export_dataset(solutions[0], out, format, any(unused) or hold or bool(mass or friction), json)
-    if format == "hdf5" or out.suffix == ".h5":
+    if format == "hdf5" or out.suffix in DATASETS:
         raise CommandError("hdf5: is for datasets; expected the folder of one, or its grasps.parquet.")
     if format is None and is_scene_file(out):
         if any((root, name, stiffness, hold, mass, friction)):
@@ -141,12 +141,13 @@ def _export_dataset(source: Path, out: Path, format: AnyFormat | None, more: boo
     import clench.dataset
     from clench.apps.cli.output.printing import print_files
     from clench.apps.cli.output.results import print_json
+    from clench.execution.formats.exchange import DATASETS
 
     if more:
         raise CommandError(
             "export: a dataset is written as it was computed; leave out all options but --out, --format."
         )
-    endings = {".h5": "hdf5", ".hdf5": "hdf5", ".yaml": "isaac_grasp", ".yml": "isaac_grasp", "": "dexgraspbench"}
+    endings = {**dict.fromkeys(DATASETS, "hdf5"), ".yaml": "isaac_grasp", ".yml": "isaac_grasp", "": "dexgraspbench"}
     if format is None and out.suffix not in endings:
         known = ", ".join(ending for ending in endings if ending)
         raise CommandError(f"--out {out}: expected a folder, or a file that ends with {known}; or name the --format.")

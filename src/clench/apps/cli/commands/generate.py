@@ -192,7 +192,7 @@ def _progress(units: int, show: bool) -> Iterator[Told]:
             rows, closed = rows + record.ok, closed + record.closed
             force_closed += record.force_closed
             rate = rows / max(time.monotonic() - began, 1e-9)
-            share = f", yield {100 * force_closed / closed:.0f} %" if closed else ""
+            share = f", yield {100 * force_closed / closed:z.0f} %" if closed else ""
             progress.update(task, advance=1, description=f"{rows} grasps, {rate:.3g} per second{share}")
 
         yield tell
@@ -218,5 +218,5 @@ def _say(report: GenerateReport) -> None:
 
 
 def _say_merged(merged: Merged) -> None:
-    size = f"{merged.bytes / merged.rows:.0f} bytes each" if merged.rows else "empty"
+    size = f"{merged.bytes / merged.rows:z.0f} bytes each" if merged.rows else "empty"
     sys.stdout.write(f"Merged {merged.rows} rows, {merged.ok} of them grasps, {size}. SHA-256 {merged.sha256}\n")

@@ -185,8 +185,8 @@ def _checked_forces(mass: tuple[float, ...], friction: tuple[float, ...], criter
 def _tell_planned(grasp: PlannedGrasp | None) -> None:
     """Say which grasp was planned, where no command was given."""
     if grasp is not None:
-        place = ", ".join(f"{1e3 * x:.0f}" for x in grasp.hand_pose.position)
-        said = f"preshape {grasp.preshape}, palm at [{place}] mm, epsilon {grasp.epsilon:.3f}"
+        place = ", ".join(f"{1e3 * x:z.0f}" for x in grasp.hand_pose.position)
+        said = f"preshape {grasp.preshape}, palm at [{place}] mm, epsilon {grasp.epsilon:z.3f}"
         sys.stdout.write(f"without a command, one grasp was planned: {said}; 'clench plan' finds more\n")
 
 

@@ -81,9 +81,9 @@ def _finger_table(finger: FingerResult, choice: Mapping[str, Any]) -> Table:
         mark = "*" if i == finger.chosen else "2" if i == said["runner_up"] else ""
         mark += "P" if i in said["pareto"] else ""
         mark += "x" if candidate.feasible is False else ""
-        where = "full" if candidate.plane is None else f"plane {candidate.plane + 1}"
+        where = "full" if candidate.plane is None else f"plane {candidate.plane}"
         scores = [_score(candidate, name) for name in names]
-        row = (mark, where, str(candidate.posture), *scores, f"{said['totals'][i]:.4f}", candidate.status.value)
+        row = (mark, where, str(candidate.posture), *scores, f"{said['totals'][i]:z.4f}", candidate.status.value)
         result.add_row(*map(plain, row))
     return result
 
@@ -92,7 +92,7 @@ def _orders_table(orders: Mapping[str, Any]) -> Table:
     """List the closing orders that were solved, or why they could not be."""
     result = table_with("closing orders (* chosen)", "", "order", "status", "sum [-]")
     for name, said in orders["compared"].items():
-        status, total = (said["refused"], "") if "refused" in said else (said["status"], f"{said['total']:.4f}")
+        status, total = (said["refused"], "") if "refused" in said else (said["status"], f"{said['total']:z.4f}")
         result.add_row(*map(plain, ("*" if name == orders["chosen"] else "", name, status, total)))
     return result
 
@@ -103,7 +103,7 @@ def _front_table(front: Sequence[HandSets], choice: Mapping[str, Any]) -> Table:
     result = table_with(title, "", *front[0].sets, *_with_units(front[0].scores, choice), "sum [-]")
     for entry in front[:_MOST_ROWS]:
         scores = [f"{v:.4g}" for v in entry.scores.values()]
-        row = ("*" if entry.chosen else "", *map(str, entry.sets.values()), *scores, f"{entry.total:.4f}")
+        row = ("*" if entry.chosen else "", *map(str, entry.sets.values()), *scores, f"{entry.total:z.4f}")
         result.add_row(*map(plain, row))
     return result
 

@@ -11,18 +11,18 @@ from .tables import console_out, plain, table_with
 def print_plan(document: Mapping[str, Any], text: str) -> None:
     """Print planned grasps, best first, and the fate of the other proposals; see `clench plan --json`."""
     console = console_out()
-    columns = ["", "kind", "preshape", "palm [mm]", "epsilon", "holds", "links", "torque [Nm]"]
+    columns = ["", "kind", "preshape", "palm [mm]", "epsilon", "confidence", "links", "torque [Nm]"]
     tried = any("hold" in grasp for grasp in document["grasps"])
     table = table_with(f"{document['hand']} on {document['object']}", *columns, *(["held"] if tried else []))
     for number, grasp in enumerate(document["grasps"], start=1):
         solution = grasp["solution"]
-        place = " ".join(f"{1e3 * x:.0f}" for x in solution["hand_pose"]["position"])
+        place = " ".join(f"{1e3 * x:z.0f}" for x in solution["hand_pose"]["position"])
         links = sorted({contact["link"] for contact in solution["contacts"] if not contact["passed"]})
         torque = max((abs(t) for t in solution["squeeze"]["torques"].values()), default=0.0)
-        row = [str(number), grasp["kind"], grasp["preshape"], place, f"{grasp['epsilon']:.3f}"]
+        row = [str(number), grasp["kind"], grasp["preshape"], place, f"{grasp['epsilon']:z.3f}"]
         sure = grasp["confidence"]
-        row += ["" if sure is None else f"{100 * sure:.0f} %", str(len(links))]
-        row += [f"{torque:.3f}", *(["yes" if grasp["hold"]["held"] else "no"] if tried else [])]
+        row += ["" if sure is None else f"{100 * sure:z.0f} %", str(len(links))]
+        row += [f"{torque:z.3f}", *(["yes" if grasp["hold"]["held"] else "no"] if tried else [])]
         table.add_row(*map(plain, row))
     console.print(table)
     console.print(plain(text))
@@ -31,4 +31,4 @@ def print_plan(document: Mapping[str, Any], text: str) -> None:
         most = sorted(fallen.items(), key=lambda item: -item[1])
         console.print("rejected: " + plain(", ".join(f"{n} {reason}" for reason, n in most)), soft_wrap=True)
     closed, closure = document["closed"], document["force_closed"]
-    console.print(f"{closed} closed, {closure} of them resist every wrench; {document['seconds']['total']:.2f} s")
+    console.print(f"{closed} closed, {closure} of them resist every wrench; {document['seconds']['total']:z.2f} s")

@@ -24,9 +24,9 @@ def print_preshapes(preshapes: Sequence[Preshape]) -> None:
         if said["quality"] is None:
             table.add_row(plain(said["name"]), "", "", "none")
             continue
-        low, high = (f"{1e3 * length:.0f}" for length in said["aperture_range"])
-        best = f"{1e3 * said['aperture']:.0f}"
-        table.add_row(plain(said["name"]), f"{low} to {high}", best, f"{said['quality']:.2f}")
+        low, high = (f"{1e3 * length:z.0f}" for length in said["aperture_range"])
+        best = f"{1e3 * said['aperture']:z.0f}"
+        table.add_row(plain(said["name"]), f"{low} to {high}", best, f"{said['quality']:z.2f}")
     console.print(table)
 
 
@@ -43,7 +43,7 @@ def print_posture_choice(solution: GraspSolution) -> None:
     marks = {said["chosen"]: "*", said["runner_up"]: "2"}
     for name, each in compared.items():
         scores = [f"{each['scores'][key]:.4g}" if key in each["scores"] else "" for key in names]
-        row = (marks.get(name, ""), name, each["status"], *scores, f"{each['total']:.4f}")
+        row = (marks.get(name, ""), name, each["status"], *scores, f"{each['total']:z.4f}")
         table.add_row(*map(plain, row))
     console.print(table)
     console.print(plain(said["text"]), soft_wrap=True)

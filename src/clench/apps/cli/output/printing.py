@@ -39,12 +39,12 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
                 f"{plain(name)} ({plain(finger.cause['code'])}): {plain(finger.cause['text'])}", soft_wrap=True
             )
     if solution.max_penetration is not None:
-        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:.4f} mm")
+        console.print(f"largest penetration of the whole hand: {solution.max_penetration * 1e3:z.4f} mm")
     if solution.certificate is not None:
         word = "certified" if solution.certified else "not certified"
         console.print(f"{word}: {plain(solution.certificate['text'])}")
     if "total" in solution.timing:
-        console.print(f"computed in {solution.timing['total'] * 1e3:.2f} ms")
+        console.print(f"computed in {solution.timing['total'] * 1e3:z.2f} ms")
     _sentences(console, "violation", solution.violations())
     _sentences(console, "warning", warnings)
     print_files(files)
@@ -57,15 +57,15 @@ def print_forces(solution: GraspSolution) -> None:
     effort = quality["actuation"]
     closure = "force closure" if quality["force_closure"] else "no force closure"
     console.print(
-        f"{closure}: epsilon {quality['epsilon']:.4f} ({quality['norm']}, {quality['edges']} edges, length scale "
-        f"{quality['length_scale'] * 1e3:.1f} mm, {quality['contact_model']} contacts), volume {quality['volume']:.4g}"
+        f"{closure}: epsilon {quality['epsilon']:z.4f} ({quality['norm']}, {quality['edges']} edges, length scale "
+        f"{quality['length_scale'] * 1e3:z.1f} mm, {quality['contact_model']} contacts), volume {quality['volume']:.4g}"
     )
     if effort["worst_torque"] is None:
         console.print(f"{effort['mass']:g} kg are not held in every direction of gravity: {plain(effort['reason'])}")
     else:
-        tension = "" if effort["worst_tension"] is None else f" and {effort['worst_tension']:.1f} N in tendons"
+        tension = "" if effort["worst_tension"] is None else f" and {effort['worst_tension']:z.1f} N in tendons"
         console.print(
-            f"{effort['mass']:g} kg in any direction of gravity take {effort['worst_torque']:.3f} Nm{tension}"
+            f"{effort['mass']:g} kg in any direction of gravity take {effort['worst_torque']:z.3f} Nm{tension}"
         )
     console.print(plain(squeeze["text"]))
     if not squeeze["forces"]:
@@ -74,13 +74,13 @@ def print_forces(solution: GraspSolution) -> None:
         "squeeze, forces on the object", "finger", "link", "friction [-]", "force [N]", "x [N]", "y [N]", "z [N]"
     )
     for contact, mu, force in zip(squeeze["contacts"], squeeze["friction"], squeeze["forces"], strict=True):
-        numbers = [f"{mu:g}", f"{float(np.linalg.norm(force)):.2f}", *(f"{f:.2f}" for f in force)]
+        numbers = [f"{mu:g}", f"{float(np.linalg.norm(force)):z.2f}", *(f"{f:z.2f}" for f in force)]
         table.add_row(*map(plain, (contact["finger"], contact["link"], *numbers)))
     console.print(table)
     table = table_with("squeeze, degrees of freedom", "joint", "torque [Nm]", "offset [deg]")
     for name, torque in squeeze["torques"].items():
         offset = squeeze["offsets"].get(name)
-        table.add_row(plain(name), f"{torque:.3f}", "" if offset is None else f"{np.rad2deg(offset):.2f}")
+        table.add_row(plain(name), f"{torque:z.3f}", "" if offset is None else f"{np.rad2deg(offset):z.2f}")
     console.print(table)
 
 
@@ -147,14 +147,14 @@ def print_report(report: ExecutionReport) -> None:
         )
         for name, joint in report.joints.items():
             angles = (joint.computed, joint.reached, joint.error)
-            table.add_row(plain(name), *(f"{np.rad2deg(a):.3f}" for a in angles))
+            table.add_row(plain(name), *(f"{np.rad2deg(a):z.3f}" for a in angles))
         console.print(table)
     if report.contacts:
         table = table_with("contacts", "finger", "link", "gap [mm]", "moved from computed [mm]")
         for c in report.contacts:
             table.add_row(plain(c.finger), plain(c.link), _millimetres(c.gap), _millimetres(c.displacement))
         console.print(table)
-    times = ", ".join(f"{n} {t:.3f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
+    times = ", ".join(f"{n} {t:z.3f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
     if times:
         console.print(f"first touch: {plain(times)}")
     if report.hold is not None:
@@ -177,13 +177,13 @@ def _print_hold(console: Console, hold: HoldReport) -> None:
         return
     table = table_with("free object", "after", "held", "moved [mm]", "turned [deg]")
     for step, motion in (("closing", hold.closed), ("squeeze alone", hold.squeezed)):
-        table.add_row(step, "", _millimetres(motion.distance), f"{np.rad2deg(motion.angle):.2f}")
+        table.add_row(step, "", _millimetres(motion.distance), f"{np.rad2deg(motion.angle):z.2f}")
     for direction, pulled in hold.pulls.items():
-        moved = _millimetres(pulled.motion.distance), f"{np.rad2deg(pulled.motion.angle):.2f}"
+        moved = _millimetres(pulled.motion.distance), f"{np.rad2deg(pulled.motion.angle):z.2f}"
         table.add_row(direction if lifted else f"pull {direction}", "yes" if pulled.held else "no", *moved)
     console.print(table)
     if hold.touch_spread is not None:
-        console.print(f"fingers touched the free object within {hold.touch_spread * 1e3:.0f} ms")
+        console.print(f"fingers touched the free object within {hold.touch_spread * 1e3:z.0f} ms")
 
 
 def _print_steps(console: Console, steps: Sequence[NextStepReached]) -> None:
@@ -193,7 +193,7 @@ def _print_steps(console: Console, steps: Sequence[NextStepReached]) -> None:
         error = max((abs(joint.error) for joint in step.joints.values()), default=0.0)
         touching = "" if step.touching is None else ", ".join(step.touching) or "none"
         moved = "" if step.motion is None else _millimetres(step.motion.distance)
-        row = (str(number), known[step.reached], f"{np.rad2deg(error):.3f}", touching, known[step.held], moved)
+        row = (str(number), known[step.reached], f"{np.rad2deg(error):z.3f}", touching, known[step.held], moved)
         table.add_row(*map(plain, row))
     console.print(table)
 
@@ -217,10 +217,10 @@ def print_batch(document: Mapping[str, Any]) -> None:
     count, seconds = document["poses"], document["seconds"]
     table = table_with(f"{document['hand']} on {document['object']}: {count} poses", "status", "poses", "share")
     for name, number in {**document["status"], "certified": document["certified"]}.items():
-        table.add_row(plain(name), str(number), f"{100.0 * number / max(count, 1):.1f} %")
+        table.add_row(plain(name), str(number), f"{100.0 * number / max(count, 1):z.1f} %")
     console.print(table)
-    rate = f", {count / seconds:.0f} a second" if count and seconds > 0.0 else ""
-    console.print(f"solved in {seconds:.2f} s{rate}")
+    rate = f", {count / seconds:z.0f} a second" if count and seconds > 0.0 else ""
+    console.print(f"solved in {seconds:z.2f} s{rate}")
 
 
 def print_weights(weights: Mapping[str, float], sentence: str) -> None:
@@ -261,8 +261,8 @@ def _finger_row(name: str, finger: FingerResult, solution: GraspSolution) -> tup
     chosen = finger.best
     if chosen is None:
         return name, finger.status.value, "", finger.reason, ""
-    plane = "full width" if chosen.plane is None else f"plane {chosen.plane + 1}"
-    angles = " ".join(f"{np.rad2deg(a):.1f}" for a in chosen.joint_angles.values())
+    plane = "full width" if chosen.plane is None else f"plane {chosen.plane}"
+    angles = " ".join(f"{np.rad2deg(a):z.1f}" for a in chosen.joint_angles.values())
     return name, finger.status.value, plane, ", ".join(links) or finger.reason, angles
 
 
@@ -272,8 +272,8 @@ def _sentences(console: Console, label: str, sentences: Sequence[str]) -> None:
 
 
 def _millimetres(length: float) -> str:
-    return f"{length * 1e3:.3f}"
+    return f"{length * 1e3:z.3f}"
 
 
 def _degrees(angle: float) -> str:
-    return f"±{np.rad2deg(angle):.2f}" if np.isfinite(angle) else "no number"
+    return f"±{np.rad2deg(angle):z.2f}" if np.isfinite(angle) else "no number"

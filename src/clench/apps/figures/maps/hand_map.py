@@ -211,7 +211,7 @@ def _joint_text(hand: Hand, j: int) -> str:
     way = f"closes {'+' if joint.direction > 0 else '-'}" if joint.role is JointRole.CLOSING else str(joint.role)
     low, open_value, high = (np.rad2deg(x) for x in (joint.lower, joint.open_value, joint.upper))
     follows = f", follows {leader}" if leader else ""
-    return f"    {joint.name}: {way}, open {open_value:.0f} in {low:.0f}..{high:.0f} deg{follows}"
+    return f"    {joint.name}: {way}, open {open_value:z.0f} in {low:z.0f}..{high:z.0f} deg{follows}"
 
 
 def _legend(figure: Figure, left: float, bottom: float) -> None:

@@ -202,7 +202,7 @@ def _angle_label(axes: Axes, joint: JointMotion, scene: PlaneScene) -> None:
     borders = [loop.points for link in scene.closed_links if link.joint in near for loop in link.loops]
     thickness = float(((np.vstack(borders) - joint.pivot) @ away).max()) if borders else 0.0
     axes.annotate(
-        f"{np.degrees(joint.angle):.1f}°",
+        f"{np.degrees(joint.angle):z.1f}°",
         tuple((joint.pivot + thickness * away) * _MM),
         xytext=tuple(7.0 * away),
         textcoords="offset points",
@@ -270,7 +270,7 @@ def _numbers(axes: Axes, contacts: Sequence[PlaneContact], distance: float) -> N
 
 def set_name(candidate: Candidate) -> str:
     """Return the name of a set in titles."""
-    return "full width" if candidate.plane is None else f"plane {candidate.plane + 1}"
+    return "full width" if candidate.plane is None else f"plane {candidate.plane}"
 
 
 def _explain(
@@ -315,7 +315,7 @@ def _explain(
 
 
 def _deg(angle: float) -> str:
-    return f"{np.degrees(angle):.1f}°"
+    return f"{np.degrees(angle):z.1f}°"
 
 
 _KIND: Final = {

@@ -155,7 +155,7 @@ class FingerScenes:
         offset = float(self.offsets[axis_group][plane])
         where = along_y(offset)
         if plane < len(planes):
-            return f"plane {plane + 1} of {len(planes)}, {where}"
+            return f"plane {plane} of 0 to {len(planes) - 1}, {where}"
         if planes[0] < offset < planes[-1]:
             return f"between the planes, {where}"
         return f"beside the plane{'s' if len(planes) > 1 else ''}, {where}"

@@ -123,7 +123,7 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
     for i, joint in enumerate(scene.joints):
         shade = style.mixed(style.joint_color(joint.position), "#000000", 0.25)
         x = i / max(len(scene.joints), 3)
-        for text, down, size in ((names[i], 6.0, 8.5), (f"{np.degrees(joint.angle):.1f}°", 19.0, 11.0)):
+        for text, down, size in ((names[i], 6.0, 8.5), (f"{np.degrees(joint.angle):z.1f}°", 19.0, 11.0)):
             label = style.write(axes, x, -down / box.height, text, fontsize=size, color=shade, fontweight="bold")
             label.set(transform=axes.transAxes, va="top")
     for i, text in enumerate(_verdict(candidate)):

@@ -131,8 +131,8 @@ def _caption(axes: Axes, number: int, grasp: PlannedGrasp, held: bool | None) ->
     line(0.0, _PANEL + 7.0, f"{number}", fontsize=12.5, fontweight="bold")
     indent = 24.0 if number < 10 else 34.0
     line(indent, _PANEL + 7.0, grasp.kind.value, fontsize=12.5)
-    score = "" if grasp.displaced is None else f"    when displaced {grasp.displaced:.3f}"
-    line(indent, _PANEL + 27.0, f"epsilon {grasp.epsilon:.3f}{score}", fontsize=9.5)
+    score = "" if grasp.displaced is None else f"    when displaced {grasp.displaced:z.3f}"
+    line(indent, _PANEL + 27.0, f"epsilon {grasp.epsilon:z.3f}{score}", fontsize=9.5)
     if grasp.displaced is None:
         line(_PANEL, _PANEL + 27.0, grasp.preshape, fontsize=9.5, color=style.FAINT, ha="right")
     if held is not None:

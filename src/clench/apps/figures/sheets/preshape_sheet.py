@@ -114,4 +114,4 @@ def _caption(shape: Preshape) -> str:
     if best_zone(shape) is None:
         return f"{shape.name}\nno two sides oppose"
     low, high = shape.aperture.min() * 1e3, shape.aperture.max() * 1e3
-    return f"{shape.name}\n{low:.0f} to {high:.0f} mm, opposition {shape.quality.max():.2f}"
+    return f"{shape.name}\n{low:z.0f} to {high:z.0f} mm, opposition {shape.quality.max():z.2f}"

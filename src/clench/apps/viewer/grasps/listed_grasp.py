@@ -50,7 +50,7 @@ class ListedGrasp:
     def text(self) -> str:
         """Say what is known of it, on one line."""
         known = [self.status.replace("_", " "), self.kind, "" if self.held is None else self.tested]
-        known.append("" if self.score is None else f"score {self.score:.3f}")
+        known.append("" if self.score is None else f"score {self.score:z.3f}")
         known.append(f"rejected: {self.rejected}" if self.rejected else "")
         return " · ".join([self.name, *(word for word in known if word)])
 

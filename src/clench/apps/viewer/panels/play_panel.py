@@ -136,6 +136,6 @@ def hold_text(report: HoldReport) -> str:
     head = f"**{'✓ Held' if report.held else '✕ Not held'}.** {report.reason}"
     if not report.forces:
         return head
-    rows = [f"| {name} | {f.planned:.2f} | {f.measured:.2f} |" for name, f in report.forces.items()]
+    rows = [f"| {name} | {f.planned:z.2f} | {f.measured:z.2f} |" for name, f in report.forces.items()]
     table = "\n".join(["| finger | planned [N] | measured [N] |", "|---|---:|---:|", *rows])
     return f"{head}\n\n{table}"

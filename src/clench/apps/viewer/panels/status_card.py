@@ -50,7 +50,7 @@ def answer_card(quick: QuickAnswer, settled: SettledAnswer | None, note: str = "
         ("Hold margin", _margin(quick, settled)),
         ("Holds the weight", "" if settled is None else _weight(settled)),
         ("Contacts", str(len(quick.links))),
-        ("Solved in", f"{1e3 * quick.seconds:.1f} ms"),
+        ("Solved in", f"{1e3 * quick.seconds:z.1f} ms"),
     ]
     shown = "".join(
         f'<tr><td style="opacity:0.72;padding-right:1em;vertical-align:top;white-space:nowrap">{name}</td>'
@@ -68,11 +68,11 @@ def answer_card(quick: QuickAnswer, settled: SettledAnswer | None, note: str = "
 
 def _margin(quick: QuickAnswer, settled: SettledAnswer | None) -> str:
     if settled is None:
-        return f"≥ {quick.bound:.3f}" if quick.bound > 0.0 else "not shown to hold (bound)"
+        return f"≥ {quick.bound:z.3f}" if quick.bound > 0.0 else "not shown to hold (bound)"
     if settled.quality is None:
         return "none"
     radius = settled.quality.epsilon.radius
-    return f"{radius:.3f}" if radius > 0.0 else "0: not every push is resisted"
+    return f"{radius:z.3f}" if radius > 0.0 else "0: not every push is resisted"
 
 
 def _weight(settled: SettledAnswer) -> str:

@@ -69,5 +69,5 @@ def comparison(compared: Mapping[str, Any] | None) -> str:
     lines = ["| preshape | status | sum |", "|---|---|---:|"]
     for name, each in entries:
         shown = f"**{name}**" if name == compared["chosen"] else name
-        lines.append(f"| {shown} | {each['status'].replace('_', ' ')} | {each['total']:.3f} |")
+        lines.append(f"| {shown} | {each['status'].replace('_', ' ')} | {each['total']:z.3f} |")
     return "\n".join([compared["text"], "", *lines])
