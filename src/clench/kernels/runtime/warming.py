@@ -1,8 +1,8 @@
 """Compile the kernels of a solve ahead of it, in two processes at once.
 
 A first solve compiles for about two minutes, one kernel after another. Half of it is the closing, so a second process
-compiles that into the cache on disk, from where this one loads it. Nothing depends on the second process: kernels that it does
-not deliver are compiled when they are called.
+compiles that into the cache on disk, from where this one loads it. Nothing depends on the second process: kernels that
+it does not deliver are compiled when they are called.
 """
 
 from __future__ import annotations
