@@ -7,7 +7,9 @@ from typing import Any
 import clench.kernels.sections.advance as on_planes
 import clench.kernels.toi.toi_work as toi_work
 from clench.kernels.closing.close_candidate import close_candidate
-from clench.kernels.closing.solve_layout import ObjectArrays
+from clench.kernels.closing.solve_layout import Closing, ObjectArrays
+from clench.kernels.geometry.bodies import no_body
+from clench.kernels.runtime.by_reference import kept
 from clench.kernels.sections.section_overlap import look_for_overlaps
 
 
@@ -35,9 +37,12 @@ def close_candidates(
     """Close every candidate once; `sections` are those of the first axis groups, and the arena for later ones."""
     sweep = plain(toi_work.make_sweep_work)(hand.chain.rate.shape[0], full_width.checked.shape[0])
     for i in range(len(candidates.finger_posture)):
-        close_candidate(hand, full_width, obj, T, *sections, candidates, i, 1, together, scratch(hand), sweep, answer)
+        work = scratch(hand)
+        held = [kept(value) for value in (hand, full_width, obj)]
+        rest = [kept(value) for value in (*sections, candidates, work, sweep, answer)]
+        close_candidate(Closing(*held, T, *rest), i, 1, together)
 
 
 def find_overlaps(hand: Any, tree: Any, rounds: Any, closed: bool, T: Any, sections: Any, overlaps: Any) -> None:
     """Find outlines that overlap at the start."""
-    look_for_overlaps(hand, tree, rounds, closed, T, sections, overlaps, scratch(hand))
+    look_for_overlaps(hand, ObjectArrays(tree, rounds, closed, no_body()), T, sections, overlaps, scratch(hand))

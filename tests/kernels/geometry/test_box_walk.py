@@ -14,11 +14,12 @@ from clench.kernels.toi import core_motion
 from clench.kernels.trees import obb as slabs
 from clench.kernels.trees.node_boxes import SLAB
 from kernels.kernel_entries import entry
+from kernels.plain_sweeps import walk_rectangle, walk_to_box
 from kernels.toi.test_toi_bodies import KINDS, drawn_chain, patch, pose
 from kernels.trees.test_obb import below, to_segment
 
-put_box, off_box, walk_to_box = entry(box_walk.put_box), entry(box_walk.off_box), entry(box_walk.walk_to_box)
-put_rectangle, walk_rectangle = entry(box_walk.put_rectangle), entry(box_walk.walk_rectangle)
+put_box, off_box = entry(box_walk.put_box), entry(box_walk.off_box)
+put_rectangle = entry(box_walk.put_rectangle)
 move_core, put_slab_face = entry(core_motion.move_core), entry(slabs.put_slab_face)
 
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))

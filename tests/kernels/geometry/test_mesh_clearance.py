@@ -99,7 +99,7 @@ def test_depths_are_those_of_the_meshes(one, other, T, link_closed, object_close
     compose_inverse(T[:3], np.eye(4)[:3], back)
     scratch = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
     sides = link, feature_owners(link), link_closed, obj, owners, object_closed
-    depth, *_ = penetration(*sides, forth, back, np.inf, *scratch)
+    depth, *_ = penetration(*sides, forth, back, np.inf, scratch)
     assert out[0, 0] == pytest.approx(min(depth, 2.0 * meshes.radius[0]), abs=1e-12)
     if one == other == "room":
         return

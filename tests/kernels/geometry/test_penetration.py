@@ -18,7 +18,7 @@ def depth_of(link, obj, T, *, closed=True, limit=np.inf):
     forth, back = np.ascontiguousarray(T[:3]), np.ascontiguousarray(np.linalg.inv(T)[:3])
     scratch = np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)
     depth, *place = penetration(
-        one, feature_owners(one), closed, two, feature_owners(two), closed, forth, back, limit, *scratch
+        one, feature_owners(one), closed, two, feature_owners(two), closed, forth, back, limit, scratch
     )
     return depth, np.array(place)
 

@@ -8,17 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.geometry.bodies import Elements, no_body, pack_bodies
-from clench.kernels.hulls import body_sweep, hull_motion, hull_sweep, near_elements
+from clench.kernels.hulls import hull_motion, near_elements
 from clench.kernels.hulls.enclosing_hulls import pack_hulls
 from clench.kernels.toi import core_motion
 from clench.kernels.toi import toi_work as sweeping
-from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
+from kernels.plain_sweeps import clear_travel, list_near, sweep_body, sweep_pair
 from kernels.toi.test_toi_bodies import KINDS, TOUCH, cores, drawn_chain, patch, pose
 
-clear_travel, make_sweep_work = entry(hull_sweep.clear_travel), entry(sweeping.make_sweep_work)
-sweep_body = entry(body_sweep.sweep_body)
-list_near, list_touching = entry(near_elements.list_near), entry(near_elements.list_touching)
+make_sweep_work, list_touching = entry(sweeping.make_sweep_work), entry(near_elements.list_touching)
 lowest_between, move_core = entry(hull_motion.lowest_between), entry(core_motion.move_core)
 
 

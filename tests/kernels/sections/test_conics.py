@@ -135,7 +135,7 @@ def test_a_turning_side_is_tangent_to_the_ellipse():
     e = region()
     chain, terms = np.array([[1.0, 0.0, 0.0]]), np.zeros((6, 3))
     w = 0.05
-    found = sweep_side_region(chain, terms, 1, 0.0, 1.0, 0.0, -3.0, 0.0, w, e, TOUCH, 2.0)
+    found = sweep_side_region(chain, terms, 1, (0.0, 1.0, 0.0, -3.0, 0.0), w, e, TOUCH, 2.0)
     points = border(e, 200001)
     heights = -math.sin(found) * points[:, 0] + math.cos(found) * points[:, 1]
     assert heights.min() == pytest.approx(w, abs=1e-8)
@@ -145,7 +145,7 @@ def test_a_turning_side_is_tangent_to_the_ellipse():
 def test_a_side_beyond_the_caps_or_too_short_does_not_touch_the_curve():
     chain, terms = np.array([[1.0, 0.0, 0.0]]), np.zeros((6, 3))
     whole = region()
-    short = sweep_side_region(chain, terms, 1, 0.0, 1.0, 0.0, -0.2, 0.0, 0.0, whole, TOUCH, 1.0)
+    short = sweep_side_region(chain, terms, 1, (0.0, 1.0, 0.0, -0.2, 0.0), 0.0, whole, TOUCH, 1.0)
     assert short == 1.0
     cut = region(low=-0.3, high=-0.29)
-    assert sweep_side_region(chain, terms, 1, 0.0, 1.0, 0.0, -3.0, 0.0, 0.0, cut, TOUCH, 0.6) == 0.6
+    assert sweep_side_region(chain, terms, 1, (0.0, 1.0, 0.0, -3.0, 0.0), 0.0, cut, TOUCH, 0.6) == 0.6

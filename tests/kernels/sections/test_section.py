@@ -166,7 +166,7 @@ def cut_rows(tree, offsets, capacity):
     segments, sources = np.full((len(offsets), capacity, 6), np.nan), np.full((len(offsets), capacity), -1)
     counts = np.full((len(offsets), 3), 7)
     T = np.eye(4)[:3].copy()
-    wanted = cut(tree, T, np.array(offsets), 1, len(offsets), np.inf, segments, sources, counts, 1, capacity)
+    wanted = cut(tree, T, np.array(offsets), (1, len(offsets)), np.inf, segments, sources, counts, 1, capacity)
     return wanted, segments, sources, counts
 
 

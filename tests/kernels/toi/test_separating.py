@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clench.kernels.toi.toi_pairs import sweep_pair
+from kernels.plain_sweeps import sweep_pair
 
 TOUCH = 1e-11
 BEST = 0.5

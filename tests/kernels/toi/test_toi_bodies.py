@@ -13,16 +13,15 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clench.kernels.geometry.bodies import Elements, pack_bodies
-from clench.kernels.hulls import body_sweep
 from clench.kernels.toi import core_motion, pair_queue
 from clench.kernels.toi import separating_planes as parting
 from clench.kernels.toi import toi_work as sweeping
 from clench.kernels.toi.separating import OVERLAP
-from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
+from kernels.plain_sweeps import sweep_body, sweep_pair
 from kernels.toi.test_spatial_motion import drawn
 
-sweep_body, make_sweep_work = entry(body_sweep.sweep_body), entry(sweeping.make_sweep_work)
+make_sweep_work = entry(sweeping.make_sweep_work)
 take_first, take_in = entry(pair_queue.take_first), entry(pair_queue.take_in)
 passes_beside, move_core = entry(parting.passes_beside), entry(core_motion.move_core)
 TOUCH = 1e-10

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 
 from clench.kernels.toi import toi_bounds as earliest
 from kernels.kernel_entries import entry
+from kernels.plain_sweeps import stays_above
 
 turn_measure, measure_of = entry(earliest.turn_measure), entry(earliest.measure_of)
-ball_entry, stays_above = entry(earliest.ball_entry), entry(earliest.stays_above)
+ball_entry = entry(earliest.ball_entry)
 
 length = st.floats(-1.0, 1.0).map(lambda x: round(x, 3))
 point = st.tuples(length, length, length)

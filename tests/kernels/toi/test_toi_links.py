@@ -5,12 +5,12 @@ import pytest
 
 from clench.kernels.toi import toi_bounds as earliest
 from clench.kernels.toi.separating import OVERLAP
-from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
+from kernels.plain_sweeps import sweep_pair, walk_core
 from kernels.toi.test_spatial_motion import drawn, placed
 from oracle.width import Core, gap
 
-walk_ball, walk_core = entry(earliest.walk_ball), entry(earliest.walk_core)
+walk_ball = entry(earliest.walk_ball)
 TOUCH = 1e-11
 BEST = 1.2
 

@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from clench.kernels.toi import core_motion
 from clench.kernels.toi.separating import OVERLAP
-from clench.kernels.toi.toi_pairs import sweep_pair
 from kernels.kernel_entries import entry
+from kernels.plain_sweeps import sweep_pair
 
 move_core, plane_gap = entry(core_motion.move_core), entry(core_motion.plane_gap)
 

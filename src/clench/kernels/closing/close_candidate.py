@@ -7,14 +7,14 @@ groups are cut with the earlier joints at rest.
 
 from __future__ import annotations
 
-from clench.core.tolerances import TOUCH_FRACTION
+from clench.core.tolerances import SWEEP_FRACTION, TOUCH_FRACTION
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.advance import advance
 from clench.kernels.sections.later_planes import enter_axis_group, is_held
 from clench.kernels.sections.plane_contact import describe_contact, settle_contact
 from clench.kernels.sections.plane_pose import copy_pose, pose_axis_groups
 from clench.kernels.toi.full_width import FullWidthArrays, describe_pair, last_mover, pose_movers
-from clench.kernels.toi.toi_links import sweep_stage
+from clench.kernels.toi.toi_links import Stage, sweep_stage
 from clench.kernels.toi.toi_work import SweepWork
 
 from .layout import (
@@ -33,26 +33,11 @@ from .layout import (
 )
 from .segments import ALL, lock_held, lock_joints, move_dofs, next_segment
 from .settling import settle
-from .solve_layout import ObjectArrays
+from .solve_layout import Closing, ProblemArrays, Workspace
 
 
 @kernel
-def close_dof(
-    hand: HandArrays,
-    full_width: FullWidthArrays,
-    T_palm_object: Floats,
-    sections: SectionArrays,
-    base: int,
-    axis_group: int,
-    dof: int,
-    closed: bool,
-    start: int,
-    candidates: CandidateArrays,
-    i: int,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> bool:
+def close_dof(closing: Closing, sections: SectionArrays, base: int, axis_group: int, dof: int, i: int) -> bool:
     """Move one degree of freedom, or all at once, until a contact or a limit holds every joint.
 
     The travel at which a follower starts or stops moving (its own limit) splits the motion into path segments. On each
@@ -61,24 +46,18 @@ def close_dof(
 
     Args:
         sections, base: whose row `plane - base` belongs to `plane`. axis_group: of the planes. dof: or `ALL`.
-        start: the finger posture's first axis group. work: whose `locked` says which joints stand still; written.
+        closing: whose `work.locked` says which joints stand still; written. i: the candidate.
 
     Returns:
         False where a link overlaps the object already.
     """
-    chain, finger_posture, turns, rates, locked = (
-        hand.chain,
-        candidates.finger_posture[i],
-        answer.turn[i],
-        work.rates,
-        work.locked,
-    )
+    hand, full_width, candidates, answer = closing.hand, closing.full_width, closing.candidates, closing.answer
+    work, sweep, T_palm_object = closing.work, closing.sweep, closing.T_palm_object
+    chain, finger_posture, turns = hand.chain, candidates.finger_posture[i], answer.turn[i]
+    rates, locked = work.rates, work.locked
     joints = finger_posture_joints(hand, finger_posture)
-    low, high = (
-        hand.axis_group_plane[axis_group] + candidates.low[i],
-        hand.axis_group_plane[axis_group] + candidates.high[i],
-    )
-    along = 0.0
+    first = hand.axis_group_plane[axis_group]
+    planes, along = (first + candidates.low[i], first + candidates.high[i]), 0.0
     while True:
         lock_held(chain, joints, candidates.until[i], along, locked)
         end = next_segment(chain, joints, dof, answer.travel[i], locked, candidates.until[i], along, rates)
@@ -89,14 +68,14 @@ def close_dof(
         for j in range(joints[0], joints[1]):
             fastest += abs(rates[j])
         reach = end + TOUCH_FRACTION / max(fastest, 1.0)
-        moved, plane = advance(hand, axis_group, sections, base, low, high, closed, turns, rates, reach, work)
+        moved, plane = advance(hand, axis_group, sections, base, planes, closing.obj.closed, turns, rates, reach, work)
         met = -1
         if full_width.requested[i]:
-            axis_groups, size = answer.pose[i], hand.axis_group_length[axis_group]
+            axis_groups = answer.pose[i]
             pose_axis_groups(hand, finger_posture, turns, work, axis_groups)
-            moved, met = sweep_stage(
-                full_width, chain, finger_posture, axis_groups, T_palm_object, size, turns, rates, moved, work, sweep
-            )
+            touch = SWEEP_FRACTION * hand.axis_group_length[axis_group]
+            stage = Stage(full_width, chain, finger_posture, axis_groups, T_palm_object, turns, rates, touch)
+            moved, met = sweep_stage(stage, moved, work, sweep)
             if moved < 0.0:
                 answer.overlap[i] = sweep.winner[2]
                 return False
@@ -110,22 +89,7 @@ def close_dof(
             lock_joints(chain, joints, last, locked)
             while last > joints[0] and rates[last] == 0.0:
                 last -= 1
-            write_contact(
-                hand,
-                full_width,
-                T_palm_object,
-                sections,
-                base,
-                last,
-                plane,
-                met,
-                start,
-                i,
-                work,
-                sweep,
-                candidates,
-                answer,
-            )
+            write_contact(closing, sections, base, last, plane, met, i)
 
 
 @kernel
@@ -167,25 +131,18 @@ def stops_same(chain: ChainArrays, contact: Ints, dof: int, joint: int) -> bool:
 
 @kernel
 def write_contact(
-    hand: HandArrays,
-    full_width: FullWidthArrays,
-    T_palm_object: Floats,
-    sections: SectionArrays,
-    base: int,
-    joint: int,
-    plane: int,
-    met: int,
-    start: int,
-    i: int,
-    work: Work,
-    sweep: SweepWork,
-    candidates: CandidateArrays,
-    answer: ClosingArrays,
+    closing: Closing, sections: SectionArrays, base: int, joint: int, plane: int, met: int, i: int
 ) -> None:
     """Write a contact that stops a degree of freedom up to `joint`; in a further round it replaces the earlier one.
 
     If a contact on a plane and one of the full width are the same, the plane describes it, because it has more data.
     """
+    hand, answer, work, finger_posture = (
+        closing.hand,
+        closing.answer,
+        closing.work,
+        closing.candidates.finger_posture[i],
+    )
     axis_group, dof = hand.chain.joint_axis_group[joint], hand.chain.joint_dof[joint]
     n = 0
     while n < answer.contacts[i] and not stops_same(hand.chain, answer.contact[i, n], dof, joint):
@@ -199,40 +156,25 @@ def write_contact(
         describe_contact(hand, sections, base, axis_group, plane, dof, answer.turn[i], work, contact, point)
         if met < 0:
             return
+        start = hand.first_axis_group[finger_posture]
         settle_contact(hand, start, sections, sections, answer.turn[i], contact, point, work)
         if abs(point[CONTACT_GAP]) <= 2.0 * TOUCH_FRACTION * hand.axis_group_length[axis_group]:
             return
-    pose_movers(full_width, hand.chain, candidates.finger_posture[i], answer.turn[i], sweep.poses)
-    describe_pair(full_width, T_palm_object, met, dof, axis_group, sweep, contact, point)
+    full_width, sweep = closing.full_width, closing.sweep
+    pose_movers(full_width, hand.chain, finger_posture, answer.turn[i], sweep.poses)
+    describe_pair(full_width, closing.T_palm_object, met, dof, axis_group, sweep, contact, point)
 
 
 @entry_kernel
-def close_candidate(
-    hand: HandArrays,
-    full_width: FullWidthArrays,
-    obj: ObjectArrays,
-    T_palm_object: Floats,
-    shared: SectionArrays,
-    own: SectionArrays,
-    candidates: CandidateArrays,
-    i: int,
-    times: int,
-    together: bool,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> None:
+def close_candidate(closing: Closing, i: int, times: int, together: bool) -> None:
     """Close one candidate: its degrees of freedom from the palm outwards, up to `times` over, or all at once; see the
     module.
 
     Args:
-        hand: the fingers. full_width: for full-width sweeps. obj: the object in its own frame, at `T_palm_object` (3,
-            4).
-        shared, own: sections with every finger posture's first axis group, by global plane; arena for a finger
-            posture's later axis groups.
-        candidates, i: the candidate. times, together: as above. work, sweep: scratch space. answer: written, cleared at
-            row `i`.
+        i: the candidate. times, together: as above.
     """
+    hand, full_width, candidates, answer = closing.hand, closing.full_width, closing.candidates, closing.answer
+    work, sweep = closing.work, closing.sweep
     finger_posture = candidates.finger_posture[i]
     if full_width.requested[i]:
         for link in range(sweep.poses.shape[0]):
@@ -245,9 +187,7 @@ def close_candidate(
     for _ in range(times):
         for j in range(work.before.shape[0]):
             work.before[j] = answer.turn[i, j]
-        if not close_dofs(
-            hand, full_width, obj, T_palm_object, shared, own, candidates, i, together, work, sweep, answer
-        ):
+        if not close_dofs(closing, i, together):
             return
         moved = False
         for j in range(work.before.shape[0]):
@@ -256,72 +196,61 @@ def close_candidate(
             break
     answer.skipped[i] = sweep.skipped[0]
     pose_axis_groups(hand, finger_posture, answer.turn[i], work, answer.pose[i])
-    settle(
-        hand,
-        full_width,
-        T_palm_object,
-        hand.first_axis_group[finger_posture],
-        shared,
-        own,
-        candidates,
-        i,
-        work,
-        sweep,
-        answer,
-    )
+    settle(closing, i)
 
 
 @kernel
-def close_dofs(
-    hand: HandArrays,
-    full_width: FullWidthArrays,
-    obj: ObjectArrays,
-    T_palm_object: Floats,
-    shared: SectionArrays,
-    own: SectionArrays,
-    candidates: CandidateArrays,
-    i: int,
-    together: bool,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> bool:
+def close_dofs(closing: Closing, i: int, together: bool) -> bool:
     """Close every degree of freedom of a candidate once, palm side first, or all at once; False: it cannot begin."""
-    finger_posture, swept = candidates.finger_posture[i], full_width.requested[i] != 0
+    hand, answer, work = closing.hand, closing.answer, closing.work
+    finger_posture, swept = closing.candidates.finger_posture[i], closing.full_width.requested[i] != 0
     start = hand.first_axis_group[finger_posture]
     axis_group = start - 1
     for dof in range(hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]):
         wanted = dof_axis_group(hand, dof)
         while axis_group < wanted and answer.overlap[i] > SUNK:
             axis_group += 1
-            enter_axis_group(hand, axis_group, start, obj, T_palm_object, own, candidates, i, swept, work, answer)
+            enter_axis_group(closing, axis_group, i)
         if answer.overlap[i] <= SUNK:
             break
-        if axis_group > start and not swept and is_held(hand, axis_group, dof, candidates, i, work, answer):
+        if axis_group > start and not swept and is_held(closing, axis_group, dof, i):
             continue
-        sections, base = shared, 0
+        sections, base = closing.shared, 0
         if axis_group > start:
-            sections, base = own, hand.axis_group_plane[start]
+            sections, base = closing.own, hand.axis_group_plane[start]
         for j in range(work.locked.shape[0]):
             work.locked[j] = 0
         moving = ALL if together else dof
-        if not close_dof(
-            hand,
-            full_width,
-            T_palm_object,
-            sections,
-            base,
-            axis_group,
-            moving,
-            obj.closed,
-            start,
-            candidates,
-            i,
-            work,
-            sweep,
-            answer,
-        ):
+        if not close_dof(closing, sections, base, axis_group, moving, i):
             return False
         if together:
             break
     return True
+
+
+@kernel
+def close_on_object(
+    problem: ProblemArrays,
+    full_width: FullWidthArrays,
+    candidates: CandidateArrays,
+    T_palm_object: Floats,
+    space: Workspace,
+    answer: ClosingArrays,
+    i: int,
+    times: int,
+    together: bool,
+) -> None:
+    """Close one candidate on the object of a problem, with other links in the way or other candidates; as above."""
+    closing = Closing(
+        problem.hand,
+        full_width,
+        problem.target,
+        T_palm_object,
+        space.arena.shared,
+        space.arena.own,
+        candidates,
+        space.work,
+        space.sweep,
+        answer,
+    )
+    close_candidate(closing, i, times, together)

@@ -7,7 +7,6 @@ from clench.kernels.closing.in_turn import close_in_turn
 from clench.kernels.closing.layout import ClosingArrays, Floats
 from clench.kernels.closing.solve_layout import Closed, ProblemArrays, Workspace
 from clench.kernels.meetings.at_once import close_at_once
-from clench.kernels.meetings.meeting_layout import Meetings
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_sections import cut_first_axis_groups, needs_planes
 
@@ -44,29 +43,10 @@ def close_with_others(
             return int(overflow)
     if not command.together:
         return int(close_in_turn(problem, T_palm_object, space, final, found.blocked[n], found.anew[n]))
-    return int(
-        close_at_once(
-            problem.hand,
-            among(
-                problem.full_width, space.swept, target.bodies, problem.full_width.link_pose, problem.full_width.checked
-            ),
-            target,
-            T_palm_object,
-            space.picked,
-            space.arena.shared,
-            space.arena.own,
-            problem.fingers,
-            space.rows[: put_swept(space)],
-            found.blocked[n],
-            space.meeting,
-            space.work,
-            space.sweep,
-            final,
-            found.anew[n],
-            found.overlapping[n],
-            Meetings(found.met.size[n], found.met.number[n], found.met.value[n]),
-        )
-    )
+    own = problem.full_width
+    everything = among(own, space.swept, target.bodies, own.link_pose, own.checked)
+    chosen = space.rows[: put_swept(space)]
+    return int(close_at_once(problem, everything, T_palm_object, space, chosen, final, found, n))
 
 
 @kernel

@@ -167,15 +167,16 @@ def read_plane_contact(
     frames: FrameArrays,
     surface: SurfaceArrays,
     finger_posture: int,
-    contact: Ints,
-    point: Floats,
-    pose: Floats,
-    travel: Floats,
+    answer: ClosingArrays,
+    i: int,
+    n: int,
     T_palm_object: Floats,
     number: Ints,
     value: Floats,
 ) -> None:
-    """Read a touch on a plane."""
+    """Read contact `n` of candidate `i`, a touch on a plane."""
+    contact, point, travel = answer.contact[i, n], answer.point[i, n], answer.travel[i]
+    pose = answer.pose[i, contact[CONTACT_AXIS_GROUP]]
     plane, axis_group, source, kind = (
         contact[CONTACT_PLANE],
         contact[CONTACT_AXIS_GROUP],
@@ -254,9 +255,7 @@ def read_contact(
     if contact[CONTACT_PLANE] < 0:
         read_full_width_contact(surface, frames.parent.shape[0], contact, point, pose, number, value)
     else:
-        read_plane_contact(
-            hand, frames, surface, finger_posture, contact, point, pose, answer.travel[i], T_palm_object, number, value
-        )
+        read_plane_contact(hand, frames, surface, finger_posture, answer, i, n, T_palm_object, number, value)
     # The stopped joint is the leader of a degree of freedom, or the last joint before those that break away.
     dof, body = contact[CONTACT_DOF], number[PALM_CONTACT_BODY]
     breaks = hand.chain.breaks[dof] != 0

@@ -32,7 +32,7 @@ from .layout import (
     SectionArrays,
     Work,
 )
-from .solve_layout import Arena, Closed, ObjectArrays, ProblemArrays
+from .solve_layout import Arena, Closed, Closing, ObjectArrays, ProblemArrays
 
 # Neither has types.
 cuda: Any = numba.cuda
@@ -240,7 +240,8 @@ def _cut(job: Job) -> None:
         job.crossed[n, finger_posture] = -1
     job.overflow[n] = wanted
     if planar and job.crossing and wanted == 0:
-        look_for_overlaps(job.hand, job.tree, job.rounds, job.closed, T, shared, job.crossed[n], work)
+        obj = ObjectArrays(job.tree, job.rounds, job.closed, job.full_width.object)
+        look_for_overlaps(job.hand, obj, T, shared, job.crossed[n], work)
 
 
 @cuda.jit
@@ -259,7 +260,7 @@ def _close(job: Job) -> None:
     answer.contacts[i], answer.skipped[i], answer.overlap[i], answer.overflow[i] = 0, 0, -1, 0
     if job.overflow[n] > 0 or job.crossed[n, job.candidates.finger_posture[i]] >= 0:
         return
-    close_candidate(
+    closing = Closing(
         job.hand,
         job.full_width,
         ObjectArrays(job.tree, job.rounds, job.closed, job.full_width.object),
@@ -267,10 +268,8 @@ def _close(job: Job) -> None:
         _sections_at(job.shared, n),
         _sections_at(job.own, index),
         job.candidates,
-        i,
-        job.times,
-        job.together,
         _work_at(job.candidate_work, index),
         _sweep_at(job.sweep, index),
         answer,
     )
+    close_candidate(closing, i, job.times, job.together)

@@ -7,7 +7,7 @@ from clench.kernels.sections.plane_sections import cut_first_axis_groups, needs_
 from clench.kernels.sections.section_overlap import look_for_overlaps
 
 from .bundles import clear_answer
-from .close_candidate import close_candidate
+from .close_candidate import close_on_object
 from .layout import ClosingArrays, Floats, Ints
 from .solve_layout import ProblemArrays, Workspace
 from .start_overlap import CROSSED, start_overlap
@@ -36,27 +36,12 @@ def close_free(
         if overflow > 0:
             return int(overflow)
         if command.crossing:
-            look_for_overlaps(
-                hand, target.tree, target.rounds, target.closed, T_palm_object, shared, crossed, space.work
-            )
+            look_for_overlaps(hand, target, T_palm_object, shared, crossed, space.work)
     for i in range(candidates.finger_posture.shape[0]):
         clear_answer(answer, i)
         if crossed[candidates.finger_posture[i]] < 0:
-            close_candidate(
-                hand,
-                problem.full_width,
-                target,
-                T_palm_object,
-                shared,
-                space.arena.own,
-                candidates,
-                i,
-                command.times,
-                command.together,
-                space.work,
-                space.sweep,
-                answer,
-            )
+            full_width, times = problem.full_width, command.times
+            close_on_object(problem, full_width, candidates, T_palm_object, space, answer, i, times, command.together)
         overflow = max(overflow, answer.overflow[i])
     return int(overflow)
 

@@ -7,10 +7,10 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
 
 from .bundles import among, clear_answer, with_lengths
-from .close_candidate import close_candidate
+from .close_candidate import close_candidate, close_on_object
 from .layout import SUNK, ClosingArrays, Floats, HandArrays, Ints
 from .picking import put_candidate_angles, take_joints
-from .solve_layout import ProblemArrays, Workspace
+from .solve_layout import Closing, ProblemArrays, Workspace
 
 
 @kernel(allocates=True)
@@ -44,24 +44,9 @@ def close_in_turn(
         )
         if f < 0:
             return 0
-        shared = space.arena.shared
         everything = among(problem.full_width, space.swept, target.bodies, space.placed, problem.across)
         clear_answer(final, f)
-        close_candidate(
-            hand,
-            everything,
-            target,
-            T_palm_object,
-            shared,
-            space.arena.own,
-            space.picked,
-            f,
-            command.times,
-            False,
-            space.work,
-            space.sweep,
-            final,
-        )
+        close_on_object(problem, everything, space.picked, T_palm_object, space, final, f, command.times, False)
         if final.overflow[f] > 0:
             return int(final.overflow[f])
         anew[f], first = 1, f + 1
@@ -112,7 +97,7 @@ def first_meeting(
         if problem.command.times > 1 or breaks_away(hand, finger_posture):
             return f
         clear_answer(spare, f)
-        close_candidate(
+        closing = Closing(
             hand,
             full_width,
             nothing,
@@ -120,13 +105,11 @@ def first_meeting(
             space.arena.no_shared,
             space.arena.no_own,
             picked,
-            f,
-            1,
-            False,
             space.work,
             space.sweep,
             spare,
         )
+        close_candidate(closing, f, 1, False)
         if spare.contacts[f] > 0 or spare.skipped[f] > 0:
             return f
     return -1

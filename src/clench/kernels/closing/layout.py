@@ -14,6 +14,14 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+#: A point of a plane, or a direction in it, (x, z).
+Flat = tuple[float, float]
+#: A line in a plane between two ends: unit normal, offset, and the ends along (-n_z, n_x), the lower one first.
+Line = tuple[float, float, float, float, float]
+#: A segment in a plane: its ends a and b, and its unit normal.
+Segment = tuple[float, float, float, float, float, float]
+#: How the object's features become relative to a pivot: its place, and the sign of z, -1 for clockwise turns.
+Origin = tuple[float, float, float]
 
 
 class ChainArrays(NamedTuple):
@@ -165,6 +173,20 @@ class SectionArrays(NamedTuple):
     ellipse_sources: Ints
     counts: Ints
     circles: Floats
+
+
+class PlaneSection(NamedTuple):
+    """The object's section with one plane, as a sweep on this plane meets it; kernels hold the arena by a pointer.
+
+    Args:
+        sections, row: the arena, and the row of the plane. closed: the object's winding is known, so that only its
+            outer side counts. touch: gaps up to this touch [m].
+    """
+
+    sections: SectionArrays
+    row: int
+    closed: bool
+    touch: float
 
 
 class RoundArrays(NamedTuple):

@@ -24,35 +24,23 @@ from .layout import (
     CONTACT_PLANE,
     CONTACT_SOURCE,
     CONTACT_WHICH,
-    CandidateArrays,
     ChainArrays,
-    ClosingArrays,
     Floats,
     HandArrays,
     Ints,
-    SectionArrays,
-    Work,
 )
+from .solve_layout import Closing
 
 
 @kernel
-def settle(
-    hand: HandArrays,
-    full_width: FullWidthArrays,
-    T_palm_object: Floats,
-    start: int,
-    shared: SectionArrays,
-    own: SectionArrays,
-    candidates: CandidateArrays,
-    i: int,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-) -> None:
+def settle(closing: Closing, i: int) -> None:
     """Evaluate a candidate's contacts again at its final posture."""
+    hand, full_width, candidates, answer = closing.hand, closing.full_width, closing.candidates, closing.answer
+    T_palm_object, work, sweep = closing.T_palm_object, closing.work, closing.sweep
     finger_posture, turns = candidates.finger_posture[i], answer.turn[i]
     if full_width.requested[i]:
         pose_movers(full_width, hand.chain, finger_posture, turns, sweep.poses)
+    start = hand.first_axis_group[finger_posture]
     touch = TOUCH_FRACTION * hand.axis_group_length[start]
     for n in range(answer.contacts[i]):
         contact, point = answer.contact[i, n], answer.point[i, n]
@@ -60,7 +48,7 @@ def settle(
         if contact[CONTACT_PLANE] < 0:
             settle_pair(full_width, hand.chain, finger_posture, turns, T_palm_object, contact, point, touch, sweep)
             continue
-        settle_contact(hand, start, shared, own, turns, contact, point, work)
+        settle_contact(hand, start, closing.shared, closing.own, turns, contact, point, work)
         if full_width.requested[i] and later_turned(hand, finger_posture, axis_group, turns):
             settle_carried(full_width, hand, finger_posture, turns, T_palm_object, contact, point, sweep)
 

@@ -32,6 +32,29 @@ class ObjectArrays(NamedTuple):
     bodies: BodyArrays
 
 
+class Closing(NamedTuple):
+    """Bundle what closes candidates at one pose, and their answers; kernels hold each by a pointer.
+
+    Args:
+        hand: the fingers. full_width: for full-width sweeps. obj: the object in its own frame, at `T_palm_object` (3,
+            4).
+        shared, own: sections with every finger posture's first axis group, by global plane; arena for a finger
+            posture's later axis groups.
+        candidates: see `CandidateArrays`. work, sweep: scratch space. answer: written, cleared at the candidate's row.
+    """
+
+    hand: HandArrays
+    full_width: FullWidthArrays
+    obj: ObjectArrays
+    T_palm_object: Floats
+    shared: SectionArrays
+    own: SectionArrays
+    candidates: CandidateArrays
+    work: Work
+    sweep: SweepWork
+    answer: ClosingArrays
+
+
 class CommandArrays(NamedTuple):
     """Bundle what the command asks for.
 

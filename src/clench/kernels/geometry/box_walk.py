@@ -13,10 +13,9 @@ import numpy as np
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.toi.core_motion import move_core, plane_offset
+from clench.kernels.toi.core_motion import CorePair, MovingCore, place_core, plane_offset
 from clench.kernels.toi.toi_bounds import STEPS
 from clench.kernels.toi.toi_pairs import step_to_plane
-from clench.kernels.trees.obb import RECTANGLE
 
 from .mesh_distance import closest_on_triangle
 from .vectors import Vector, cross, dot, scaled
@@ -154,30 +153,19 @@ def box_reach(box: Floats, m: Vector) -> float:
 
 
 @kernel
-def walk_to_box(
-    core: Floats,
-    ka: int,
-    box: Floats,
-    w: float,
-    chain: Floats,
-    count: int,
-    near: float,
-    begin: float,
-    best: float,
-    placed: Floats,
-) -> float:
+def walk_to_box(moving: MovingCore, box: Floats, w: float, near: float, begin: float, best: float) -> float:
     """Return a travel up to which a core, that is apart from a box until `begin`, stays farther than `w` from it.
 
     It is infinite if it does until `best`. Every step goes to a plane between the two, see `step_to_plane`, but ends
     where they are nearer than `near`, or after some steps.
     """
-    s = begin
+    s, placed = begin, moving.placed
     for _ in range(STEPS):
-        move_core(core, ka, chain, count, s, placed)
-        gap, nx, ny, nz, top = off_box(placed, ka, box, placed[4:])
+        place_core(moving, s)
+        gap, nx, ny, nz, top = off_box(placed, moving.corners, box, placed[4:])
         if gap - w <= near:
             return s
-        s += step_to_plane(core, placed, ka, chain, count, nx, ny, nz, top + w + 0.5 * near, s, best - s)
+        s += step_to_plane(moving, nx, ny, nz, top + w + 0.5 * near, s, best - s)
         if s >= best:
             return math.inf
     return s
@@ -205,33 +193,22 @@ def edge_half(corners: Floats, k: int) -> Vector:
 
 
 @kernel
-def walk_rectangle(
-    core: Floats,
-    fixed: Floats,
-    kb: int,
-    box: Floats,
-    w: float,
-    chain: Floats,
-    count: int,
-    near: float,
-    begin: float,
-    best: float,
-    placed: Floats,
-) -> float:
+def walk_rectangle(pair: CorePair, box: Floats, near: float, begin: float, best: float) -> float:
     """Return what `walk_to_box` does, for a rectangle that moves towards a resting core.
 
     Args:
-        core: the rectangle's corners, in order, (4, 3). fixed, kb: the core. box: scratch space, (5, 3).
+        pair: whose moving core is the rectangle, its corners in order. box: scratch space, (5, 3).
     """
-    s = begin
+    moving, fixed, kb, w = pair.moving, pair.fixed, pair.corners, pair.w
+    s, placed = begin, moving.placed
     for _ in range(STEPS):
-        move_core(core, RECTANGLE, chain, count, s, placed)
+        place_core(moving, s)
         put_rectangle(placed, box)
         gap, nx, ny, nz, _ = off_box(fixed, kb, box, placed[4:])
         if gap - w <= near:
             return s
         offset = plane_offset(fixed, kb, -nx, -ny, -nz) + w + 0.5 * near
-        s += step_to_plane(core, placed, RECTANGLE, chain, count, -nx, -ny, -nz, offset, s, best - s)
+        s += step_to_plane(moving, -nx, -ny, -nz, offset, s, best - s)
         if s >= best:
             return math.inf
     return s

@@ -170,8 +170,7 @@ def depth_of(
         T,
         T_link_object,
         limit,
-        work.crossings,
-        work.stack,
+        (work.crossings, work.stack),
     )
     return found
 

@@ -12,6 +12,7 @@ from .mesh_distance import Point, closest_within, corners, is_inside
 
 Masks = NDArray[np.uint8]
 Deepest = tuple[float, Point]
+Scratch = tuple[Floats, Ints]
 
 #: Entries that `penetration` needs for the crossings of one edge; an edge with more is sampled up to the last of them.
 CROSSINGS = 64
@@ -28,8 +29,7 @@ def penetration(
     T_obj_link: Floats,
     T_link_obj: Floats,
     limit: float,
-    crossings: Floats,
-    stack: Ints,
+    scratch: Scratch,
 ) -> tuple[float, float, float, float]:
     """Return the depth of penetration of a link and an object, and its place.
 
@@ -50,14 +50,13 @@ def penetration(
         T_obj_link: maps the link's coordinates to the object's, shape (3, 4).
         T_link_obj: its inverse, shape (3, 4).
         limit: the largest depth that is told apart [m].
-        crossings: scratch, shape (CROSSINGS,).
-        stack: scratch, shape (STACK_SIZE,).
+        scratch: two arrays, shapes (CROSSINGS,) and (STACK_SIZE,).
 
     Returns:
         depth [m], at most `limit`, 0 when disjoint or just touching, and the place x, y, z in the object's frame [m].
     """
-    depth, p = _deepest(link, link_owners, T_obj_link, obj, obj_closed, 0.0, limit, crossings, stack)
-    other, q = _deepest(obj, obj_owners, T_link_obj, link, link_closed, depth, limit, crossings, stack)
+    depth, p = _deepest(link, link_owners, T_obj_link, obj, obj_closed, 0.0, limit, scratch)
+    other, q = _deepest(obj, obj_owners, T_link_obj, link, link_closed, depth, limit, scratch)
     if other > depth:
         x, y, z = moved(T_obj_link, q)
         return other, x, y, z
@@ -83,10 +82,10 @@ def _deepest(
     closed: bool,
     best: float,
     limit: float,
-    crossings: Floats,
-    stack: Ints,
+    scratch: Scratch,
 ) -> Deepest:
     """Return depth and place (in b's frame) of the point of a's surface deepest inside b, if deeper than `best`."""
+    stack = scratch[1]
     vertices, triangles, low, high = a.vertices, a.triangles, a.low, a.high
     first, count, skip = a.first, a.count, a.skip
     place = (0.0, 0.0, 0.0)
@@ -107,7 +106,7 @@ def _deepest(
                 if owners[t] & (1 << k):
                     best, place = _deeper(b, p, closed, best, limit, place, stack)
                 if owners[t] & (8 << k):
-                    best, place = _deeper_on_edge(b, p, q, closed, best, limit, place, crossings, stack)
+                    best, place = _deeper_on_edge(b, p, q, closed, best, limit, place, scratch)
                 p, q, r = q, r, p
         node += 1
     return best, place
@@ -156,10 +155,10 @@ def _deeper_on_edge(
     best: float,
     limit: float,
     place: Point,
-    crossings: Floats,
-    stack: Ints,
+    scratch: Scratch,
 ) -> Deepest:
     """Look at the middle of every piece of the edge pq between crossings with b."""
+    crossings, stack = scratch
     number = _cross_edge(b, p, q, crossings)
     if number == 0:
         return best, place

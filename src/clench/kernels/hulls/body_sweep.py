@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats
-from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.spatial_motion import axis_of, is_spatial, turned_about, way_of
 from clench.kernels.toi.toi_bodies import NONE, keep_earliest, measure, sweep_elements
-from clench.kernels.toi.toi_work import SweepWork, item_of, push_roots
+from clench.kernels.toi.toi_work import BodyPair, SweepWork, item_of, push_roots
 
 from .hull_sweep import NEAR, clear_travel
 from .near_elements import list_near
@@ -23,68 +22,51 @@ UNSURE = -3.0
 
 
 @kernel
-def sweep_body(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    best: float,
-    work: SweepWork,
-) -> float:
+def sweep_body(pair: BodyPair, best: float, work: SweepWork) -> float:
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
     Hulls take the place of elements, which a body of one element would gain nothing from.
 
     Args:
-        chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
+        pair: the bodies.
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
-    if moving.root[m] >= 0 and item_of(moving, moving.root[m]) < 0:
-        return sweep_elements(moving, m, resting, r, chain, count, touch, best, -1, work)
-    if never_meet(moving, m, resting, r, chain, count, touch, best, work):
+    moving, root = pair.moving, pair.moving.root[pair.m]
+    if root >= 0 and item_of(moving, root) < 0:
+        return sweep_elements(pair, best, -1, work)
+    if never_meet(pair, best, work):
         return best
     copy_pose(work.moving, work.begun)
-    found = sweep_stepwise(moving, m, resting, r, chain, count, touch, best, work)
+    found = sweep_stepwise(pair, best, work)
     copy_pose(work.begun, work.moving)
     if found == UNSURE:
-        return sweep_elements(moving, m, resting, r, chain, count, touch, best, -1, work)
+        return sweep_elements(pair, best, -1, work)
     return found
 
 
 @kernel
-def sweep_stepwise(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    best: float,
-    work: SweepWork,
-) -> float:
+def sweep_stepwise(pair: BodyPair, best: float, work: SweepWork) -> float:
     """Return what `sweep_body` returns, or `UNSURE` where elements seem to overlap on the way.
 
     Args:
         work: `begun` has the pose of the moving body. `moving` is overwritten.
     """
+    chain, count, touch = pair.chain, pair.rows, pair.touch
     onward, done, length = work.turned if is_spatial(chain) else work.level, 0.0, FIRST * NEAR
+    ahead = BodyPair(pair.moving, pair.m, pair.resting, pair.r, onward, count, touch)
     while True:
         put_onward(chain, count, done, work, onward)
-        clear = clear_travel(moving, m, resting, r, onward, count, touch, best - done, work)
+        clear = clear_travel(ahead, best - done, work)
         if clear == math.inf:
             return best
         if clear > 0.0:
             done += clear
             put_onward(chain, count, done, work, onward)
         span = min(length, best - done)
-        listed = list_near(moving, m, resting, r, onward, count, touch, span, work)
+        listed = list_near(ahead, span, work)
         if listed < 0:
             span = best - done
-        found = sweep_elements(moving, m, resting, r, onward, count, touch, span, listed, work)
+        found = sweep_elements(ahead, span, listed, work)
         if found < 0.0:
             return found if done == 0.0 else UNSURE
         if found < span:
@@ -95,20 +77,11 @@ def sweep_stepwise(
 
 
 @kernel
-def never_meet(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    best: float,
-    work: SweepWork,
-) -> bool:
+def never_meet(pair: BodyPair, best: float, work: SweepWork) -> bool:
     """Say whether the balls around two bodies, or their extents along a common axis, tell that they never meet."""
-    height, limit = push_roots(moving, m, resting, r, work.stack), measure(best, chain, count)
-    return keep_earliest(moving, resting, 0, height, chain, count, touch, 0.0, 0.0, limit, NONE, work) == 0
+    height = push_roots(pair.moving, pair.m, pair.resting, pair.r, work.stack)
+    limit = measure(best, pair.chain, pair.rows)
+    return keep_earliest(pair, 0, height, 0.0, 0.0, limit, NONE, work) == 0
 
 
 @kernel

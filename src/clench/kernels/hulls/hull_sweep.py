@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import Floats
-from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
-from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.toi.toi_work import BodyPair, SweepWork
 from clench.kernels.trees.obb import slab_top
 
 from .enclosing_hulls import HullArrays
@@ -60,28 +58,19 @@ ROUGH, FINE = 0.3, 0.02
 
 
 @kernel
-def clear_travel(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    best: float,
-    sweep: SweepWork,
-) -> float:
+def clear_travel(pair: BodyPair, best: float, sweep: SweepWork) -> float:
     """Return a travel up to which body `m` is farther than `touch` from body `r`; infinite if it is until `best`.
 
-    Args: see `sweep_body`.
+    Args:
+        pair, sweep: see `sweep_body`.
     """
-    hulls, until, near = moving.hulls.body, best, False
-    if moving.root[m] < 0 or resting.root[r] < 0:
+    hulls, m, until, near = pair.moving.hulls.body, pair.m, best, False
+    if pair.moving.root[m] < 0 or pair.resting.root[pair.r] < 0:
         return math.inf
     if hulls[m] == hulls[m + 1]:
         return 0.0
     for hull in range(hulls[m], hulls[m + 1]):
-        found = clear_hull(moving, hull, resting, r, chain, count, touch, until, sweep)
+        found = clear_hull(pair, hull, until, sweep)
         if found < math.inf:
             until, near = found, True
         if near and until <= 0.0:
@@ -90,28 +79,18 @@ def clear_travel(
 
 
 @kernel
-def clear_hull(
-    moving: BodyArrays,
-    hull: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    best: float,
-    sweep: SweepWork,
-) -> float:
+def clear_hull(pair: BodyPair, hull: int, best: float, sweep: SweepWork) -> float:
     """Return for one hull of the moving body what `clear_travel` returns."""
-    motion, window = motion_of_hull(moving, hull, chain, count, sweep), sweep.hull
+    motion, window = motion_of_hull(pair.moving, hull, pair.chain, pair.rows, sweep), sweep.hull
     forget_planes(window)
-    put_pose(chain, count, 0.0, sweep, window[NOW:END])
+    put_pose(pair.chain, pair.rows, 0.0, sweep, window[NOW:END])
     for c in range(3):
-        window[LAST, c] = window[NOW + c, 3] - resting.box[r, c]
+        window[LAST, c] = window[NOW + c, 3] - pair.resting.box[pair.r, c]
     window[LAST, 3] = 0.0
     sweep.near[0] = -1
     s, end = 0.0, best
     for _ in range(WINDOWS):
-        end = clear_window(moving, motion, resting, r, chain, count, touch, s, end, sweep)
+        end = clear_window(pair, motion, s, end, sweep)
         if end < s:
             return s
         if end >= best:
@@ -122,54 +101,32 @@ def clear_hull(
 
 
 @kernel
-def clear_window(
-    moving: BodyArrays,
-    motion: HullMotion,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    s: float,
-    end: float,
-    sweep: SweepWork,
-) -> float:
+def clear_window(pair: BodyPair, motion: HullMotion, s: float, end: float, sweep: SweepWork) -> float:
     """Return the end of a window from `s` in which a hull stays clear of a body, at most `end`; below `s` if near.
 
     `END` has the pose there.
     """
-    begin_window(moving, motion, chain, count, s, end, sweep)
-    parts = resting.hulls
+    begin_window(pair.moving, motion, pair.chain, pair.rows, s, end, sweep)
+    parts, r = pair.resting.hulls, pair.r
     for part in range(parts.body[r], parts.body[r + 1]):
         if end >= s:
-            w = parts.radius[part] + touch
-            end = keep_off(moving.hulls, motion, parts, part, 0, w, chain, count, s, end, sweep)
+            end = keep_off(pair, motion, parts, part, 0, parts.radius[part] + pair.touch, s, end, sweep)
     if parts.body[r] < parts.body[r + 1]:
         return end
-    return clear_of_tree(moving, motion, resting, r, chain, count, touch, s, end, sweep)
+    return clear_of_tree(pair, motion, s, end, sweep)
 
 
 @kernel
-def clear_of_tree(
-    moving: BodyArrays,
-    motion: HullMotion,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    s: float,
-    end: float,
-    sweep: SweepWork,
-) -> float:
+def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, sweep: SweepWork) -> float:
     """Return what `clear_window` returns for a body without hulls.
 
     The element that ended the window before is looked at first.
     """
-    window, stack, hulls, known = sweep.hull, sweep.stack, moving.hulls, sweep.near[0]
+    window, stack, known = sweep.hull, sweep.stack, sweep.near[0]
+    resting, touch = pair.resting, pair.touch
     if known >= 0:
-        end = keep_off_element(hulls, motion, resting, known, touch, chain, count, s, end, sweep)
-    stack[0, 0], waiting = resting.root[r], 1
+        end = keep_off_element(pair, motion, known, s, end, sweep)
+    stack[0, 0], waiting = resting.root[pair.r], 1
     while waiting > 0 and end >= s:
         waiting -= 1
         n = stack[waiting, 0]
@@ -178,7 +135,7 @@ def clear_of_tree(
         if away > reach * reach or keeps_off_box(resting.slab[n], touch, window):
             continue
         if known < 0 and away > (SOME * ball) ** 2:
-            split, end = keep_off_node(hulls, motion, resting, n, touch, chain, count, s, end, sweep)
+            split, end = keep_off_node(pair, motion, n, s, end, sweep)
             if not split:
                 continue
         if resting.count[n] == 0:
@@ -186,24 +143,16 @@ def clear_of_tree(
             continue
         for e in range(resting.first[n], resting.first[n] + resting.count[n]):
             if end >= s:
-                end = keep_off_element(hulls, motion, resting, e, touch, chain, count, s, end, sweep)
+                end = keep_off_element(pair, motion, e, s, end, sweep)
     return end
 
 
 @kernel
 def keep_off_node(
-    hulls: HullArrays,
-    motion: HullMotion,
-    resting: BodyArrays,
-    n: int,
-    touch: float,
-    chain: Floats,
-    count: int,
-    s: float,
-    end: float,
-    sweep: SweepWork,
+    pair: BodyPair, motion: HullMotion, n: int, s: float, end: float, sweep: SweepWork
 ) -> tuple[bool, float]:
     """Look for a plane that keeps a hull off a node; return whether the node is to be split, and the window's end."""
+    hulls, resting, touch = pair.moving.hulls, pair.resting, pair.touch
     window, slab = sweep.hull, resting.slab[n]
     now, least = window[NOW:END], SOME * window[LAST, 3] + motion.radius
     put_box_corners(slab, window)
@@ -220,27 +169,16 @@ def keep_off_node(
         return False, end
     if start - top < FAR * resting.node[n, 3]:
         return True, end
-    end = shorten(hulls, motion, v, start, top, chain, count, s, end, sweep)
+    end = shorten(pair, motion, v, start, top, s, end, sweep)
     renew_planes(hulls, motion, end - s, window)
     return False, end
 
 
 @kernel
-def keep_off_element(
-    hulls: HullArrays,
-    motion: HullMotion,
-    resting: BodyArrays,
-    e: int,
-    touch: float,
-    chain: Floats,
-    count: int,
-    s: float,
-    end: float,
-    sweep: SweepWork,
-) -> float:
+def keep_off_element(pair: BodyPair, motion: HullMotion, e: int, s: float, end: float, sweep: SweepWork) -> float:
     """Return what `keep_off` returns for an element; one that ends the window is kept in `sweep.near`."""
-    w, corners = resting.radius[e] + touch, put_element(resting, e, sweep.hull)
-    found = keep_off(hulls, motion, hulls, -1, corners, w, chain, count, s, end, sweep)
+    w, corners = pair.resting.radius[e] + pair.touch, put_element(pair.resting, e, sweep.hull)
+    found = keep_off(pair, motion, pair.moving.hulls, -1, corners, w, s, end, sweep)
     if found < end:
         sweep.near[0] = e
     return float(found)
@@ -248,14 +186,12 @@ def keep_off_element(
 
 @kernel
 def keep_off(
-    hulls: HullArrays,
+    pair: BodyPair,
     motion: HullMotion,
     others: HullArrays,
     other: int,
     corners: int,
     w: float,
-    chain: Floats,
-    count: int,
     s: float,
     end: float,
     sweep: SweepWork,
@@ -263,10 +199,10 @@ def keep_off(
     """Return the end of a window in which a hull stays off another one, at most `end`; below `s` if it is near.
 
     Args:
-        hulls, motion: the hull. others, other: the other one, or -1 for the first `corners` of the window's corners.
+        motion: of the hull. others, other: the other one, or -1 for the first `corners` of the window's corners.
         w: by which the other one is grown [m]. The rest as in `clear_window`.
     """
-    window, points = sweep.hull, sweep.hull[CORNERS : CORNERS + corners]
+    hulls, window, points = pair.moving.hulls, sweep.hull, sweep.hull[CORNERS : CORNERS + corners]
     if keeps_off_hull(others, other, points, w, window):
         return end
     now, simplex, direction = window[NOW:END], window[SIMPLEX:CORNERS], window[LAST]
@@ -281,20 +217,18 @@ def keep_off(
     remember_plane(n, start, low, window)
     if low <= top:
         window[LAST, 3] = start - top
-        end = shorten(hulls, motion, n, start, top, chain, count, s, end, sweep)
+        end = shorten(pair, motion, n, start, top, s, end, sweep)
         renew_planes(hulls, motion, end - s, window)
     return end
 
 
 @kernel
 def shorten(
-    hulls: HullArrays,
+    pair: BodyPair,
     motion: HullMotion,
     n: Vector,
     start: float,
     top: float,
-    chain: Floats,
-    count: int,
     s: float,
     end: float,
     sweep: SweepWork,
@@ -307,16 +241,16 @@ def shorten(
         n: the direction, from what rests to the hull. start: height of the hull along it at `s`.
         top: height of what rests [m].
     """
-    window, gap, length = sweep.hull, start - top, end - s
+    hulls, window, gap, length = pair.moving.hulls, sweep.hull, start - top, end - s
     least = gap / motion.speed
     left = least_height(hulls, motion, n, start, length, window) - top
     for _ in range(TRIALS):
         length = max(length * (1.0 - LEFT) * gap / (gap - left), least)
-        put_pose(chain, count, s + length, sweep, window[END:SIMPLEX])
+        put_pose(pair.chain, pair.rows, s + length, sweep, window[END:SIMPLEX])
         if length <= least:
             return s + length
         left = least_height(hulls, motion, n, start, length, window) - top
         if left > 0.0:
             return s + length
-    put_pose(chain, count, s + least, sweep, window[END:SIMPLEX])
+    put_pose(pair.chain, pair.rows, s + least, sweep, window[END:SIMPLEX])
     return s + least

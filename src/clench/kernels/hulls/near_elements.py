@@ -6,7 +6,7 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
-from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.toi.toi_work import BodyPair, SweepWork
 
 from .enclosing_hulls import HullArrays
 from .gjk import lowest_of, separating_direction
@@ -33,22 +33,13 @@ from .hull_window import (
 
 
 @kernel
-def list_near(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    end: float,
-    sweep: SweepWork,
-) -> int:
-    """List the elements of body `r` that body `m` may come within `touch` of before `end` in `sweep.listed`.
+def list_near(pair: BodyPair, end: float, sweep: SweepWork) -> int:
+    """List in `sweep.listed` the elements of the resting body that the moving one may touch before `end`.
 
     Returns:
-        how many there are, or -1 where there are too many, or where body `m` has no hulls: then any can be met.
+        how many there are, or -1 where there are too many, or where the moving body has no hulls: then any can be met.
     """
+    moving, m, chain, count = pair.moving, pair.m, pair.chain, pair.rows
     found, window = 0, sweep.hull
     if moving.hulls.body[m] == moving.hulls.body[m + 1]:
         return -1
@@ -57,7 +48,7 @@ def list_near(
         forget_planes(window)
         put_pose(chain, count, 0.0, sweep, window[NOW:END])
         begin_window(moving, motion, chain, count, 0.0, end, sweep)
-        found = list_near_hull(moving.hulls, motion, resting, r, touch, end, found, sweep)
+        found = list_near_hull(moving.hulls, motion, pair.resting, pair.r, pair.touch, end, found, sweep)
         if found < 0:
             return -1
     return found

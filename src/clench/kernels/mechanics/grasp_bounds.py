@@ -9,6 +9,9 @@ from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .wrench_bound import resisted_ball
 
+#: Directions of the edges, and of the faces, of a friction polyhedron.
+Directions = tuple[Floats, Floats]
+
 
 @entry_kernel(allocates=True)
 def bound_grasps(
@@ -19,8 +22,7 @@ def bound_grasps(
     torsion: float,
     center: Floats,
     length: float,
-    around: Floats,
-    between: Floats,
+    directions: Directions,
     rounds: int,
     out: Floats,
 ) -> None:
@@ -31,11 +33,11 @@ def bound_grasps(
         position: [m], inward: unit normals into the object, friction: [-]; of all contacts, (C, 3), (C, 3), (C,).
         torsion: torsional coefficient of soft fingers [m]; 0: point contacts with friction.
         center: of mass, in the frame of the contacts [m], (N, 3). length: length scale of wrenches [m].
-        around, between: unit directions of the edges and of the faces of the friction polyhedra, (E, 2).
+        directions: unit directions of the edges and of the faces of the friction polyhedra, (E, 2).
         rounds: of reweighting, see `resisted_ball`. out: [N per N of normal force], (N,).
     """
     soft = 1 if torsion > 0.0 else 0
-    edges, width = len(around), 3 + soft
+    edges, width = len(directions[0]), 3 + soft
     for n in range(len(out)):
         out[n] = 0.0
         begin, count = first[n], first[n + 1] - first[n]
@@ -47,16 +49,17 @@ def bound_grasps(
         reach, caps = np.ones((count, width)), np.zeros((1, width * count))
         for i in range(count):
             _put_columns(G, width, i, position[begin + i], inward[begin + i], center[n], length)
-            _put_cone(generators[i], faces[i], reach[i], friction[begin + i], torsion, around, between)
+            _put_cone(generators[i], faces[i], reach[i], friction[begin + i], torsion, directions)
             caps[0, width * i + 2] = 1.0
         out[n] = resisted_ball(G, generators, faces, reach, caps, np.ones(1), rounds)
 
 
 @kernel
 def _put_cone(
-    generators: Floats, faces: Floats, reach: Floats, mu: float, torsion: float, around: Floats, between: Floats
+    generators: Floats, faces: Floats, reach: Floats, mu: float, torsion: float, directions: Directions
 ) -> None:
     """Write the edges and the inward face normals of a friction polyhedron, and its semi-axes."""
+    around, between = directions
     edges = len(around)
     lean = np.cos(np.pi / edges)
     reach[0] = reach[1] = mu

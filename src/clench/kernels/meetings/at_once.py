@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.bundles import clear_answer
-from clench.kernels.closing.close_candidate import close_candidate
-from clench.kernels.closing.layout import CandidateArrays, ClosingArrays, Floats, HandArrays, Ints, SectionArrays, Work
-from clench.kernels.closing.solve_layout import ObjectArrays
+from clench.kernels.closing.close_candidate import close_on_object
+from clench.kernels.closing.layout import CandidateArrays, ClosingArrays, Floats, Ints
+from clench.kernels.closing.solve_layout import Closed, ProblemArrays, Workspace
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
-from clench.kernels.toi.toi_work import SweepWork
 
 from .finger_lanes import leave_out_lanes
 from .finger_motion import put_motion
@@ -125,46 +124,38 @@ def hold_where_they_meet(
 
 @kernel(allocates=True)
 def close_at_once(
-    hand: HandArrays,
+    problem: ProblemArrays,
     full_width: FullWidthArrays,
-    target: ObjectArrays,
     T_palm_object: Floats,
-    candidates: CandidateArrays,
-    shared: SectionArrays,
-    own: SectionArrays,
-    fingers: FingerLinks,
+    space: Workspace,
     chosen: Ints,
-    blocked: Ints,
-    workspace: MeetingWork,
-    work: Work,
-    sweep: SweepWork,
-    answer: ClosingArrays,
-    anew: Ints,
-    overlapping: Ints,
-    met: Meetings,
+    final: ClosingArrays,
+    found: Closed,
+    n: int,
 ) -> int:
     """Close fingers anew that meet each other on their way, all of them moving at once.
 
     The joints of either finger up to the links that meet are held from there on, and the finger closes again.
 
     Args:
-        hand, full_width, T_palm_object, candidates, shared, own: see `close_candidates`; `full_width` has the object.
-            target: the object.
-        fingers: their links. chosen: one candidate of every finger that is swept over its full width, (K,).
-        blocked: whether a finger posture overlaps the object before anything moves, (E,); its finger stays where it is.
-        workspace, work, sweep: scratch space. answer: read, and written for candidates that close anew.
-        anew: written with which candidates closed anew, (I,). overlapping: written with which candidates' fingers
-            overlap another one before they move, (I,); such fingers are left alone. met: written.
+        full_width: of the picked candidates, with the object. space: which has these candidates.
+        chosen: one candidate of every finger that is swept over its full width, (K,).
+        final: answers of the picked candidates: read, and written for those that close anew.
+        found: `anew`, `overlapping` and `met` are written at pose `n`. A finger that is blocked stays where it is;
+            fingers that overlap another one before they move are left alone.
 
     Returns:
         the capacity wanted, or 0.
     """
+    chain, fingers, candidates, workspace = problem.hand.chain, problem.fingers, space.picked, space.meeting
+    blocked, anew, overlapping = found.blocked[n], found.anew[n], found.overlapping[n]
+    met = Meetings(found.met.size[n], found.met.number[n], found.met.value[n])
     for i in range(candidates.finger_posture.shape[0]):
         anew[i], overlapping[i], workspace.until[i] = 0, 0, candidates.until[i]
     count = list_pairs(full_width, fingers, candidates, chosen, workspace)
     for k in range(chosen.shape[0]):
         finger_posture = candidates.finger_posture[chosen[k]]
-        put_motion(full_width, hand.chain, finger_posture, blocked[finger_posture] != 0, answer, chosen[k], workspace)
+        put_motion(full_width, chain, finger_posture, blocked[finger_posture] != 0, final, chosen[k], workspace)
     set_off(full_width, fingers, candidates, chosen, -1, 0.0, count, workspace)
     bound, met.size[0] = held_candidates(candidates, workspace.until), 0
     while True:
@@ -178,7 +169,7 @@ def close_at_once(
             (candidates.finger_posture[chosen[a]], candidates.finger_posture[chosen[b]]),
             p,
             workspace,
-            sweep,
+            space.sweep,
         )
         if told == FREE:
             workspace.at[p] = math.inf
@@ -191,24 +182,10 @@ def close_at_once(
                 if held[which] < 0:
                     continue
                 k, i = workspace.pair[p, which], chosen[workspace.pair[p, which]]
-                clear_answer(answer, i)
-                close_candidate(
-                    hand,
-                    full_width,
-                    target,
-                    T_palm_object,
-                    shared,
-                    own,
-                    bound,
-                    i,
-                    1,
-                    True,
-                    work,
-                    sweep,
-                    answer,
-                )
-                if answer.overflow[i] > 0:
-                    return int(answer.overflow[i])
+                clear_answer(final, i)
+                close_on_object(problem, full_width, bound, T_palm_object, space, final, i, 1, True)
+                if final.overflow[i] > 0:
+                    return int(final.overflow[i])
                 anew[i] = 1
-                put_motion(full_width, hand.chain, candidates.finger_posture[i], False, answer, i, workspace)
+                put_motion(full_width, chain, candidates.finger_posture[i], False, final, i, workspace)
                 set_off(full_width, fingers, candidates, chosen, k, at, count, workspace)

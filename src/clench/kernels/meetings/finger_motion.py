@@ -11,7 +11,7 @@ from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.full_width import FullWidthArrays, turn_about
 from clench.kernels.toi.spatial_motion import turned_about
 
-from .meeting_layout import FingerLinks, MeetingWork
+from .meeting_layout import FingerLinks, LinkPair, MeetingWork
 
 #: Motions that differ by less are one [-].
 ROUNDING = 1e-12
@@ -165,17 +165,37 @@ def motion_along(
 
 
 @kernel
-def approach_along(
-    full_width: FullWidthArrays,
-    fingers: FingerLinks,
-    finger_postures: tuple[int, int],
-    rows: tuple[int, int],
-    n: Vector,
-    at: float,
-    end: float,
-    workspace: MeetingWork,
-) -> tuple[float, float, float]:
+def even_until(pair: LinkPair, at: float, end: float) -> float:
+    """Return up to where every joint that moves either of two links turns evenly from a place on, at most `end`."""
+    full_width, fingers, workspace = pair.full_width, pair.fingers, pair.workspace
+    (one, other), (m, r) = pair.finger_postures, pair.rows
+    until = next_change(full_width, fingers, one, m, at, end, workspace)
+    return next_change(full_width, fingers, other, r, at, until, workspace)
+
+
+@kernel
+def speeds_of(pair: LinkPair, at: float) -> float:
+    """Return a bound on how fast two links approach each other from a place on [m]."""
+    full_width, fingers, workspace = pair.full_width, pair.fingers, pair.workspace
+    (one, other), (m, r) = pair.finger_postures, pair.rows
+    speed = speed_of(full_width, fingers, one, m, at, workspace)
+    return speed + speed_of(full_width, fingers, other, r, at, workspace)
+
+
+@kernel
+def place_links_at(pair: LinkPair, at: float, first: Floats, second: Floats) -> None:
+    """Write the poses of two links at a place of the motion, (3, 4) each, and their joints' turns."""
+    full_width, fingers, workspace = pair.full_width, pair.fingers, pair.workspace
+    (one, other), (m, r) = pair.finger_postures, pair.rows
+    place_link(full_width, fingers, one, m, at, workspace, first)
+    place_link(full_width, fingers, other, r, at, workspace, second)
+
+
+@kernel
+def approach_along(pair: LinkPair, n: Vector, at: float, end: float) -> tuple[float, float, float]:
     """Return the sums of the results of `motion_along` for two links, one of either finger posture."""
-    way, speed, bend = motion_along(full_width, fingers, finger_postures[0], rows[0], n, at, end, workspace)
-    other, more, further = motion_along(full_width, fingers, finger_postures[1], rows[1], n, at, end, workspace)
-    return way + other, speed + more, bend + further
+    full_width, fingers, workspace = pair.full_width, pair.fingers, pair.workspace
+    (one, other), (m, r) = pair.finger_postures, pair.rows
+    way, speed, bend = motion_along(full_width, fingers, one, m, n, at, end, workspace)
+    longer, more, further = motion_along(full_width, fingers, other, r, n, at, end, workspace)
+    return way + longer, speed + more, bend + further

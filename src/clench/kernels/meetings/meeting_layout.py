@@ -8,6 +8,8 @@ import numpy as np
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.toi.full_width import FullWidthArrays
+from clench.kernels.toi.toi_work import SweepWork
 
 
 class FingerLinks(NamedTuple):
@@ -74,6 +76,22 @@ class MeetingWork(NamedTuple):
     reach: Floats
     ahead: Floats
     touch: Floats
+
+
+class LinkPair(NamedTuple):
+    """Two links of simultaneously closing fingers; kernels hold what is large by pointers.
+
+    Args:
+        full_width, fingers: of the hand. finger_postures: of the two fingers. rows: the links, of `fingers`.
+        workspace, sweep: scratch space; `sweep` has the poses of the links.
+    """
+
+    full_width: FullWidthArrays
+    fingers: FingerLinks
+    finger_postures: tuple[int, int]
+    rows: tuple[int, int]
+    workspace: MeetingWork
+    sweep: SweepWork
 
 
 @kernel(allocates=True)

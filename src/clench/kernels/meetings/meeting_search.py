@@ -15,9 +15,9 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.toi_work import SweepWork
 
-from .finger_motion import ROUNDING, approach_along, last_end, next_change, place_link, put_axes, speed_of
+from .finger_motion import ROUNDING, approach_along, even_until, last_end, place_links_at, put_axes, speeds_of
 from .hull_planes import find_plane, plane_between
-from .meeting_layout import FingerLinks, MeetingWork
+from .meeting_layout import FingerLinks, LinkPair, MeetingWork
 from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shorter_step, step_by_elements
 
 #: Hulls nearer than this are measured by their elements [m].
@@ -81,52 +81,28 @@ def point_at(T: Floats, p: Floats) -> Vector:
 
 
 @kernel
-def place_pair(
-    full_width: FullWidthArrays,
-    fingers: FingerLinks,
-    one: int,
-    other: int,
-    m: int,
-    r: int,
-    at: float,
-    workspace: MeetingWork,
-    sweep: SweepWork,
-) -> None:
-    """Write the poses of two links, of two finger postures, at a place of the motion to `sweep`, and their joints'
-    turns.
-    """
-    place_link(full_width, fingers, one, m, at, workspace, sweep.moving)
-    place_link(full_width, fingers, other, r, at, workspace, sweep.resting)
+def links_of(pair: LinkPair) -> tuple[int, int]:
+    """Return the numbers of two links in the hand."""
+    link, (m, r) = pair.fingers.link, pair.rows
+    return int(link[m]), int(link[r])
 
 
 @kernel
-def step_by_plane(
-    full_width: FullWidthArrays,
-    fingers: FingerLinks,
-    finger_postures: tuple[int, int],
-    rows: tuple[int, int],
-    n: Vector,
-    margin: float,
-    at: float,
-    end: float,
-    workspace: MeetingWork,
-    sweep: SweepWork,
-) -> float:
+def step_by_plane(pair: LinkPair, n: Vector, margin: float, at: float, end: float) -> float:
     """Return how far two links advance from a place of the motion, kept apart by planes across one direction.
 
     Args:
-        finger_postures, rows: of the links, which stand in `sweep`. n: unit vector from the second link to the first.
+        pair: the links. n: unit vector from the second link to the first.
         margin: how far planes across it keep them apart there, above 0 [m]. end: of their motion.
 
     Returns:
         the step; infinite where it leads to the end.
     """
-    if approach_along(full_width, fingers, finger_postures, rows, n, at, end, workspace)[0] < margin:
+    if approach_along(pair, n, at, end)[0] < margin:
         return math.inf
-    until = next_change(full_width, fingers, finger_postures[0], rows[0], at, end, workspace)
-    until = next_change(full_width, fingers, finger_postures[1], rows[1], at, until, workspace)
-    _, speed, bend = approach_along(full_width, fingers, finger_postures, rows, n, at, until, workspace)
-    m, r, width = fingers.link[rows[0]], fingers.link[rows[1]], until - at
+    until, sweep = even_until(pair, at, end), pair.sweep
+    _, speed, bend = approach_along(pair, n, at, until)
+    (m, r), width = links_of(pair), until - at
     if speed * width < margin:
         return width
     least = margin / speed
@@ -135,10 +111,8 @@ def step_by_plane(
     for _ in range(LENGTHS):
         if step <= least:
             break
-        place_pair(
-            full_width, fingers, finger_postures[0], finger_postures[1], rows[0], rows[1], at + step, workspace, sweep
-        )
-        left = plane_between(full_width.links, m, r, n[0], n[1], n[2], sweep)
+        place_links_at(pair, at + step, sweep.moving, sweep.resting)
+        left = plane_between(pair.full_width.links, m, r, n[0], n[1], n[2], sweep)
         if lowest_on(step, margin, left, bend) > level:
             return step
         step = shorter_step(step, margin - level, left - level, bend)
@@ -165,13 +139,14 @@ def look_at(
     """Let a pair of links go on by a step, and return `ON`, `FREE` or `MEETS`."""
     pair, plane, at = workspace.pair[p], workspace.plane[p], workspace.at[p]
     rows = (pair[2], pair[3])
-    m, r = fingers.link[rows[0]], fingers.link[rows[1]]
+    both = LinkPair(full_width, fingers, finger_postures, rows, workspace, sweep)
+    m, r = links_of(both)
     end = last_end(full_width, fingers, finger_postures[0], rows[0], workspace)
     end = max(end, last_end(full_width, fingers, finger_postures[1], rows[1], workspace))
     # Links that are held where they met touch at the end of their motion.
     if at >= (1.0 - ROUNDING) * end:
         return FREE
-    place_pair(full_width, fingers, finger_postures[0], finger_postures[1], rows[0], rows[1], at, workspace, sweep)
+    place_links_at(both, at, sweep.moving, sweep.resting)
     put_axes(full_width, fingers, finger_postures[0], rows[0], workspace)
     put_axes(full_width, fingers, finger_postures[1], rows[1], workspace)
     margin, nx, ny, nz = find_plane(full_width.links, m, r, plane[0], plane[1], plane[2], sweep)
@@ -185,20 +160,14 @@ def look_at(
             if gap <= TOUCH or pair[5] == LOOKS:
                 put_touch(gap, n, point, at, workspace.touch)
                 return MEETS
-            step = step_by_elements(
-                full_width, fingers, finger_postures, rows, gap, n, pair[6:], at, end, workspace, sweep
-            )
+            step = step_by_elements(both, gap, n, pair[6:], at, end)
             nx, ny, nz = n
             margin = min(plane_between(full_width.links, m, r, nx, ny, nz, sweep), gap)
         else:
-            speed = speed_of(full_width, fingers, finger_postures[0], rows[0], at, workspace)
-            step = gap / (speed + speed_of(full_width, fingers, finger_postures[1], rows[1], at, workspace))
+            step = gap / speeds_of(both, at)
         workspace.reach[p] = max(WIDER * gap, REACH)
     if margin > 0.0:
-        step = max(
-            step,
-            step_by_plane(full_width, fingers, finger_postures, rows, (nx, ny, nz), margin, at, end, workspace, sweep),
-        )
+        step = max(step, step_by_plane(both, (nx, ny, nz), margin, at, end))
     workspace.at[p] = at + step
     return ON if at + step < (1.0 - ROUNDING) * end else FREE
 

@@ -10,7 +10,6 @@ from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import plane_gap
-from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.separating_planes import span
 from clench.kernels.toi.toi_work import (
     SweepWork,
@@ -22,8 +21,8 @@ from clench.kernels.toi.toi_work import (
     split_pair,
 )
 
-from .finger_motion import approach_along, next_change, place_link, speed_of
-from .meeting_layout import FingerLinks, MeetingWork
+from .finger_motion import approach_along, even_until, place_links_at, speeds_of
+from .meeting_layout import LinkPair
 
 #: Gap at which links meet [m].
 TOUCH = 1e-11
@@ -123,53 +122,35 @@ def shorter_step(step: float, margin: float, left: float, bend: float) -> float:
 
 
 @kernel
-def step_by_elements(
-    full_width: FullWidthArrays,
-    fingers: FingerLinks,
-    finger_postures: tuple[int, int],
-    rows: tuple[int, int],
-    gap: float,
-    n: Vector,
-    near: Ints,
-    at: float,
-    end: float,
-    workspace: MeetingWork,
-    sweep: SweepWork,
-) -> float:
+def step_by_elements(pair: LinkPair, gap: float, n: Vector, near: Ints, at: float, end: float) -> float:
     """Return how far two links advance from a place of the motion, kept apart by planes between their elements.
 
     Elements that are farther apart than links approach each other on the step do not count.
 
     Args:
-        finger_postures, rows: of the links, which stand in `sweep`. gap: of the links [m].
+        pair: the links. gap: of the links [m].
         n, near: unit vector between their nearest elements, and these. at: the place. end: of their motion.
     """
-    links, stack = full_width.links, sweep.stack
-    until = next_change(full_width, fingers, finger_postures[0], rows[0], at, end, workspace)
-    until = next_change(full_width, fingers, finger_postures[1], rows[1], at, until, workspace)
-    speed = speed_of(full_width, fingers, finger_postures[0], rows[0], at, workspace)
-    speed += speed_of(full_width, fingers, finger_postures[1], rows[1], at, workspace)
-    _, across, _ = approach_along(full_width, fingers, finger_postures, rows, n, at, until, workspace)
+    links, sweep, stack = pair.full_width.links, pair.sweep, pair.sweep.stack
+    until, speed = even_until(pair, at, end), speeds_of(pair, at)
+    _, across, _ = approach_along(pair, n, at, until)
     least = gap / speed
     step = min(until - at, AROUND * gap / max(across, FLAT * speed))
     if step <= least:
         return least
-    put_ahead(full_width, fingers, finger_postures, rows, at + step, workspace)
+    put_ahead(pair, at + step)
     # The nearest elements tell most.
-    step = step_of_elements(
-        full_width, fingers, finger_postures, rows, near[0], near[1], at, until, step, workspace, sweep
-    )
+    step = step_of_elements(pair, near[0], near[1], at, until, step)
     put_sides(n, sweep)
-    waiting = push_roots(links, fingers.link[rows[0]], links, fingers.link[rows[1]], stack)
+    m, r = pair.rows
+    waiting = push_roots(links, pair.fingers.link[m], links, pair.fingers.link[r], stack)
     while waiting > 0 and step > least:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
         if are_apart(links, a, b, speed * step, across * step, sweep):
             continue
         if a < 0 and b < 0:
-            step = step_of_elements(
-                full_width, fingers, finger_postures, rows, -1 - a, -1 - b, at, until, step, workspace, sweep
-            )
+            step = step_of_elements(pair, -1 - a, -1 - b, at, until, step)
             continue
         height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
         put_nearest_last(links, links, stack, waiting, height, sweep)
@@ -178,42 +159,23 @@ def step_by_elements(
 
 
 @kernel
-def put_ahead(
-    full_width: FullWidthArrays,
-    fingers: FingerLinks,
-    finger_postures: tuple[int, int],
-    rows: tuple[int, int],
-    at: float,
-    workspace: MeetingWork,
-) -> None:
+def put_ahead(pair: LinkPair, at: float) -> None:
     """Write the poses of two links at a place of the motion to `workspace.ahead`."""
-    place_link(full_width, fingers, finger_postures[0], rows[0], at, workspace, workspace.ahead[0])
-    place_link(full_width, fingers, finger_postures[1], rows[1], at, workspace, workspace.ahead[1])
+    ahead = pair.workspace.ahead
+    place_links_at(pair, at, ahead[0], ahead[1])
 
 
 @kernel
-def step_of_elements(
-    full_width: FullWidthArrays,
-    fingers: FingerLinks,
-    finger_postures: tuple[int, int],
-    rows: tuple[int, int],
-    i: int,
-    k: int,
-    at: float,
-    until: float,
-    step: float,
-    workspace: MeetingWork,
-    sweep: SweepWork,
-) -> float:
+def step_of_elements(pair: LinkPair, i: int, k: int, at: float, until: float, step: float) -> float:
     """Return how far of a step, to which `workspace.ahead` belongs, a plane is seen to keep two elements apart.
 
     Args:
         i, k: the elements. until: up to where every joint turns evenly.
     """
-    links, ahead = full_width.links, sweep.placed
+    links, sweep, ahead = pair.full_width.links, pair.sweep, pair.sweep.placed
     ka, kb, w = links.corners[i], links.corners[k], links.radius[i] + links.radius[k]
     gap, n, _ = elements_gap(links, i, k, sweep)
-    _, speed, bend = approach_along(full_width, fingers, finger_postures, rows, n, at, until, workspace)
+    _, speed, bend = approach_along(pair, n, at, until)
     level = min(0.5 * gap, 0.5 * TOUCH)
     if speed * step < gap - level:
         return step
@@ -221,13 +183,13 @@ def step_of_elements(
     for _ in range(LENGTHS):
         if step <= least:
             return step
-        put_core(links, i, workspace.ahead[0], ahead)
-        put_core(links, k, workspace.ahead[1], ahead[4:])
+        put_core(links, i, pair.workspace.ahead[0], ahead)
+        put_core(links, k, pair.workspace.ahead[1], ahead[4:])
         left = plane_gap(ahead, ka, ahead[4:], kb, n[0], n[1], n[2]) - w
         if lowest_on(step, gap, left, bend) > level:
             return step
         step = max(shorter_step(step, gap - level, left - level, bend), least)
-        put_ahead(full_width, fingers, finger_postures, rows, at + step, workspace)
+        put_ahead(pair, at + step)
     if step > least:
-        put_ahead(full_width, fingers, finger_postures, rows, at + least, workspace)
+        put_ahead(pair, at + least)
     return least

@@ -34,6 +34,7 @@ from clench.kernels.closing.settling import settle_pair
 from clench.kernels.closing.solve_layout import (
     Arena,
     Closed,
+    Closing,
     CommandArrays,
     ObjectArrays,
     ProblemArrays,
@@ -50,7 +51,7 @@ from clench.kernels.sections.advance import advance
 from clench.kernels.sections.plane_contact import describe_contact, settle_contact
 from clench.kernels.sections.plane_sections import cut_first_axis_groups
 from clench.kernels.toi.full_width import planes_only
-from clench.kernels.toi.toi_links import sweep_stage
+from clench.kernels.toi.toi_links import Stage, sweep_stage
 from clench.kernels.toi.toi_work import SweepWork
 from clench.kernels.trees.bvh import MeshTree, build_tree
 
@@ -149,9 +150,7 @@ def sample_values() -> dict[str, Any]:
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values["tree"] = tree
     values |= dict.fromkeys(("closed", "together"), True)
-    values |= dict.fromkeys(
-        ("axis_group", "start", "base", "low", "high", "times", "dof", "plane", "finger_posture", "i", "n"), 0
-    )
+    values |= dict.fromkeys(("axis_group", "start", "base", "times", "dof", "plane", "finger_posture", "i", "n"), 0)
     values |= _solve_values(values)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
@@ -161,6 +160,12 @@ def sample_values() -> dict[str, Any]:
     }
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])
+    poses, turns, T = _arrays("f3 f1 f2")
+    names = ("hand", "full_width", "obj", "shared", "own", "candidates", "work", "sweep", "answer")
+    held = {name: kept(values[name]) for name in names}
+    values["closing"] = Closing(T_palm_object=T, **held)
+    values["stage"] = Stage(held["full_width"], kept(chain), 0, poses, T, turns, turns, 0.0)
+    values["planes"] = (0, 0)
     return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
 
 

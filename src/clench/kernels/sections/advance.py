@@ -15,6 +15,7 @@ from clench.kernels.closing.layout import (
     HandArrays,
     Outline,
     OutlineArrays,
+    PlaneSection,
     SectionArrays,
     Work,
 )
@@ -112,17 +113,13 @@ def fill_chain(joint: int, first: int, rates: Floats, place: Floats, work: Work)
 
 @kernel
 def advance_outline(
-    chain: ChainArrays,
-    outlines: OutlineArrays,
+    hand: HandArrays,
     o: int,
     axis_group: int,
-    sections: SectionArrays,
-    row: int,
-    closed: bool,
+    section: PlaneSection,
     first: int,
     turns: Floats,
     rates: Floats,
-    touch: float,
     best: float,
     work: Work,
 ) -> float:
@@ -133,6 +130,7 @@ def advance_outline(
     cut into short strides. At the start of a stride a feature's gap costs no trigonometry, and most gaps are too wide
     for it.
     """
+    chain, outlines = hand.chain, hand.outlines
     joint, place = outlines.joint[o], work.place
     count, last, rate, speed = fill_chain(joint, first, rates, place, work)
     if count == 0:
@@ -142,9 +140,9 @@ def advance_outline(
         mirror = -1.0 if rate < 0.0 else 1.0
         outline = put_outline(outlines, o, joint, place, place[last, 0], place[last, 1], mirror, work)
         work.chain[0, 0] = abs(rate)
-        best = turn_outline(outline, sections, row, closed, px, pz, mirror, abs(rate), touch, best, work)
-        return sweep_ellipses(outline, sections, row, px, pz, mirror, 1, touch, best, work)
-    begun = 0.0
+        best = turn_outline(outline, section, (px, pz, mirror), abs(rate), best, work)
+        return sweep_ellipses(outline, section, (px, pz, mirror), 1, best, work)
+    begun, origin = 0.0, (px, pz, 1.0)
     while begun < best:
         for j in range(turns.shape[0]):
             work.turns[j] = turns[j] + rates[j] * begun
@@ -153,13 +151,13 @@ def advance_outline(
         outline = put_outline(outlines, o, joint, work.moved, work.moved[last, 0], work.moved[last, 1], 1.0, work)
         x, z = work.moved[last, 0], work.moved[last, 1]
         speed += abs(rate) * farthest(work.stadium, o)
-        lead, nearest = first_near(outline, sections, row, x, z, speed, touch, work)
+        lead, nearest = first_near(outline, section.sections, section.row, x, z, speed, section.touch, work)
         if lead > STRIDE:
             begun += lead
             continue
         stride = min(STRIDE, best - begun)
-        found = sweep_outline(outline, sections, row, closed, px, pz, x, z, nearest, count, speed, touch, stride, work)
-        found = sweep_ellipses(outline, sections, row, px, pz, 1.0, count, touch, found, work)
+        found = sweep_outline(outline, section, origin, (x, z), nearest, count, speed, stride, work)
+        found = sweep_ellipses(outline, section, origin, count, found, work)
         if found < stride:
             return sooner(begun + found, best)
         begun += stride
@@ -172,8 +170,7 @@ def advance(
     axis_group: int,
     sections: SectionArrays,
     base: int,
-    low: int,
-    high: int,
+    planes: tuple[int, int],
     closed: bool,
     turns: Floats,
     rates: Floats,
@@ -184,7 +181,7 @@ def advance(
 
     Args:
         hand: the fingers. axis_group: the axis group of the active joints.
-        sections: whose row `plane - base` belongs to `plane`. low, high: the range of planes in use.
+        sections: whose row `plane - base` belongs to `plane`. planes: the range of those in use.
         closed: the object's winding is known, so that only its outer side counts.
         turns: of every joint at the start [rad], (J,). rates: turn per unit of travel, 0 for resting joints, (J,).
         length: of the segment [travel].
@@ -202,23 +199,10 @@ def advance(
         return best, contact
     place_joints(hand.chain, axis_group, turns, work.place)
     touch = TOUCH_FRACTION * hand.axis_group_length[axis_group]
-    for plane in range(low, high):
+    for plane in range(planes[0], planes[1]):
+        section = PlaneSection(sections, plane - base, closed, touch)
         for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
-            found = advance_outline(
-                hand.chain,
-                hand.outlines,
-                o,
-                axis_group,
-                sections,
-                plane - base,
-                closed,
-                first,
-                turns,
-                rates,
-                touch,
-                best,
-                work,
-            )
+            found = advance_outline(hand, o, axis_group, section, first, turns, rates, best, work)
             if found < best:
                 best, contact = found, plane
                 if best == 0.0:

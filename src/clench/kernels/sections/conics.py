@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 
 from clench.core.tolerances import FOOT_FRACTION
-from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
+from clench.kernels.closing.layout import KIND_SIDE, Floats, Line, Outline, Work
 from clench.kernels.runtime.compiling import kernel
 
 from .coupled import STEPS, bounds, cosine_and_sine, evaluate, line_on_point, safe_step
 from .coupled_pairs import side_foot
-from .turning_pairs import note
+from .turning_pairs import note, other_face
 
 #: Inverses of products below this run over [m^2]: such a point is on the axis.
 NOTHING = 1e-290
@@ -149,20 +149,10 @@ def turn_to_curve(e: Floats, first: float, last: float, nx: float, nz: float, se
 
 @kernel
 def sweep_side_region(
-    chain: Floats,
-    terms: Floats,
-    count: int,
-    nx: float,
-    nz: float,
-    g: float,
-    ta: float,
-    tb: float,
-    w: float,
-    e: Floats,
-    touch: float,
-    best: float,
+    chain: Floats, terms: Floats, count: int, line: Line, w: float, e: Floats, touch: float, best: float
 ) -> float:
     """Return the first `s` before `best` at which a moving side meets the curved part of a region."""
+    nx, nz, g, ta, tb = line
     n, constant = line_on_point(chain, count, nx, nz, g, e[0], e[1], w, terms)
     _, bound = bounds(terms, n)
     rate = chain[count - 1, 0]
@@ -205,20 +195,9 @@ def sweep_side_region(
 
 
 @kernel
-def sweep_region(
-    outline: Outline,
-    i: int,
-    e: Floats,
-    touch: float,
-    count: int,
-    best: float,
-    vertex: Floats,
-    side: Floats,
-    chain: Floats,
-    terms: Floats,
-    pair: Ints,
-) -> float:
+def sweep_region(outline: Outline, i: int, e: Floats, touch: float, count: int, best: float, work: Work) -> float:
     """Return the first contact of a moving outline with a region before `best`; all relative to the first pivot."""
+    chain, terms, vertex, side, pair = work.chain, work.terms, work.vertex, work.side, work.best
     w = outline.radius
     for v in range(outline.v0, outline.v1):
         found = sweep_vertex_region(chain, count, vertex[v, 0], vertex[v, 1], w, e, touch, best)
@@ -226,13 +205,13 @@ def sweep_region(
             best = found
             note(pair, outline.tip, outline.number, v, i, 0, 2)
     for k in range(outline.s0, outline.s1):
-        nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
-        found = sweep_side_region(chain, terms, count, nx, nz, g, ta, tb, w, e, touch, best)
+        line = (side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4])
+        found = sweep_side_region(chain, terms, count, line, w, e, touch, best)
         if found < best:
             best = found
             note(pair, KIND_SIDE, outline.number, k, i, 0, 2)
         if outline.both:
-            found = sweep_side_region(chain, terms, count, -nx, -nz, -g, -tb, -ta, w, e, touch, best)
+            found = sweep_side_region(chain, terms, count, other_face(line), w, e, touch, best)
             if found < best:
                 best = found
                 note(pair, KIND_SIDE, outline.number, k, i, 2, 2)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import Floats, Outline
+from clench.kernels.closing.layout import Flat, Floats, Origin, Outline, PlaneSection, Segment, Work
 from clench.kernels.runtime.compiling import kernel
 
 from .coupled import bounds, evaluate, line_on_point, point_on_line
@@ -62,22 +62,19 @@ def body_above(outline: Outline, side: Floats, x: float, z: float, nx: float, nz
 
 
 @kernel
-def object_below(
-    segments: Floats,
-    count: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    x: float,
-    z: float,
-    nx: float,
-    nz: float,
-    near: float,
-) -> bool:
+def segment_from(section: PlaneSection, i: int, origin: Origin) -> Segment:
+    """Return a segment of a section relative to a pivot."""
+    s, row, (px, pz, mirror) = section.sections.segments, section.row, origin
+    ax, az, bx, bz = s[row, i, 0] - px, (s[row, i, 1] - pz) * mirror, s[row, i, 2] - px, (s[row, i, 3] - pz) * mirror
+    return ax, az, bx, bz, s[row, i, 4], s[row, i, 5] * mirror
+
+
+@kernel
+def object_below(section: PlaneSection, origin: Origin, x: float, z: float, nx: float, nz: float) -> bool:
     """Say whether the object's segments that end at (x, z) lie on the inner side of a line with normal `n`."""
-    for i in range(count):
-        ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
-        bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
+    near = NEAR * section.touch
+    for i in range(section.sections.counts[section.row, 0]):
+        ax, az, bx, bz, _, _ = segment_from(section, i, origin)
         size = math.hypot(bx - ax, bz - az)
         if size > near:
             far, slack = (bx - ax) * nx + (bz - az) * nz, max(LEAN * size, near)
@@ -90,44 +87,27 @@ def object_below(
 
 @kernel
 def corner_blocks(
-    outline: Outline,
-    segments: Floats,
-    count: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    closed: bool,
-    vx: float,
-    vz: float,
-    x: float,
-    z: float,
-    chain: Floats,
-    terms: Floats,
-    joints: int,
-    touch: float,
-    side: Floats,
+    outline: Outline, section: PlaneSection, origin: Origin, v: Flat, q: Flat, joints: int, work: Work
 ) -> bool:
     """Say whether no separating line of two touching corners lets the motion pass, nor all sides of a notch.
 
     Args:
-        outline, side: the link, relative to its last pivot.
-        segments, count, px, pz, mirror: the object's segments and how they become relative to the first pivot.
-        vx, vz: the link's corner from the last pivot. x, z: the object's from the first.
-        chain, joints: what moves the link.
+        outline, work: the link, relative to its last pivot. section, origin: the object, relative to the first one.
+        v: the link's corner from the last pivot. q: the object's from the first. joints: how many move the link.
     """
-    near, sides, left = NEAR * touch, 0, 0
-    for i in range(count):
-        ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
-        bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
+    touch, closed, side, chain, terms = section.touch, section.closed, work.side, work.chain, work.terms
+    near, sides, left, (vx, vz), (x, z) = NEAR * touch, 0, 0, v, q
+    for i in range(section.sections.counts[section.row, 0]):
+        ax, az, bx, bz, mx, mz = segment_from(section, i, origin)
         if math.hypot(ax - x, az - z) <= near or math.hypot(bx - x, bz - z) <= near:
-            nx, nz, leaves = segments[i, 4], segments[i, 5] * mirror, False
+            nx, nz, leaves = mx, mz, False
             for flip in range(1 if closed else 2):
                 if flip:
                     nx, nz = -nx, -nz
                 if body_above(outline, side, vx, vz, nx, nz, near) and line_permits(
                     chain, terms, joints, vx, vz, nx, nz, touch
                 ):
-                    if object_below(segments, count, px, pz, mirror, x, z, nx, nz, near):
+                    if object_below(section, origin, x, z, nx, nz):
                         return False
                     leaves = True
             sides, left = sides + 1, left + (1 if leaves else 0)
@@ -142,7 +122,7 @@ def corner_blocks(
                 leaves = False
                 for flip in range(2 if outline.both else 1):
                     nx, nz = (mx, mz) if flip else (-mx, -mz)
-                    if object_below(segments, count, px, pz, mirror, x, z, nx, nz, near) and side_permits(
+                    if object_below(section, origin, x, z, nx, nz) and side_permits(
                         chain, terms, joints, -nx, -nz, x, z, touch
                     ):
                         if body_above(outline, side, vx, vz, nx, nz, near):
@@ -154,101 +134,49 @@ def corner_blocks(
 
 @kernel
 def vertex_blocks(
-    outline: Outline,
-    segments: Floats,
-    count: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    closed: bool,
-    vx: float,
-    vz: float,
-    i: int,
-    chain: Floats,
-    terms: Floats,
-    joints: int,
-    touch: float,
-    side: Floats,
-    dx: float,
-    dz: float,
+    outline: Outline, section: PlaneSection, origin: Origin, v: Flat, i: int, d: Flat, joints: int, work: Work
 ) -> bool:
     """Say whether a link vertex that touches segment `i` is blocked there."""
-    near = NEAR * touch
-    x, z = vx + dx, vz + dz
-    ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
-    bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
+    touch, side, chain, terms = section.touch, work.side, work.chain, work.terms
+    near, (vx, vz) = NEAR * touch, v
+    x, z = vx + d[0], vz + d[1]
+    ax, az, bx, bz, nx, nz = segment_from(section, i, origin)
     for end in range(2):
         qx, qz = (bx, bz) if end else (ax, az)
         if math.hypot(x - qx, z - qz) <= near:
-            return corner_blocks(
-                outline, segments, count, px, pz, mirror, closed, vx, vz, qx, qz, chain, terms, joints, touch, side
-            )
-    nx, nz = segments[i, 4], segments[i, 5] * mirror
+            return corner_blocks(outline, section, origin, v, (qx, qz), joints, work)
     if body_above(outline, side, vx, vz, nx, nz, near):
         return not line_permits(chain, terms, joints, vx, vz, nx, nz, touch)
     return (
-        not closed
+        not section.closed
         and body_above(outline, side, vx, vz, -nx, -nz, near)
         and not line_permits(chain, terms, joints, vx, vz, -nx, -nz, touch)
     )
 
 
 @kernel
-def sharp_blocks(
-    outline: Outline,
-    segments: Floats,
-    count: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    closed: bool,
-    touch: float,
-    vertex: Floats,
-    side: Floats,
-    chain: Floats,
-    terms: Floats,
-    joints: int,
-) -> bool:
+def sharp_blocks(outline: Outline, section: PlaneSection, origin: Origin, joints: int, work: Work) -> bool:
     """Say whether a sharp outline is blocked where it touches the object's section at the start.
 
     Args:
-        outline, vertex, side: the link, relative to its last pivot. chain, joints: what moves it.
-        segments, count: of the section. px, pz, mirror: how they become relative to the first pivot.
-        closed: the object's winding is known.
+        outline, work: the link, relative to its last pivot. joints: how many move it.
+        section, origin: the object, relative to the first pivot.
     """
+    touch, vertex, side, chain, terms = section.touch, work.vertex, work.side, work.chain, work.terms
     near = NEAR * touch
     dx, dz = 0.0, 0.0
     for k in range(joints - 1):
         dx += chain[k, 1]
         dz += chain[k, 2]
-    for i in range(count):
-        ax, az = segments[i, 0] - px, (segments[i, 1] - pz) * mirror
-        bx, bz = segments[i, 2] - px, (segments[i, 3] - pz) * mirror
-        nx, nz = segments[i, 4], segments[i, 5] * mirror
+    for i in range(section.sections.counts[section.row, 0]):
+        ax, az, bx, bz, nx, nz = segment_from(section, i, origin)
         ta, tb = nx * az - nz * ax, nx * bz - nz * bx
         low, high = min(ta, tb) - near, max(ta, tb) + near
         for v in range(outline.v0, outline.v1):
             x, z = vertex[v, 0] + dx, vertex[v, 1] + dz
             touching = abs(nx * (x - ax) + nz * (z - az)) <= touch and low <= nx * z - nz * x <= high
-            if touching and vertex_blocks(
-                outline,
-                segments,
-                count,
-                px,
-                pz,
-                mirror,
-                closed,
-                vertex[v, 0],
-                vertex[v, 1],
-                i,
-                chain,
-                terms,
-                joints,
-                touch,
-                side,
-                dx,
-                dz,
-            ):
+            p = (vertex[v, 0], vertex[v, 1])
+            if touching and vertex_blocks(outline, section, origin, p, i, (dx, dz), joints, work):
                 return True
         for k in range(outline.s0, outline.s1):
             mx, mz, g = side[k, 0], side[k, 1], side[k, 2]
@@ -257,12 +185,12 @@ def sharp_blocks(
                 t = mx * z - mz * x
                 # Ends of sides are vertices, which the loop above has seen.
                 if abs(mx * x + mz * z - g) <= touch and side[k, 3] + near < t < side[k, 4] - near:
-                    if object_below(segments, count, px, pz, mirror, x + dx, z + dz, -mx, -mz, near):
+                    if object_below(section, origin, x + dx, z + dz, -mx, -mz):
                         if not side_permits(chain, terms, joints, mx, mz, x + dx, z + dz, touch):
                             return True
                     elif (
                         outline.both
-                        and object_below(segments, count, px, pz, mirror, x + dx, z + dz, mx, mz, near)
+                        and object_below(section, origin, x + dx, z + dz, mx, mz)
                         and not side_permits(chain, terms, joints, -mx, -mz, x + dx, z + dz, touch)
                     ):
                         return True

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from clench.core.tolerances import FOOT_FRACTION
-from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
+from clench.kernels.closing.layout import KIND_SIDE, Flat, Floats, Line, Outline, Segment, Work
 from clench.kernels.runtime.compiling import kernel
 
 from .coupled import at_start, bounds, line_on_point, next_root, place, point_on_line, point_on_point
-from .turning_pairs import defer, note
+from .turning_pairs import defer, line_of, note, other_face
 
 
 @kernel
@@ -24,22 +24,11 @@ def side_foot(chain: Floats, count: int, nx: float, nz: float, qx: float, qz: fl
 
 @kernel
 def sweep_vertex_line(
-    chain: Floats,
-    terms: Floats,
-    count: int,
-    vx: float,
-    vz: float,
-    w: float,
-    nx: float,
-    nz: float,
-    h: float,
-    ta: float,
-    tb: float,
-    touch: float,
-    best: float,
+    chain: Floats, terms: Floats, count: int, v: Flat, w: float, line: Line, touch: float, best: float
 ) -> float:
     """Return the first `s` before `best` at which a moving vertex disk meets a fixed segment from its outer side."""
-    chain[count - 1, 1], chain[count - 1, 2] = vx, vz
+    nx, nz, h, ta, tb = line
+    chain[count - 1, 1], chain[count - 1, 2] = v
     n, constant = point_on_line(chain, count, nx, nz, h + w, terms)
     first, second = bounds(terms, n)
     value = at_start(terms, n, constant)
@@ -60,21 +49,10 @@ def sweep_vertex_line(
 
 @kernel
 def sweep_side_point(
-    chain: Floats,
-    terms: Floats,
-    count: int,
-    nx: float,
-    nz: float,
-    g: float,
-    ta: float,
-    tb: float,
-    qx: float,
-    qz: float,
-    w: float,
-    touch: float,
-    best: float,
+    chain: Floats, terms: Floats, count: int, line: Line, q: Flat, w: float, touch: float, best: float
 ) -> float:
     """Return the first `s` before `best` at which a moving side meets a fixed point from the side's outer side."""
+    (nx, nz, g, ta, tb), (qx, qz) = line, q
     n, constant = line_on_point(chain, count, nx, nz, g, qx, qz, w, terms)
     first, second = bounds(terms, n)
     value = at_start(terms, n, constant)
@@ -93,20 +71,11 @@ def sweep_side_point(
 
 @kernel
 def sweep_vertex_point(
-    chain: Floats,
-    terms: Floats,
-    count: int,
-    vx: float,
-    vz: float,
-    qx: float,
-    qz: float,
-    w: float,
-    touch: float,
-    best: float,
+    chain: Floats, terms: Floats, count: int, v: Flat, q: Flat, w: float, touch: float, best: float
 ) -> float:
     """Return the first `s` before `best` at which a moving vertex comes within `w` > 0 of a fixed point."""
-    chain[count - 1, 1], chain[count - 1, 2] = vx, vz
-    n, constant = point_on_point(chain, count, qx, qz, w, terms)
+    chain[count - 1, 1], chain[count - 1, 2] = v
+    n, constant = point_on_point(chain, count, q[0], q[1], w, terms)
     first, second = bounds(terms, n)
     value = at_start(terms, n, constant)
     if value - touch > first * best or value < -touch:
@@ -118,90 +87,73 @@ def sweep_vertex_point(
 def sweep_segment(
     outline: Outline,
     i: int,
-    ax: float,
-    az: float,
-    bx: float,
-    bz: float,
-    nx: float,
-    nz: float,
+    segment: Segment,
     closed: bool,
     touch: float,
     count: int,
     speed: float,
     best: float,
-    vertex: Floats,
-    side: Floats,
-    chain: Floats,
-    terms: Floats,
-    pair: Ints,
+    work: Work,
 ) -> float:
     """Return the first contact of an outline moved by several joints with segment `i` before `best`.
 
-    The segment is relative to the first pivot; `vertex` and `side` hold the outline about the last one.
+    The segment is relative to the first pivot; `work` has the outline about the last one.
     """
-    w = outline.radius
-    ta, tb = -nz * ax + nx * az, -nz * bx + nx * bz
-    h = nx * ax + nz * az
-    if ta > tb:
-        ta, tb = tb, ta
+    ax, az, bx, bz, _, _ = segment
+    chain, terms, pair, w, line = work.chain, work.terms, work.best, outline.radius, line_of(segment)
     for v in range(outline.v0, outline.v1):
-        vx, vz = vertex[v, 0], vertex[v, 1]
-        found = sweep_vertex_line(chain, terms, count, vx, vz, w, nx, nz, h, ta, tb, touch, best)
+        p = (work.vertex[v, 0], work.vertex[v, 1])
+        found = sweep_vertex_line(chain, terms, count, p, w, line, touch, best)
         if w == 0.0 and found * speed <= touch:
             defer(pair, outline.tip, outline.number, v, i, 0)
         elif found < best:
             best = found
             note(pair, outline.tip, outline.number, v, i, 0, 0)
         if not closed:
-            found = sweep_vertex_line(chain, terms, count, vx, vz, w, -nx, -nz, -h, -tb, -ta, touch, best)
+            found = sweep_vertex_line(chain, terms, count, p, w, other_face(line), touch, best)
             if w == 0.0 and found * speed <= touch:
                 defer(pair, outline.tip, outline.number, v, i, 1)
             elif found < best:
                 best = found
                 note(pair, outline.tip, outline.number, v, i, 1, 0)
         if w > 0.0:
-            found = sweep_vertex_point(chain, terms, count, vx, vz, ax, az, w, touch, best)
+            found = sweep_vertex_point(chain, terms, count, p, (ax, az), w, touch, best)
             if found < best:
                 best = found
                 note(pair, outline.tip, outline.number, v, i, 2, 0)
-            found = sweep_vertex_point(chain, terms, count, vx, vz, bx, bz, w, touch, best)
+            found = sweep_vertex_point(chain, terms, count, p, (bx, bz), w, touch, best)
             if found < best:
                 best = found
                 note(pair, outline.tip, outline.number, v, i, 3, 0)
-    best = sweep_sides(outline, i, 0, ax, az, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
-    return sweep_sides(outline, i, 1, bx, bz, 0.0, 0, touch, count, speed, best, side, chain, terms, pair)
+    best = sweep_sides(outline, (i, 0, 0), (ax, az), 0.0, touch, count, speed, best, work)
+    return sweep_sides(outline, (i, 1, 0), (bx, bz), 0.0, touch, count, speed, best, work)
 
 
 @kernel
 def sweep_sides(
     outline: Outline,
-    i: int,
-    end: int,
-    qx: float,
-    qz: float,
+    met: tuple[int, int, int],
+    q: Flat,
     radius: float,
-    disk: int,
     touch: float,
     count: int,
     speed: float,
     best: float,
-    side: Floats,
-    chain: Floats,
-    terms: Floats,
-    pair: Ints,
+    work: Work,
 ) -> float:
-    """Return the first `s` at which a side of the moving outline meets an object vertex of some radius."""
-    w = outline.radius + radius
+    """Return the first `s` at which a side of the outline meets an object vertex of some radius; see `turn_sides`."""
+    i, end, disk = met
+    chain, terms, side, pair, w = work.chain, work.terms, work.side, work.best, outline.radius + radius
     for k in range(outline.s0, outline.s1):
-        nx, nz, g, ta, tb = side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4]
-        found = sweep_side_point(chain, terms, count, nx, nz, g, ta, tb, qx, qz, w, touch, best)
+        line = (side[k, 0], side[k, 1], side[k, 2], side[k, 3], side[k, 4])
+        found = sweep_side_point(chain, terms, count, line, q, w, touch, best)
         if w == 0.0 and found * speed <= touch:
             defer(pair, KIND_SIDE, outline.number, k, i, end)
         elif found < best:
             best = found
             note(pair, KIND_SIDE, outline.number, k, i, end, disk)
         if outline.both:
-            found = sweep_side_point(chain, terms, count, -nx, -nz, -g, -tb, -ta, qx, qz, w, touch, best)
+            found = sweep_side_point(chain, terms, count, other_face(line), q, w, touch, best)
             if w == 0.0 and found * speed <= touch:
                 defer(pair, KIND_SIDE, outline.number, k, i, end + 2)
             elif found < best:
@@ -212,26 +164,13 @@ def sweep_sides(
 
 @kernel
 def sweep_disk(
-    outline: Outline,
-    i: int,
-    qx: float,
-    qz: float,
-    radius: float,
-    touch: float,
-    count: int,
-    speed: float,
-    best: float,
-    vertex: Floats,
-    side: Floats,
-    chain: Floats,
-    terms: Floats,
-    pair: Ints,
+    outline: Outline, i: int, q: Flat, radius: float, touch: float, count: int, speed: float, best: float, work: Work
 ) -> float:
     """Return the first contact of an outline moved by several joints with a disk of the object before `best`."""
-    w = outline.radius + radius
+    chain, terms, vertex, w = work.chain, work.terms, work.vertex, outline.radius + radius
     for v in range(outline.v0, outline.v1):
-        found = sweep_vertex_point(chain, terms, count, vertex[v, 0], vertex[v, 1], qx, qz, w, touch, best)
+        found = sweep_vertex_point(chain, terms, count, (vertex[v, 0], vertex[v, 1]), q, w, touch, best)
         if found < best:
             best = found
-            note(pair, outline.tip, outline.number, v, i, 0, 1)
-    return sweep_sides(outline, i, 0, qx, qz, radius, 1, touch, count, speed, best, side, chain, terms, pair)
+            note(work.best, outline.tip, outline.number, v, i, 0, 1)
+    return sweep_sides(outline, (i, 0, 1), q, radius, touch, count, speed, best, work)

@@ -15,16 +15,13 @@ from clench.kernels.closing.layout import (
     CONTACT_X,
     CONTACT_Z,
     SUNK,
-    CandidateArrays,
     ChainArrays,
     ClosingArrays,
     Floats,
     HandArrays,
     Ints,
-    SectionArrays,
-    Work,
 )
-from clench.kernels.closing.solve_layout import ObjectArrays
+from clench.kernels.closing.solve_layout import Closing
 from clench.kernels.runtime.compiling import kernel
 
 from .advance import place_joints
@@ -35,45 +32,36 @@ from .turning import STILL
 
 
 @kernel
-def enter_axis_group(
-    hand: HandArrays,
-    axis_group: int,
-    start: int,
-    obj: ObjectArrays,
-    T_palm_object: Floats,
-    own: SectionArrays,
-    candidates: CandidateArrays,
-    i: int,
-    swept: bool,
-    work: Work,
-    answer: ClosingArrays,
-) -> None:
+def enter_axis_group(closing: Closing, axis_group: int, i: int) -> None:
     """Place an axis group at a candidate's present posture and cut the object by its planes, unless that was done
     before.
 
     On the one plane of a candidate a link that did not touch may overlap the object by now: joints about another axis
-    turned it there, in planes of their own. Then there is no set on this plane, and nothing moves. Candidates that are
-    `swept` over their full width see all links.
+    turned it there, in planes of their own. Then there is no set on this plane, and nothing moves. Candidates that
+    are swept over their full width see all links.
     """
+    hand, obj, own, candidates = closing.hand, closing.obj, closing.own, closing.candidates
+    work, answer = closing.work, closing.answer
+    start = hand.first_axis_group[candidates.finger_posture[i]]
     pose_axis_group(hand, axis_group, axis_group == start, answer.turn[i], work, answer.pose[i])
     if axis_group == start or candidates.low[i] >= candidates.high[i]:
         return
     T, base = work.pose[0], hand.axis_group_plane[start]
-    compose_inverse(answer.pose[i, axis_group], T_palm_object, T)
+    compose_inverse(answer.pose[i, axis_group], closing.T_palm_object, T)
     low, high = (
         hand.axis_group_plane[axis_group] + candidates.low[i],
         hand.axis_group_plane[axis_group] + candidates.high[i],
     )
-    wanted = cut_planes(hand, axis_group, low, high, obj.tree, obj.rounds, T, own, base, work.pose[1])
+    wanted = cut_planes(hand, axis_group, (low, high), obj.tree, obj.rounds, T, own, base, work.pose[1])
     answer.overflow[i] = max(answer.overflow[i], wanted)
-    if wanted > 0 or swept or high - low > 1:
+    if wanted > 0 or closing.full_width.requested[i] != 0 or high - low > 1:
         return
     place_joints(hand.chain, axis_group, answer.turn[i], work.place)
     touch = TOUCH_FRACTION * hand.axis_group_length[axis_group]
     for o in range(hand.plane_outline[low], hand.plane_outline[low + 1]):
         if touches_still(hand, o, i, answer):
             continue
-        if outline_overlaps(hand, o, low, touch, obj.tree, obj.rounds, obj.closed, T, own, low - base, work):
+        if outline_overlaps(hand, o, low, touch, obj, T, own, low - base, work):
             answer.travel[i], answer.turn[i] = 0.0, 0.0
             answer.contacts[i], answer.overlap[i] = 0, SUNK - hand.outlines.link[o]
             return
@@ -111,14 +99,13 @@ def joint_of(hand: HandArrays, axis_group: int, link: int) -> int:
 
 
 @kernel
-def is_held(
-    hand: HandArrays, axis_group: int, dof: int, candidates: CandidateArrays, i: int, work: Work, answer: ClosingArrays
-) -> bool:
+def is_held(closing: Closing, axis_group: int, dof: int, i: int) -> bool:
     """Say whether a degree of freedom would press on a link that touched on a plane of an earlier axis group.
 
     The axis group's own plane lies elsewhere and may show the link a little off the object or inside it, where a sweep
     would begin with neither a touch nor a gap.
     """
+    hand, candidates, work, answer = closing.hand, closing.candidates, closing.work, closing.answer
     if candidates.high[i] - candidates.low[i] != 1:
         return False
     chain, turns = hand.chain, answer.turn[i]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import RUN, Floats, Outline, SectionArrays, Work
+from clench.kernels.closing.layout import RUN, Flat, Floats, Origin, Outline, PlaneSection, SectionArrays, Work
 from clench.kernels.runtime.compiling import kernel
 
 from .conics import sweep_region
 from .corners import sharp_blocks
 from .coupled_pairs import sweep_disk, sweep_segment
 from .turning_pairs import turn_disk, turn_segment
+
+#: The way of a point that turns about the pivot: where it begins (x, z), its distance, and where it ends (x, z).
+Arc = tuple[float, float, float, float, float]
 
 
 @kernel
@@ -45,13 +48,12 @@ def farthest(stadium: Floats, o: int) -> float:
 
 
 @kernel
-def misses(
-    cx: float, cz: float, d: float, ex: float, ez: float, wide: bool, mx: float, mz: float, reach: float
-) -> bool:
-    """Say whether a circle that turns from `c` to `e` at distance `d` stays farther than `reach` from the point `m`.
+def misses(arc: Arc, wide: bool, mx: float, mz: float, reach: float) -> bool:
+    """Say whether the middle of a circle that turns along an arc stays farther than `reach` from the point `m`.
 
     `wide`: it turns by more than half a turn, so that only the distance from the pivot tells.
     """
+    cx, cz, d, ex, ez = arc
     r = math.sqrt(mx * mx + mz * mz)
     if abs(d - r) > reach:
         return True
@@ -62,35 +64,10 @@ def misses(
 
 
 @kernel
-def deferred_blocks(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    closed: bool,
-    touch: float,
-    count: int,
-    work: Work,
-) -> bool:
+def deferred_blocks(outline: Outline, section: PlaneSection, origin: Origin, count: int, work: Work) -> bool:
     """Decide on sharp pairs that touch at the start; if they block, make the last of them the winner."""
     work.best[6] = 0
-    if not sharp_blocks(
-        outline,
-        sections.segments[row],
-        sections.counts[row, 0],
-        px,
-        pz,
-        mirror,
-        closed,
-        touch,
-        work.vertex,
-        work.side,
-        work.chain,
-        work.terms,
-        count,
-    ):
+    if not sharp_blocks(outline, section, origin, count, work):
         return False
     for k in range(6):
         work.best[k] = work.best[7 + k]
@@ -106,34 +83,20 @@ def turned(x: float, z: float, turn: float) -> tuple[float, float]:
 
 @kernel
 def nearest_turn(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    cx: float,
-    cz: float,
-    ex: float,
-    ez: float,
-    d: float,
-    reach: float,
-    turn: float,
-    touch: float,
-    work: Work,
+    outline: Outline, section: PlaneSection, origin: Origin, arc: Arc, reach: float, turn: float, work: Work
 ) -> int:
     """Return the segment that a turning outline may meet first, as its distance over its speed tells, or -1.
 
     Args:
-        cx, cz, reach: the circle around the outline, whose centre is `d` from the pivot. turn: the last of interest.
-        ex, ez: where the centre is then.
+        arc, reach: how the circle around the outline moves, and its radius. turn: the last of interest.
     """
+    sections, row, touch, (px, pz, mirror) = section.sections, section.row, section.touch, origin
     segments, circles, count = sections.segments, sections.circles, sections.counts[row, 0]
     nearest, least, wide, stadium, o = -1, math.inf, turn >= 3.0, work.stadium, outline.number
     for run in range(-(-count // RUN)):
         mx, mz, around = circles[row, run, 0] - px, (circles[row, run, 1] - pz) * mirror, circles[row, run, 2]
         arm = math.sqrt(mx * mx + mz * mz) + around
-        if misses(cx, cz, d, ex, ez, wide, mx, mz, reach + around) or (
+        if misses(arc, wide, mx, mz, reach + around) or (
             stadium_gap(stadium, o, mx, mz) - around - touch > arm * min(turn, least)
         ):
             continue
@@ -141,7 +104,7 @@ def nearest_turn(
             ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
             bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
             mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
-            if not misses(cx, cz, d, ex, ez, wide, mx, mz, reach + half):
+            if not misses(arc, wide, mx, mz, reach + half):
                 gap, arm = stadium_gap(stadium, o, mx, mz) - half - touch, math.sqrt(mx * mx + mz * mz)
                 # A part of the object turns about the pivot, seen from the link: along an arc no shorter than the gap.
                 if gap <= arm * min(turn, least):
@@ -151,31 +114,22 @@ def nearest_turn(
 
 @kernel
 def turn_outline(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    closed: bool,
-    px: float,
-    pz: float,
-    mirror: float,
-    rate: float,
-    touch: float,
-    best: float,
-    work: Work,
+    outline: Outline, section: PlaneSection, origin: Origin, rate: float, best: float, work: Work
 ) -> float:
     """Return the first contact of an outline behind one active joint with a plane's section, before `best`."""
+    sections, row, closed, touch = section.sections, section.row, section.closed, section.touch
     segments, disks, stadium, o = sections.segments, sections.disks, work.stadium, outline.number
-    circles, count = sections.circles, sections.counts[row, 0]
-    vertex, side, pair = work.vertex, work.side, work.best
+    circles, count, (px, pz, mirror) = sections.circles, sections.counts[row, 0], origin
     # The circle around the turning stadium, and its place at the end.
     cx, cz = stadium[o, 0] + 0.5 * stadium[o, 2], stadium[o, 1] + 0.5 * stadium[o, 3]
     reach = 0.5 * math.sqrt(stadium[o, 2] ** 2 + stadium[o, 3] ** 2) + stadium[o, 5] + touch
     d = math.sqrt(cx * cx + cz * cz)
-    nearest, before, ex, ez, wide = -1, -1.0, 0.0, 0.0, False
+    nearest, before, arc, wide = -1, -1.0, (cx, cz, d, 0.0, 0.0), False
     if count > 0:
         before, turn = best, best * rate
-        ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
-        nearest = nearest_turn(outline, sections, row, px, pz, mirror, cx, cz, ex, ez, d, reach, turn, touch, work)
+        (ex, ez), wide = turned(cx, cz, turn), turn >= 3.0
+        arc = (cx, cz, d, ex, ez)
+        nearest = nearest_turn(outline, section, origin, arc, reach, turn, work)
     # The nearest segment first, then run after run, if one has come that near.
     for run in range(-1, -(-count // RUN) if nearest >= 0 else -1):
         first, last = nearest, nearest + 1
@@ -183,7 +137,7 @@ def turn_outline(
             first, last = RUN * run, min(RUN * run + RUN, count)
             mx, mz, around = circles[row, run, 0] - px, (circles[row, run, 1] - pz) * mirror, circles[row, run, 2]
             arm = math.sqrt(mx * mx + mz * mz) + around
-            if misses(cx, cz, d, ex, ez, wide, mx, mz, reach + around) or (
+            if misses(arc, wide, mx, mz, reach + around) or (
                 stadium_gap(stadium, o, mx, mz) - around - touch > arm * best * rate
             ):
                 continue
@@ -192,23 +146,24 @@ def turn_outline(
                 continue
             if best != before:
                 before, turn = best, best * rate
-                ex, ez, wide = *turned(cx, cz, turn), turn >= 3.0
+                (ex, ez), wide = turned(cx, cz, turn), turn >= 3.0
+                arc = (cx, cz, d, ex, ez)
             ax, az = segments[row, i, 0] - px, (segments[row, i, 1] - pz) * mirror
             bx, bz = segments[row, i, 2] - px, (segments[row, i, 3] - pz) * mirror
             mx, mz, half = 0.5 * (ax + bx), 0.5 * (az + bz), 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
             if (
-                not misses(cx, cz, d, ex, ez, wide, mx, mz, reach + half)
+                not misses(arc, wide, mx, mz, reach + half)
                 and stadium_gap(stadium, o, mx, mz) - half - touch <= math.sqrt(mx * mx + mz * mz) * best * rate
             ):
                 nx, nz = segments[row, i, 4], segments[row, i, 5] * mirror
-                best = turn_segment(outline, i, ax, az, bx, bz, nx, nz, closed, touch, rate, best, vertex, side, pair)
+                best = turn_segment(outline, i, (ax, az, bx, bz, nx, nz), closed, touch, rate, best, work)
                 if best == 0.0:
                     return best
-    if pair[6] and deferred_blocks(outline, sections, row, px, pz, mirror, closed, touch, 1, work):
+    if work.best[6] and deferred_blocks(outline, section, origin, 1, work):
         return 0.0
     for i in range(sections.counts[row, 1]):
-        qx, qz = disks[row, i, 0] - px, (disks[row, i, 1] - pz) * mirror
-        best = turn_disk(outline, i, qx, qz, disks[row, i, 2], touch, rate, best, vertex, side, pair)
+        q = (disks[row, i, 0] - px, (disks[row, i, 1] - pz) * mirror)
+        best = turn_disk(outline, i, q, disks[row, i, 2], touch, rate, best, work)
     return best
 
 
@@ -252,95 +207,59 @@ def first_near(
 @kernel
 def sweep_outline(
     outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    closed: bool,
-    px: float,
-    pz: float,
-    x: float,
-    z: float,
+    section: PlaneSection,
+    origin: Origin,
+    last: Flat,
     nearest: int,
     count: int,
     speed: float,
-    touch: float,
     best: float,
     work: Work,
 ) -> float:
     """Return the first contact of an outline behind several active joints with a plane's section, before `best`.
 
     Args:
-        px, pz: the first pivot; x, z: the last one, see `first_near`, which gives `nearest`, too.
+        origin: the first pivot; last: the last one, see `first_near`, which gives `nearest`, too.
     """
+    sections, row, touch, (px, pz, _), (x, z) = section.sections, section.row, section.touch, origin, last
     segments, disks, circles, o = sections.segments, sections.disks, sections.circles, outline.number
-    vertex, side, chain, terms, pair = work.vertex, work.side, work.chain, work.terms, work.best
     segment_count = sections.counts[row, 0]
     for run in range(-1, -(-segment_count // RUN)):
-        first, last = nearest, nearest + 1
+        begin, end = nearest, nearest + 1
         if run >= 0:
-            first, last = RUN * run, min(RUN * run + RUN, segment_count)
+            begin, end = RUN * run, min(RUN * run + RUN, segment_count)
             near = touch + speed * best + circles[row, run, 2]
             if stadium_gap(work.stadium, o, circles[row, run, 0] - x, circles[row, run, 1] - z) > near:
                 continue
-        for i in range(max(first, 0), last):
+        for i in range(max(begin, 0), end):
             if run >= 0 and i == nearest:
                 continue
             ax, az, bx, bz = segments[row, i, 0], segments[row, i, 1], segments[row, i, 2], segments[row, i, 3]
             near = touch + speed * best + 0.5 * math.sqrt((bx - ax) ** 2 + (bz - az) ** 2)
             if stadium_gap(work.stadium, o, 0.5 * (ax + bx) - x, 0.5 * (az + bz) - z) <= near:
-                ax, az, bx, bz, nx, nz = ax - px, az - pz, bx - px, bz - pz, segments[row, i, 4], segments[row, i, 5]
-                best = sweep_segment(
-                    outline,
-                    i,
-                    ax,
-                    az,
-                    bx,
-                    bz,
-                    nx,
-                    nz,
-                    closed,
-                    touch,
-                    count,
-                    speed,
-                    best,
-                    vertex,
-                    side,
-                    chain,
-                    terms,
-                    pair,
-                )
+                one = (ax - px, az - pz, bx - px, bz - pz, segments[row, i, 4], segments[row, i, 5])
+                best = sweep_segment(outline, i, one, section.closed, touch, count, speed, best, work)
                 if best == 0.0:
                     return best
-    if pair[6] and deferred_blocks(outline, sections, row, px, pz, 1.0, closed, touch, count, work):
+    if work.best[6] and deferred_blocks(outline, section, origin, count, work):
         return 0.0
     for i in range(sections.counts[row, 1]):
-        qx, qz = disks[row, i, 0] - px, disks[row, i, 1] - pz
-        best = sweep_disk(
-            outline, i, qx, qz, disks[row, i, 2], touch, count, speed, best, vertex, side, chain, terms, pair
-        )
+        q = (disks[row, i, 0] - px, disks[row, i, 1] - pz)
+        best = sweep_disk(outline, i, q, disks[row, i, 2], touch, count, speed, best, work)
     return best
 
 
 @kernel
 def sweep_ellipses(
-    outline: Outline,
-    sections: SectionArrays,
-    row: int,
-    px: float,
-    pz: float,
-    mirror: float,
-    count: int,
-    touch: float,
-    best: float,
-    work: Work,
+    outline: Outline, section: PlaneSection, origin: Origin, count: int, best: float, work: Work
 ) -> float:
     """Return the first contact of a moving outline with the ellipses of a plane's section, before `best`."""
+    sections, row, (px, pz, mirror) = section.sections, section.row, origin
     for i in range(sections.counts[row, 2]):
         for k in range(8):
             work.ellipse[k] = sections.ellipses[row, i, k]
         work.ellipse[0] -= px
         work.ellipse[1] = (work.ellipse[1] - pz) * mirror
         work.ellipse[3] *= mirror
-        best = sweep_region(
-            outline, i, work.ellipse, touch, count, best, work.vertex, work.side, work.chain, work.terms, work.best
-        )
+        best = sweep_region(outline, i, work.ellipse, section.touch, count, best, work)
     return best

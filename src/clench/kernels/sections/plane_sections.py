@@ -75,8 +75,7 @@ def cut_rounds(rounds: RoundArrays, T: Floats, offset: float, row: int, sections
 def cut_planes(
     hand: HandArrays,
     axis_group: int,
-    low: int,
-    high: int,
+    planes: tuple[int, int],
     tree: MeshTree,
     rounds: RoundArrays,
     T: Floats,
@@ -84,7 +83,7 @@ def cut_planes(
     base: int,
     pose: Floats,
 ) -> int:
-    """Cut the object by the planes `low` to `high` of an axis group; row `plane - base` of the arena is written.
+    """Cut the object by a range of planes of an axis group; row `plane - base` of the arena is written.
 
     Args:
         T: `T_axis_group_object`, shape (3, 4). pose: scratch space, (3, 4).
@@ -97,8 +96,7 @@ def cut_planes(
         tree,
         T,
         hand.plane_offset,
-        low,
-        high,
+        planes,
         hand.axis_group_reach[axis_group],
         sections.segments,
         sections.sources,
@@ -106,7 +104,7 @@ def cut_planes(
         base,
         capacity,
     )
-    for plane in range(low, high):
+    for plane in range(planes[0], planes[1]):
         sections.counts[plane - base, 1], sections.counts[plane - base, 2] = 0, 0
         cut_rounds(rounds, T, hand.plane_offset[plane], plane - base, sections, pose)
         put_circles(sections, plane - base)
@@ -143,6 +141,6 @@ def cut_first_axis_groups(
     for finger_posture in range(hand.first_axis_group.shape[0] - 1):
         axis_group = hand.first_axis_group[finger_posture]
         compose_inverse(hand.axis_group_pose[axis_group], T_palm_object, T)
-        low, high = hand.axis_group_plane[axis_group], hand.axis_group_plane[axis_group + 1]
-        wanted = max(wanted, cut_planes(hand, axis_group, low, high, tree, rounds, T, sections, 0, two[1]))
+        planes = (hand.axis_group_plane[axis_group], hand.axis_group_plane[axis_group + 1])
+        wanted = max(wanted, cut_planes(hand, axis_group, planes, tree, rounds, T, sections, 0, two[1]))
     return wanted

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import Floats, SectionArrays
+from clench.kernels.closing.layout import Flat, Floats, SectionArrays
 from clench.kernels.runtime.compiling import kernel
 
 SPHERE, CAPSULE, CYLINDER, ELLIPSOID = 0, 1, 2, 3
@@ -38,10 +38,8 @@ def add_disk(x: float, z: float, radius: float, source: int, row: int, sections:
 
 @kernel
 def add_ellipse(
-    x: float,
-    z: float,
-    ux: float,
-    uz: float,
+    center: Flat,
+    u: Flat,
     a: float,
     b: float,
     low: float,
@@ -50,7 +48,8 @@ def add_ellipse(
     row: int,
     sections: SectionArrays,
 ) -> None:
-    """Append the part of an ellipse between two coordinates along its major axis."""
+    """Append the part of an ellipse between two coordinates along its major axis `u`."""
+    (x, z), (ux, uz) = center, u
     i = sections.counts[row, 2]
     e = sections.ellipses[row, i]
     e[0], e[1], e[2], e[3], e[4], e[5], e[6], e[7] = x, z, ux, uz, a, b, max(low, -a), min(high, a)
@@ -115,12 +114,12 @@ def cut_cylinder(
     if low >= a or high <= -a:
         return
     cx, cz = x + along * ax, z + along * az
-    add_ellipse(cx, cz, ux, uz, a, radius, low, high, source, row, sections)
+    add_ellipse((cx, cz), (ux, uz), a, radius, low, high, source, row, sections)
     if caps:
         if low > -a:
-            add_chord(cx, cz, ux, uz, radius * math.sqrt(1.0 - (low / a) ** 2), low, -1.0, source, row, sections)
+            add_chord((cx, cz), (ux, uz), radius * math.sqrt(1.0 - (low / a) ** 2), low, -1.0, source, row, sections)
         if high < a:
-            add_chord(cx, cz, ux, uz, radius * math.sqrt(1.0 - (high / a) ** 2), high, 1.0, source, row, sections)
+            add_chord((cx, cz), (ux, uz), radius * math.sqrt(1.0 - (high / a) ** 2), high, 1.0, source, row, sections)
 
 
 @kernel
@@ -162,10 +161,8 @@ def add_band(
 
 @kernel
 def add_chord(
-    cx: float,
-    cz: float,
-    ux: float,
-    uz: float,
+    center: Flat,
+    u: Flat,
     half: float,
     t: float,
     sign: float,
@@ -174,6 +171,7 @@ def add_chord(
     sections: SectionArrays,
 ) -> None:
     """Append the straight edge that a cap leaves at coordinate `t` of an ellipse."""
+    (cx, cz), (ux, uz) = center, u
     x, z = cx + t * ux, cz + t * uz
     add_segment(x - half * uz, z + half * ux, x + half * uz, z - half * ux, sign * ux, sign * uz, source, row, sections)
 
@@ -209,7 +207,7 @@ def cut_ellipsoid(pose: Floats, size: Floats, offset: float, source: int, row: i
     if a - b <= 1e-12 * a:
         add_disk(x, z, a, source, row, sections)
     else:
-        add_ellipse(x, z, rho * ax / a, rho * az / a, a, b, -a, a, source, row, sections)
+        add_ellipse((x, z), (rho * ax / a, rho * az / a), a, b, -a, a, source, row, sections)
 
 
 @kernel

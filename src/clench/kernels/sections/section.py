@@ -49,7 +49,7 @@ def cut_mesh(
     while wanted:
         capacity = wanted
         segments, sources = np.empty((1, capacity, 6)), np.empty((1, capacity), dtype=np.int64)
-        wanted = cut(tree, T, offsets, 0, 1, float(reach), segments, sources, counts, 0, capacity)
+        wanted = cut(tree, T, offsets, (0, 1), float(reach), segments, sources, counts, 0, capacity)
     found = counts[0, 0]
     return segments[0, :found].copy(), tree.original[sources[0, :found]]
 
@@ -59,8 +59,7 @@ def cut(
     tree: MeshTree,
     T: Floats,
     offsets: Floats,
-    low: int,
-    high: int,
+    planes: tuple[int, int],
     reach: float,
     segments: Floats,
     sources: Any,
@@ -93,7 +92,7 @@ def cut(
     Args:
         tree: the mesh in the object's frame.
         T: `T_axis_group_object`, shape (3, 4).
-        offsets: of all planes [m], (P,). low, high: the range of those that cut.
+        offsets: of all planes [m], (P,). planes: the range of those that cut.
         reach: segments farther than this from the axis group's origin, in the plane, are left out [m].
         segments: row `plane - base` gets rows `[ax, az, bx, bz, nx, nz]`, normal unit and outward, shape (P, C, 6).
         sources: written with each segment's triangle in tree order, shape (P, C).
@@ -104,6 +103,7 @@ def cut(
         0, or the capacity that would have sufficed.
     """
     # Fields and entries are taken out once, and no array is handed on in the loop: either costs more than the geometry.
+    low, high = planes
     vertices, triangles, normals = tree.vertices, tree.triangles, tree.normals
     first, count, skip, least, most = tree.first, tree.count, tree.skip, tree.low, tree.high
     x_row = (T[0, 0], T[0, 1], T[0, 2], T[0, 3])

@@ -6,6 +6,7 @@ import math
 
 from clench.core.tolerances import TOUCH_FRACTION
 from clench.kernels.closing.layout import RUN, Floats, HandArrays, Ints, Outline, RoundArrays, SectionArrays, Work
+from clench.kernels.closing.solve_layout import ObjectArrays
 from clench.kernels.geometry.mesh_distance import Point, is_inside
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.trees.bvh import MeshTree
@@ -140,9 +141,7 @@ def outline_overlaps(
     o: int,
     plane: int,
     touch: float,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
+    obj: ObjectArrays,
     T_axis_group_object: Floats,
     sections: SectionArrays,
     row: int,
@@ -151,23 +150,16 @@ def outline_overlaps(
     """Say whether an outline of a plane overlaps the object with the joints where they are placed."""
     outline = put_outline(hand.outlines, o, hand.outlines.joint[o], work.place, 0.0, 0.0, 1.0, work)
     x, z = work.vertex[outline.v0, 0], work.vertex[outline.v0, 1]
-    if starts_inside(tree, rounds, closed, T_axis_group_object, x, hand.plane_offset[plane], z) and not closer_than(
-        outline, sections, row, 4.0 * touch, work
-    ):
+    y = hand.plane_offset[plane]
+    inside = starts_inside(obj.tree, obj.rounds, obj.closed, T_axis_group_object, x, y, z)
+    if inside and not closer_than(outline, sections, row, 4.0 * touch, work):
         return True
     return bool(curves_overlap(outline, sections, row, touch, work))
 
 
 @entry_kernel
 def look_for_overlaps(
-    hand: HandArrays,
-    tree: MeshTree,
-    rounds: RoundArrays,
-    closed: bool,
-    T_palm_object: Floats,
-    sections: SectionArrays,
-    overlaps: Ints,
-    work: Work,
+    hand: HandArrays, obj: ObjectArrays, T_palm_object: Floats, sections: SectionArrays, overlaps: Ints, work: Work
 ) -> None:
     """Write, for every finger posture, an outline that overlaps the object before anything moves, or -1, shape (E,)."""
     turns, T = work.turns, work.pose[0]
@@ -181,7 +173,7 @@ def look_for_overlaps(
         compose_inverse(hand.axis_group_pose[axis_group], T_palm_object, T)
         for plane in range(hand.axis_group_plane[axis_group], hand.axis_group_plane[axis_group + 1]):
             for o in range(hand.plane_outline[plane], hand.plane_outline[plane + 1]):
-                if outline_overlaps(hand, o, plane, touch, tree, rounds, closed, T, sections, plane, work):
+                if outline_overlaps(hand, o, plane, touch, obj, T, sections, plane, work):
                     overlaps[finger_posture] = o
                     break
             if overlaps[finger_posture] >= 0:

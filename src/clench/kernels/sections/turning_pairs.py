@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import KIND_SIDE, Floats, Ints, Outline
+from clench.kernels.closing.layout import KIND_SIDE, Flat, Ints, Line, Outline, Segment, Work
 from clench.kernels.runtime.compiling import kernel
 
 from .turning import disk_on_segment, disk_on_vertex, side_on_vertex
@@ -33,34 +33,31 @@ def defer(pair: Ints, kind: int, outline: int, feature: int, source: int, which:
 
 
 @kernel
+def line_of(segment: Segment) -> Line:
+    """Return the line that a segment lies on, between the segment's ends."""
+    ax, az, bx, bz, nx, nz = segment
+    ta, tb = -nz * ax + nx * az, -nz * bx + nx * bz
+    return nx, nz, nx * ax + nz * az, min(ta, tb), max(ta, tb)
+
+
+@kernel
+def other_face(line: Line) -> Line:
+    """Return a line as it is seen from its other side."""
+    nx, nz, g, ta, tb = line
+    return -nx, -nz, -g, -tb, -ta
+
+
+@kernel
 def turn_segment(
-    outline: Outline,
-    i: int,
-    ax: float,
-    az: float,
-    bx: float,
-    bz: float,
-    nx: float,
-    nz: float,
-    closed: bool,
-    touch: float,
-    rate: float,
-    best: float,
-    vertex: Floats,
-    side: Floats,
-    pair: Ints,
+    outline: Outline, i: int, segment: Segment, closed: bool, touch: float, rate: float, best: float, work: Work
 ) -> float:
     """Return the first contact of a turning outline with segment `i`, in units of travel, before `best`.
 
-    The segment is relative to the pivot; `vertex` and `side` hold the outline about the pivot, `pair` gets the winner.
-    When the object is not closed,
-    both sides of the segment count.
+    The segment is relative to the pivot; `work` has the outline about the pivot, and gets the winner. When the object
+    is not closed, both sides of the segment count.
     """
-    w = outline.radius
-    ta, tb = -nz * ax + nx * az, -nz * bx + nx * bz
-    h = nx * ax + nz * az
-    if ta > tb:
-        ta, tb = tb, ta
+    ax, az, bx, bz, _, _ = segment
+    vertex, pair, w, (nx, nz, h, ta, tb) = work.vertex, work.best, outline.radius, line_of(segment)
     limit = best * rate
     turn = limit
     ra, rb = math.sqrt(ax * ax + az * az), math.sqrt(bx * bx + bz * bz)
@@ -88,27 +85,22 @@ def turn_segment(
             if found < turn:
                 turn = found
                 note(pair, outline.tip, outline.number, v, i, 3, 0)
-    found = turn_sides(outline, i, 0, ax, az, 0.0, 0, touch, turn, side, pair)
-    turn = turn_sides(outline, i, 1, bx, bz, 0.0, 0, touch, found, side, pair)
+    found = turn_sides(outline, (i, 0, 0), (ax, az), 0.0, touch, turn, work)
+    turn = turn_sides(outline, (i, 1, 0), (bx, bz), 0.0, touch, found, work)
     return sooner(turn / rate, best) if turn < limit else best
 
 
 @kernel
 def turn_sides(
-    outline: Outline,
-    i: int,
-    end: int,
-    qx: float,
-    qz: float,
-    radius: float,
-    disk: int,
-    touch: float,
-    turn: float,
-    side: Floats,
-    pair: Ints,
+    outline: Outline, met: tuple[int, int, int], q: Flat, radius: float, touch: float, turn: float, work: Work
 ) -> float:
-    """Return the first turn at which a side of the outline meets an object vertex of some radius."""
-    w = outline.radius + radius
+    """Return the first turn at which a side of the outline meets an object vertex of some radius.
+
+    Args:
+        met: number of the vertex's segment or disk, which end of the segment it is, and 1 for a disk. q: the vertex.
+    """
+    (i, end, disk), (qx, qz) = met, q
+    side, pair, w = work.side, work.best, outline.radius + radius
     for s in range(outline.s0, outline.s1):
         nx, nz, g = side[s, 0], side[s, 1], side[s, 2]
         ta, tb = side[s, 3], side[s, 4]
@@ -130,20 +122,10 @@ def turn_sides(
 
 @kernel
 def turn_disk(
-    outline: Outline,
-    i: int,
-    qx: float,
-    qz: float,
-    radius: float,
-    touch: float,
-    rate: float,
-    best: float,
-    vertex: Floats,
-    side: Floats,
-    pair: Ints,
+    outline: Outline, i: int, q: Flat, radius: float, touch: float, rate: float, best: float, work: Work
 ) -> float:
     """Return the first contact of a turning outline with a disk of the object, in units of travel, before `best`."""
-    w = outline.radius
+    vertex, w, (qx, qz) = work.vertex, outline.radius, q
     limit = best * rate
     turn = limit
     r = math.sqrt(qx * qx + qz * qz)
@@ -152,6 +134,6 @@ def turn_disk(
         found = disk_on_vertex(vx, vz, rho, qx, qz, r, w + radius, touch, turn)
         if found < turn:
             turn = found
-            note(pair, outline.tip, outline.number, v, i, 0, 1)
-    turn = turn_sides(outline, i, 0, qx, qz, radius, 1, touch, turn, side, pair)
+            note(work.best, outline.tip, outline.number, v, i, 0, 1)
+    turn = turn_sides(outline, (i, 0, 1), q, radius, touch, turn, work)
     return sooner(turn / rate, best) if turn < limit else best

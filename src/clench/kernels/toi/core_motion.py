@@ -3,12 +3,68 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector, dot
 from clench.kernels.runtime.compiling import kernel
 
 from .spatial_motion import is_spatial, moved, moved_back, point_bounds, point_motion, total_rate
+
+
+class MovingCore(NamedTuple):
+    """A convex core, and the chain that moves it.
+
+    Args:
+        core: its corners relative to the last pivot [m], (4, 3). corners: how many of them count.
+        chain, rows: what moves, rows (Ω, e_x, e_z), of which the last gives only its rate; where axes are not parallel
+            see `spatial_motion`.
+        placed: where the corners are at some travel, and scratch space, (6, 3) at least.
+    """
+
+    core: Floats
+    corners: int
+    chain: Floats
+    rows: int
+    placed: Floats
+
+
+class CorePair(NamedTuple):
+    """A moving core and a resting one that it may meet.
+
+    Args:
+        moving: the moving one. fixed: corners of the resting one, relative to the first pivot [m], (3, 3).
+        corners: how many of these count. w: sum of both radii [m]. touch: gaps up to this touch [m].
+    """
+
+    moving: MovingCore
+    fixed: Floats
+    corners: int
+    w: float
+    touch: float
+
+
+@kernel
+def place_core(moving: MovingCore, s: float) -> None:
+    """Write to `placed` where a core is when its chain has moved by `s`."""
+    move_core(moving.core, moving.corners, moving.chain, moving.rows, s, moving.placed)
+
+
+@kernel
+def pair_gap(pair: CorePair, nx: float, ny: float, nz: float) -> float:
+    """Return how far the moving core, where it is placed, lies beyond the resting one along n, less their radii."""
+    moving = pair.moving
+    return plane_gap(moving.placed, moving.corners, pair.fixed, pair.corners, nx, ny, nz) - pair.w
+
+
+@kernel
+def widest_motion(moving: MovingCore, s: float) -> tuple[float, float]:
+    """Return bounds on speed and acceleration of all corners of a core, for any direction."""
+    speed, bend = 0.0, 0.0
+    for k in range(moving.corners):
+        _, _, lever, bound = corner_motion(moving.core, k, moving.chain, moving.rows, 1.0, 0.0, 0.0, s)
+        speed, bend = max(speed, lever), max(bend, bound)
+    return speed, bend
 
 
 @kernel

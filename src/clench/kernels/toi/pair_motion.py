@@ -18,7 +18,7 @@ from clench.kernels.hulls.body_sweep import sweep_body
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_pose, put_point
 
-from .toi_work import SweepWork, make_sweep_work
+from .toi_work import BodyPair, SweepWork, make_sweep_work
 
 
 class PathProblem(NamedTuple):
@@ -199,7 +199,7 @@ def free_share(problem: PathProblem, m: int, r: int, k: int, t: float, touch: fl
         sweep.moving[c, 3] -= last[c]
         sweep.resting[c, 3] -= first[c]
     target, b = target_of(problem, r)
-    return float(sweep_body(problem.links, m, target, b, sweep.spatial, count, touch, 1.0, sweep))
+    return float(sweep_body(BodyPair(problem.links, m, target, b, sweep.spatial, count, touch), 1.0, sweep))
 
 
 @kernel

@@ -17,7 +17,18 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.coupled import safe_step
 from clench.kernels.sections.turning import is_blocking
 
-from .core_motion import carried_back, corner_motion, move_core, plane_gap, plane_offset, turn_rate, turn_to_plane
+from .core_motion import (
+    CorePair,
+    carried_back,
+    corner_motion,
+    move_core,
+    pair_gap,
+    plane_gap,
+    plane_offset,
+    turn_rate,
+    turn_to_plane,
+    widest_motion,
+)
 
 #: Below this fraction of the touch tolerance a gap has no direction of its own [-].
 FLAT = 1.0 / 256.0
@@ -35,50 +46,26 @@ TILT = 64.0
 
 
 @kernel
-def plane_permits(
-    core: Floats,
-    placed: Floats,
-    corners: int,
-    chain: Floats,
-    count: int,
-    nx: float,
-    ny: float,
-    nz: float,
-    offset: float,
-    s: float,
-    touch: float,
-) -> bool:
+def plane_permits(pair: CorePair, nx: float, ny: float, nz: float, offset: float, s: float) -> bool:
     """Say whether no corner that touches a plane at `s` moves on into it."""
-    for k in range(corners):
+    moving, placed = pair.moving, pair.moving.placed
+    for k in range(moving.corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
-        if gap <= touch:
-            slope, curvature, lever, _ = corner_motion(core, k, chain, count, nx, ny, nz, s)
-            if is_blocking(slope, curvature, lever, touch):
+        if gap <= pair.touch:
+            slope, curvature, lever, _ = corner_motion(moving.core, k, moving.chain, moving.rows, nx, ny, nz, s)
+            if is_blocking(slope, curvature, lever, pair.touch):
                 return False
     return True
 
 
 @kernel
-def leave_plane(
-    core: Floats,
-    placed: Floats,
-    corners: int,
-    chain: Floats,
-    count: int,
-    nx: float,
-    ny: float,
-    nz: float,
-    offset: float,
-    s: float,
-    touch: float,
-    best: float,
-) -> float:
+def leave_plane(pair: CorePair, nx: float, ny: float, nz: float, offset: float, s: float, best: float) -> float:
     """Return for how long after `s` a plane that permits the motion keeps separating, at most `best`."""
-    step = best
-    rate = abs(chain[count - 1, 0])
-    for k in range(corners):
+    moving, placed, count, touch, step = pair.moving, pair.moving.placed, pair.moving.rows, pair.touch, best
+    rate = abs(moving.chain[count - 1, 0])
+    for k in range(moving.corners):
         gap = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2] - offset
-        slope, curvature, _, bound = corner_motion(core, k, chain, count, nx, ny, nz, s)
+        slope, curvature, _, bound = corner_motion(moving.core, k, moving.chain, count, nx, ny, nz, s)
         if bound == 0.0:
             continue
         if count == 1:
@@ -113,38 +100,21 @@ def looks_along(face: Floats, nx: float, ny: float, nz: float) -> bool:
 
 
 @kernel
-def separates(
-    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, nx: float, ny: float, nz: float, touch: float
-) -> bool:
+def separates(pair: CorePair, nx: float, ny: float, nz: float) -> bool:
     """Say whether a plane across n keeps a touching pair apart.
 
     A plane in which both lie does so only with the body of the moving one on its own side.
     """
-    if plane_gap(placed, ka, fixed, kb, nx, ny, nz) - w < -OVERLAPPING * touch:
+    if pair_gap(pair, nx, ny, nz) < -OVERLAPPING * pair.touch:
         return False
-    if ka < 3 or w > 0.0 or not looks_along(placed, nx, ny, nz):
+    placed, corners = pair.moving.placed, pair.moving.corners
+    if corners < 3 or pair.w > 0.0 or not looks_along(placed, nx, ny, nz):
         return True
-    return not lies_in_plane(placed, ka, fixed, kb, nx, ny, nz, touch)
+    return not lies_in_plane(placed, corners, pair.fixed, pair.corners, nx, ny, nz, pair.touch)
 
 
 @kernel
-def try_direction(
-    core: Floats,
-    placed: Floats,
-    ka: int,
-    fixed: Floats,
-    kb: int,
-    w: float,
-    chain: Floats,
-    count: int,
-    nx: float,
-    ny: float,
-    nz: float,
-    known: Vector,
-    s: float,
-    touch: float,
-    best: float,
-) -> float:
+def try_direction(pair: CorePair, nx: float, ny: float, nz: float, known: Vector, s: float, best: float) -> float:
     """Return how far a touching pair may move on from `s` if a plane across n separates it and permits the motion.
 
     `BLOCKED` when the plane does not permit it, `OVERLAP` when it does not even separate.
@@ -154,30 +124,16 @@ def try_direction(
     """
     if nx * known[0] + ny * known[1] + nz * known[2] < OPPOSED:
         return OVERLAP
-    if not separates(placed, ka, fixed, kb, w, nx, ny, nz, touch):
+    if not separates(pair, nx, ny, nz):
         return OVERLAP
-    offset = plane_offset(fixed, kb, nx, ny, nz) + w
-    if not plane_permits(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch):
+    offset = plane_offset(pair.fixed, pair.corners, nx, ny, nz) + pair.w
+    if not plane_permits(pair, nx, ny, nz, offset, s):
         return BLOCKED
-    return leave_plane(core, placed, ka, chain, count, nx, ny, nz, offset, s, touch, best)
+    return leave_plane(pair, nx, ny, nz, offset, s, best)
 
 
 @kernel
-def try_across(
-    core: Floats,
-    placed: Floats,
-    ka: int,
-    fixed: Floats,
-    kb: int,
-    u: Vector,
-    v: Vector,
-    known: Vector,
-    chain: Floats,
-    count: int,
-    s: float,
-    touch: float,
-    best: float,
-) -> float:
+def try_across(pair: CorePair, u: Vector, v: Vector, known: Vector, s: float, best: float) -> float:
     """Return the better answer of `try_direction` for the two directions across u and v (none where parallel)."""
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     square, uu = nx * nx + ny * ny + nz * nz, u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
@@ -191,8 +147,8 @@ def try_across(
         square = nx * nx + ny * ny + nz * nz
     size = math.sqrt(square)
     nx, ny, nz = nx / size, ny / size, nz / size
-    one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
-    other = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, -nx, -ny, -nz, known, s, touch, best)
+    one = try_direction(pair, nx, ny, nz, known, s, best)
+    other = try_direction(pair, -nx, -ny, -nz, known, s, best)
     return max(one, other)
 
 
@@ -204,29 +160,17 @@ def side(core: Floats, corners: int, k: int) -> Vector:
 
 
 @kernel
-def leave_touch(
-    core: Floats,
-    placed: Floats,
-    ka: int,
-    fixed: Floats,
-    kb: int,
-    known: Vector,
-    chain: Floats,
-    count: int,
-    s: float,
-    touch: float,
-    best: float,
-) -> float:
+def leave_touch(pair: CorePair, known: Vector, s: float, best: float) -> float:
     """Return how far a sharp pair that touches at `s` may move on from planes that rest; see `try_direction`.
 
     The planes to look at are those of the faces, those along two edges, and, for cores in one plane, those across a
     face along an edge.
     """
-    found = OVERLAP
+    placed, ka, fixed, kb, found = pair.moving.placed, pair.moving.corners, pair.fixed, pair.corners, OVERLAP
     for i in range(ka if ka > 1 else 0):
         for k in range(kb if kb > 1 else 0):
             u, v = side(placed, ka, i), side(fixed, kb, k)
-            found = max(found, try_across(core, placed, ka, fixed, kb, u, v, known, chain, count, s, touch, best))
+            found = max(found, try_across(pair, u, v, known, s, best))
     for face in range(2):
         nx, ny, nz, size = 0.0, 0.0, 0.0, 0.0
         if face == 0 and kb == 3:
@@ -237,21 +181,18 @@ def leave_touch(
             n = (nx, ny, nz)
             for _ in range(2):
                 nx, ny, nz = -nx, -ny, -nz
-                one = try_direction(core, placed, ka, fixed, kb, 0.0, chain, count, nx, ny, nz, known, s, touch, best)
-                found = max(found, one)
+                found = max(found, try_direction(pair, nx, ny, nz, known, s, best))
             for k in range(ka if ka > 1 else 0):
                 u = side(placed, ka, k)
-                found = max(found, try_across(core, placed, ka, fixed, kb, n, u, known, chain, count, s, touch, best))
+                found = max(found, try_across(pair, n, u, known, s, best))
             for k in range(kb if kb > 1 else 0):
                 v = side(fixed, kb, k)
-                found = max(found, try_across(core, placed, ka, fixed, kb, n, v, known, chain, count, s, touch, best))
+                found = max(found, try_across(pair, n, v, known, s, best))
     return found
 
 
 @kernel
-def starts_apart(
-    placed: Floats, ka: int, fixed: Floats, kb: int, w: float, m: Vector, back: Vector, turn: float, touch: float
-) -> bool:
+def starts_apart(pair: CorePair, m: Vector, back: Vector, turn: float) -> bool:
     """Say whether a plane separates a touching pair from which one across m is reached by a turn of that size.
 
     Tried are m itself, m on its way with the moving core, and the planes along two edges.
@@ -260,10 +201,11 @@ def starts_apart(
         m: unit direction across the plane that separates the pair after the step. back: the same direction before the
             step if it goes along with the moving core. turn: of that core on the step, at most [rad].
     """
-    if separates(placed, ka, fixed, kb, w, m[0], m[1], m[2], touch):
+    if separates(pair, m[0], m[1], m[2]):
         return True
-    if separates(placed, ka, fixed, kb, w, back[0], back[1], back[2], touch):
+    if separates(pair, back[0], back[1], back[2]):
         return True
+    placed, ka, fixed, kb = pair.moving.placed, pair.moving.corners, pair.fixed, pair.corners
     for i in range(edge_count(ka)):
         for k in range(edge_count(kb)):
             u, v = side(placed, ka, i), side(fixed, kb, k)
@@ -275,38 +217,22 @@ def starts_apart(
                 size = -size
             nx, ny, nz = nx / size, ny / size, nz / size
             away = (nx - m[0]) ** 2 + (ny - m[1]) ** 2 + (nz - m[2]) ** 2
-            if away <= (TILT * turn) ** 2 and separates(placed, ka, fixed, kb, w, nx, ny, nz, touch):
+            if away <= (TILT * turn) ** 2 and separates(pair, nx, ny, nz):
                 return True
     return False
 
 
 @kernel
-def probe(
-    core: Floats,
-    placed: Floats,
-    ka: int,
-    fixed: Floats,
-    kb: int,
-    w: float,
-    known: Vector,
-    chain: Floats,
-    count: int,
-    s: float,
-    touch: float,
-    best: float,
-) -> float:
+def probe(pair: CorePair, known: Vector, s: float, best: float) -> float:
     """Return a short step after which a touching pair is apart and on which it does not overlap, or `BLOCKED`.
 
     One plane separates the pair now, and another one after the step. A plane that turns evenly between them separates
     the pair on the way, up to the bends of the corners' paths. The step keeps these below the touch tolerance.
-
-    Args:
-        placed: (6, 3); the first rows have the moving core at `s`, the others are scratch space.
     """
-    rate, speed, bend = turn_rate(chain, count), 0.0, 0.0
-    for k in range(ka):
-        _, _, lever, bound = corner_motion(core, k, chain, count, 1.0, 0.0, 0.0, s)
-        speed, bend = max(speed, lever), max(bend, bound)
+    moving = pair.moving
+    core, ka, chain, count, placed = moving.core, moving.corners, moving.chain, moving.rows, moving.placed
+    fixed, kb, w, touch = pair.fixed, pair.corners, pair.w, pair.touch
+    rate, (speed, bend) = turn_rate(chain, count), widest_motion(pair.moving, s)
     bend += 2.0 * TILT * rate * speed
     if bend == 0.0:
         return BLOCKED
@@ -320,38 +246,20 @@ def probe(
         return BLOCKED
     m = (mx, my, mz)
     back = carried_back(m, chain, count, s, step)
-    return step if starts_apart(placed, ka, fixed, kb, w, m, back, rate * step, touch) else BLOCKED
+    return step if starts_apart(pair, m, back, rate * step) else BLOCKED
 
 
 @kernel
-def move_on(
-    core: Floats,
-    placed: Floats,
-    ka: int,
-    fixed: Floats,
-    kb: int,
-    w: float,
-    nx: float,
-    ny: float,
-    nz: float,
-    chain: Floats,
-    count: int,
-    s: float,
-    touch: float,
-    best: float,
-) -> float:
+def move_on(pair: CorePair, nx: float, ny: float, nz: float, s: float, best: float) -> float:
     """Return how far a pair that touches at `s` may move on, at most `best`; `BLOCKED` or `OVERLAP` where it may not.
 
     Args:
-        core, placed: the moving core relative to the last pivot, and where it is at `s` (and scratch space), (6, 3).
-        n: unit direction from the resting to the moving core; zeros where they are too close to have one, and w = 0.
-        The others as for `sweep_pair`.
+        pair: whose moving core is placed at `s`.
+        nx, ny, nz: unit direction from the resting to the moving core; zeros where they are too close to have one, and
+            w = 0.
     """
     known = (nx, ny, nz)
-    if w > 0.0:
-        free = try_direction(core, placed, ka, fixed, kb, w, chain, count, nx, ny, nz, known, s, touch, best)
-    else:
-        free = leave_touch(core, placed, ka, fixed, kb, known, chain, count, s, touch, best)
+    free = try_direction(pair, nx, ny, nz, known, s, best) if pair.w > 0.0 else leave_touch(pair, known, s, best)
     if free == BLOCKED:
-        free = probe(core, placed, ka, fixed, kb, w, known, chain, count, s, touch, best)
+        free = probe(pair, known, s, best)
     return free

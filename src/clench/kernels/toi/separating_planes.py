@@ -10,7 +10,7 @@ from clench.kernels.geometry.core_distance import separation
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.trees.obb import slab_top
 
-from .core_motion import plane_offset
+from .core_motion import MovingCore, plane_offset
 from .toi_bounds import stays_above
 from .toi_work import SweepWork
 
@@ -50,7 +50,7 @@ def keep_plane(kb: int, wb: float, touch: float, work: SweepWork) -> bool:
 def stays_beyond(ka: int, wa: float, chain: Floats, count: int, begin: float, best: float, work: SweepWork) -> bool:
     """Say whether the moving item in `work` is seen to stay beyond its plane from `begin` until `best`."""
     nx, ny, nz, offset = work.plane[0], work.plane[1], work.plane[2], work.plane[3]
-    return bool(stays_above(work.core, work.placed, ka, chain, count, nx, ny, nz, offset + wa, begin, best))
+    return bool(stays_above(MovingCore(work.core, ka, chain, count, work.placed), nx, ny, nz, offset + wa, begin, best))
 
 
 @kernel

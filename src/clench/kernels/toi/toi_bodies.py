@@ -10,12 +10,13 @@ from clench.kernels.geometry.box_walk import put_box, walk_rectangle, walk_to_bo
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.trees.obb import RECTANGLE, put_slab_face
 
+from .core_motion import CorePair, MovingCore
 from .pair_queue import take_first, take_in
 from .separating_planes import keep_plane, lay_plane, lies_within, passes_beside, stays_beyond
 from .spatial_motion import is_spatial
 from .toi_bounds import ball_entry, measure_of, walk_ball, walk_core
 from .toi_pairs import sweep_pair
-from .toi_work import QUEUE, SweepWork, is_looser, push_first, put_ball, put_item, split_pair
+from .toi_work import QUEUE, BodyPair, SweepWork, is_looser, push_first, put_ball, put_item, split_pair
 
 #: How coarsely the sweep of a node is settled, as a fraction of how thick it is, and of how wide [-].
 COARSE, WIDE = 0.1, 0.02
@@ -24,25 +25,15 @@ NONE = -(2**40)
 
 
 @kernel
-def earliest_meeting(
-    moving: BodyArrays,
-    a: int,
-    resting: BodyArrays,
-    b: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    begin: float,
-    limit: float,
-    work: SweepWork,
-) -> float:
+def earliest_meeting(pair: BodyPair, a: int, b: int, begin: float, limit: float, work: SweepWork) -> float:
     """Return a bound on when the balls of two items come within `touch`: a `turn_measure`, for several joints a travel.
 
     Args:
         begin: a travel before which they do not. limit: later ones are of no interest, in the measure of the result.
-            The rest as in `sweep_body`.
     """
-    reach = put_ball(moving, a, work.moving, work.core[0]) + put_ball(resting, b, work.resting, work.fixed[0]) + touch
+    chain, count = pair.chain, pair.rows
+    reach = put_ball(pair.moving, a, work.moving, work.core[0])
+    reach = reach + put_ball(pair.resting, b, work.resting, work.fixed[0]) + pair.touch
     if count > 1:
         return float(walk_ball(work.core, work.fixed, reach, chain, count, begin, limit, work.placed))
     square = reach * reach - (work.core[0, 1] - work.fixed[0, 1]) ** 2
@@ -55,18 +46,7 @@ def earliest_meeting(
 
 @kernel
 def keep_earliest(
-    moving: BodyArrays,
-    resting: BodyArrays,
-    low: int,
-    high: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    begin: float,
-    floor: float,
-    limit: float,
-    beyond: int,
-    work: SweepWork,
+    pair: BodyPair, low: int, high: int, begin: float, floor: float, limit: float, beyond: int, work: SweepWork
 ) -> int:
     """Order the pairs on the stack from `low` on, the earliest on top, without those that meet later than `limit`.
 
@@ -76,15 +56,14 @@ def keep_earliest(
     Returns:
         the stack's new height.
     """
-    stack, keys, kept, spatial = work.stack, work.keys, low, is_spatial(chain)
+    stack, keys, kept, spatial = work.stack, work.keys, low, is_spatial(pair.chain)
     for k in range(low, high):
         a, b = stack[k, 0], stack[k, 1]
-        if a == beyond and lies_within(resting, b, work):
+        if a == beyond and lies_within(pair.resting, b, work):
             continue
-        if not spatial and passes_beside(moving, a, resting, b, work):
+        if not spatial and passes_beside(pair.moving, a, pair.resting, b, work):
             continue
-        key = earliest_meeting(moving, a, resting, b, chain, count, touch, begin, limit, work)
-        key = max(key, floor)
+        key = max(earliest_meeting(pair, a, b, begin, limit, work), floor)
         if key >= limit and key > 0.0:
             continue
         n = kept
@@ -106,19 +85,7 @@ def put_moving(moving: BodyArrays, a: int, T: Floats, out: Floats) -> tuple[int,
 
 
 @kernel
-def walk_item(
-    ka: int,
-    wa: float,
-    a: int,
-    resting: BodyArrays,
-    b: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    since: float,
-    best: float,
-    work: SweepWork,
-) -> float:
+def walk_item(pair: BodyPair, ka: int, wa: float, a: int, b: int, since: float, best: float, work: SweepWork) -> float:
     """Return a travel up to which a pair of items, of which one is a node at least, is farther apart than `touch`.
 
     It is infinite if it is until `best`.
@@ -126,22 +93,18 @@ def walk_item(
     Args:
         ka, wa: corners and radius of the moving item `a`, which is in `work`. since: a travel before which it is known.
     """
+    resting, touch, moving = pair.resting, pair.touch, MovingCore(work.core, ka, pair.chain, pair.rows, work.placed)
     near = touch + (COARSE * wa if a >= 0 else 0.0)
     if b < 0:
         kb, wb = put_item(resting, b, work.resting, work.fixed)
+        cores = CorePair(moving, work.fixed, kb, wa + wb + touch, touch)
         if ka == RECTANGLE:
-            return float(
-                walk_rectangle(
-                    work.core, work.fixed, kb, work.box, wa + wb + touch, chain, count, near, since, best, work.placed
-                )
-            )
-        return float(
-            walk_core(work.core, ka, work.fixed, kb, wa + wb + touch, chain, count, near, since, best, work.placed)
-        )
+            return float(walk_rectangle(cores, work.box, near, since, best))
+        return float(walk_core(cores, near, since, best))
     grown, box = put_box(resting.slab[b], work.resting, work.box), work.box
     near += COARSE * (box[4, 2] + grown) + WIDE * box[4, 0]
     w = wa + grown + touch
-    return float(walk_to_box(work.core, ka, box, w, chain, count, near, since, best, work.placed))
+    return float(walk_to_box(moving, box, w, near, since, best))
 
 
 @kernel
@@ -151,18 +114,7 @@ def measure(s: float, chain: Floats, count: int) -> float:
 
 
 @kernel
-def sweep_elements(
-    moving: BodyArrays,
-    m: int,
-    resting: BodyArrays,
-    r: int,
-    chain: Floats,
-    count: int,
-    touch: float,
-    best: float,
-    listed: int,
-    work: SweepWork,
-) -> float:
+def sweep_elements(pair: BodyPair, best: float, listed: int, work: SweepWork) -> float:
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
     Pairs of items are looked at in the order in which they can meet, as far as balls, and boxes after those, tell. A
@@ -171,14 +123,14 @@ def sweep_elements(
     last, and the plane by which two never met. Elements that are left are swept.
 
     Args:
-        chain, count: what moves, and its rows, see `sweep_pair`. touch: gaps up to this touch [m].
-        listed: see `push_first`.
+        pair: the bodies. listed: see `push_first`.
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
+    moving, resting, chain, count, touch = pair.moving, pair.resting, pair.chain, pair.rows, pair.touch
     stack, keys, laid, met, beyond, apart = work.stack, work.keys, False, False, NONE, 0.0
     limit = measure(best, chain, count)
-    queue, height = 0, push_first(moving, m, resting, r, listed, work.listed, stack[QUEUE:]) + QUEUE
-    height = keep_earliest(moving, resting, QUEUE, height, chain, count, touch, 0.0, 0.0, limit, NONE, work)
+    queue, height = 0, push_first(moving, pair.m, resting, pair.r, listed, work.listed, stack[QUEUE:]) + QUEUE
+    height = keep_earliest(pair, QUEUE, height, 0.0, 0.0, limit, NONE, work)
     while queue > 0 or height > QUEUE:
         if height > QUEUE:
             height = row = height - 1
@@ -195,7 +147,7 @@ def sweep_elements(
             continue
         if a >= 0 or b >= 0:
             if stack[row, 2] == 0:
-                s = walk_item(ka, wa, a, resting, b, chain, count, touch, since, best, work)
+                s = walk_item(pair, ka, wa, a, b, since, best, work)
                 if s == math.inf or (within and s > since and stays_beyond(ka, wa, chain, count, s, best, work)):
                     continue
                 stack[row, 2], work.since[row], keys[row] = 1, s, max(keys[row], measure(s, chain, count))
@@ -206,7 +158,7 @@ def sweep_elements(
             since, floor, low = work.since[row], keys[row], height
             known = beyond if since >= apart else NONE
             height = split_pair(moving, a, resting, b, is_looser(moving, a, resting, b), stack, low)
-            height = keep_earliest(moving, resting, low, height, chain, count, touch, since, floor, limit, known, work)
+            height = keep_earliest(pair, low, height, since, floor, limit, known, work)
             while low == QUEUE and queue < QUEUE and height > QUEUE:
                 height -= 1
                 queue = take_in(work, queue, height)
@@ -214,13 +166,14 @@ def sweep_elements(
         if since > 0.0 and since >= best:
             continue
         kb, wb = put_item(resting, b, work.resting, work.fixed)
-        found = sweep_pair(work.core, ka, work.fixed, kb, wa + wb, chain, count, touch, since, best, work.placed)
+        core = MovingCore(work.core, ka, chain, count, work.placed)
+        found = sweep_pair(CorePair(core, work.fixed, kb, wa + wb, touch), since, best)
         if found >= best:
             if best > 0.0 and not met and keep_plane(kb, wb, touch, work):
                 laid, beyond = True, NONE
             continue
         best = found
-        work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, m, r
+        work.pair[0], work.pair[1], work.pair[2], work.pair[3] = -1 - a, -1 - b, pair.m, pair.r
         if best < 0.0:
             return best
         limit = measure(best, chain, count)

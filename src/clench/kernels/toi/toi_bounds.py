@@ -8,7 +8,7 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.core_distance import crosses, separation
 from clench.kernels.runtime.compiling import kernel
 
-from .core_motion import corner_motion, move_core, plane_offset
+from .core_motion import CorePair, MovingCore, corner_motion, move_core, place_core, plane_offset
 from .toi_pairs import step_to_plane
 
 #: A ball that comes this near to another one, as a fraction of the sum of their radii, is taken to meet it [-].
@@ -59,32 +59,21 @@ def ball_entry(ax: float, az: float, bx: float, bz: float, square: float) -> flo
 
 
 @kernel
-def walk_core(
-    core: Floats,
-    ka: int,
-    fixed: Floats,
-    kb: int,
-    w: float,
-    chain: Floats,
-    count: int,
-    near: float,
-    begin: float,
-    best: float,
-    placed: Floats,
-) -> float:
-    """Return a travel up to which two cores, that are apart until `begin`, stay farther than `w` apart.
+def walk_core(pair: CorePair, near: float, begin: float, best: float) -> float:
+    """Return a travel up to which two cores, that are apart until `begin`, stay farther than `pair.w` apart.
 
     It is infinite if they do until `best`; a pair that is near at the start never is. Every step goes to a plane
     between the two, as in `sweep_pair`, but ends where they are nearer than `near`, or after some steps.
     """
-    s = begin
+    moving, fixed, kb, w = pair.moving, pair.fixed, pair.corners, pair.w
+    s, placed, ka = begin, moving.placed, moving.corners
     for step in range(STEPS):
-        move_core(core, ka, chain, count, s, placed)
+        place_core(moving, s)
         d, nx, ny, nz, _, _, _, _, _ = separation(placed, ka, fixed, kb)
         if d - w <= near or (step == 0 and crosses(placed, ka, fixed, kb)):
             return s
         offset = plane_offset(fixed, kb, nx, ny, nz) + w
-        s += step_to_plane(core, placed, ka, chain, count, nx, ny, nz, offset + 0.5 * near, s, best - s)
+        s += step_to_plane(moving, nx, ny, nz, offset + 0.5 * near, s, best - s)
         if s >= best:
             return math.inf
     return s
@@ -117,29 +106,17 @@ def walk_ball(
 
 
 @kernel
-def stays_above(
-    core: Floats,
-    placed: Floats,
-    corners: int,
-    chain: Floats,
-    count: int,
-    nx: float,
-    ny: float,
-    nz: float,
-    offset: float,
-    begin: float,
-    best: float,
-) -> bool:
+def stays_above(moving: MovingCore, nx: float, ny: float, nz: float, offset: float, begin: float, best: float) -> bool:
     """Say whether a moving core is seen to stay beyond the plane `n·p = offset` from `begin` until `best`."""
     s = begin
     for _ in range(STEPS):
-        move_core(core, corners, chain, count, s, placed)
-        step = step_to_plane(core, placed, corners, chain, count, nx, ny, nz, offset, s, best - s)
+        place_core(moving, s)
+        step = step_to_plane(moving, nx, ny, nz, offset, s, best - s)
         if step <= 0.0:
             return False
         if step >= best - s:
             return True
-        if count == 1:
+        if moving.rows == 1:
             return False
         s += step
     return False

@@ -7,8 +7,8 @@ several axis groups move at once is seen in the palm frame, with a chain that ha
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from clench.core.tolerances import SWEEP_FRACTION
 from clench.kernels.closing.layout import ChainArrays, Floats, Work
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.hulls.body_sweep import sweep_body
@@ -18,26 +18,48 @@ from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
 
 from .full_width import FullWidthArrays, keep_pair, last_mover, place_axes, pose_movers
 from .separating_planes import lanes_apart
-from .toi_work import SweepWork
+from .toi_work import BodyPair, SweepWork
+
+
+class Stage(NamedTuple):
+    """A path segment along which joints of a finger posture move, and what its links may meet.
+
+    Args:
+        full_width, chain: the hand; kernels hold both by pointers. finger_posture: of the candidate.
+        axis_groups: `T_palm_axis_group` of those with active joints, (F, 3, 4). T_palm_object: (3, 4).
+        turns: of every joint where the segment begins [rad], (J,). rates: of every joint, (J,).
+        touch: gaps up to this touch [m].
+    """
+
+    full_width: FullWidthArrays
+    chain: ChainArrays
+    finger_posture: int
+    axis_groups: Floats
+    T_palm_object: Floats
+    turns: Floats
+    rates: Floats
+    touch: float
 
 
 @kernel
 def sweep_turning(
-    links: BodyArrays,
+    stage: Stage,
     m: int,
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
-    T_palm_axis_group: Floats,
-    first: int,
-    joint: int,
-    rates: Floats,
-    touch: float,
+    joints: tuple[int, int],
     best: float,
     work: Work,
     sweep: SweepWork,
 ) -> float:
     """Return what `sweep_link` does where the active joints are of one axis group."""
+    first, joint = joints
+    links, rates, T_palm_axis_group = (
+        stage.full_width.links,
+        stage.rates,
+        stage.axis_groups[stage.chain.joint_axis_group[first]],
+    )
     place, moving, other = work.place, sweep.moving, sweep.resting
     count, last, _, _ = fill_chain(joint, first, rates, place, work)
     compose_inverse(T_palm_axis_group, sweep.poses[m], moving)
@@ -47,7 +69,7 @@ def sweep_turning(
         return best
     moving[0, 3], moving[2, 3] = moving[0, 3] - place[last, 0], moving[2, 3] - place[last, 1]
     other[0, 3], other[2, 3] = other[0, 3] - place[first, 0], other[2, 3] - place[first, 1]
-    return sweep_body(links, m, resting, r, work.chain, count, touch, best, sweep)
+    return sweep_body(BodyPair(links, m, resting, r, work.chain, count, stage.touch), best, sweep)
 
 
 @kernel
@@ -68,26 +90,24 @@ def fill_spatial(first: int, joint: int, rates: Floats, sweep: SweepWork) -> tup
 
 @kernel
 def sweep_spatially(
-    links: BodyArrays,
+    stage: Stage,
     m: int,
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
-    first: int,
-    joint: int,
-    rates: Floats,
-    touch: float,
+    joints: tuple[int, int],
     best: float,
     sweep: SweepWork,
 ) -> float:
     """Return what `sweep_link` does where the active joints are of several axis groups."""
-    count, last = fill_spatial(first, joint, rates, sweep)
+    links, first = stage.full_width.links, joints[0]
+    count, last = fill_spatial(first, joints[1], stage.rates, sweep)
     copy_pose(sweep.poses[m], sweep.moving)
     copy_pose(T_palm_resting, sweep.resting)
     for k in range(3):
         sweep.moving[k, 3] -= sweep.anchor[last, k]
         sweep.resting[k, 3] -= sweep.anchor[first, k]
-    return sweep_body(links, m, resting, r, sweep.spatial, count, touch, best, sweep)
+    return sweep_body(BodyPair(links, m, resting, r, sweep.spatial, count, stage.touch), best, sweep)
 
 
 @kernel
@@ -103,17 +123,12 @@ def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float
 
 @kernel
 def sweep_link(
-    full_width: FullWidthArrays,
-    chain: ChainArrays,
-    axis_groups: Floats,
+    stage: Stage,
     m: int,
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
-    first: int,
-    joint: int,
-    rates: Floats,
-    touch: float,
+    joints: tuple[int, int],
     best: float,
     work: Work,
     sweep: SweepWork,
@@ -121,19 +136,17 @@ def sweep_link(
     """Return the first contact of one moving link with one resting body before `best`; see `sweep_body`.
 
     Args:
-        first, joint: first active joint, and the last joint that moves the link. T_palm_resting: where the body is.
-        The rest as in `sweep_stage`, which has placed joints, axes and links.
+        stage: the segment, for which `sweep_stage` has placed joints, axes and links.
+        T_palm_resting: where the body is. joints: first active joint, and the last joint that moves the link.
     """
     if resting.root[r] < 0:
         return best
-    last = joint
-    while rates[last] == 0.0:
+    first, last = joints
+    while stage.rates[last] == 0.0:
         last -= 1
-    axis_group, links = chain.joint_axis_group[first], full_width.links
-    if chain.joint_axis_group[last] == axis_group:
-        T = axis_groups[axis_group]
-        return sweep_turning(links, m, resting, r, T_palm_resting, T, first, joint, rates, touch, best, work, sweep)
-    return sweep_spatially(links, m, resting, r, T_palm_resting, first, joint, rates, touch, best, sweep)
+    if stage.chain.joint_axis_group[last] == stage.chain.joint_axis_group[first]:
+        return sweep_turning(stage, m, resting, r, T_palm_resting, joints, best, work, sweep)
+    return sweep_spatially(stage, m, resting, r, T_palm_resting, joints, best, sweep)
 
 
 @kernel
@@ -146,51 +159,33 @@ def first_after(full_width: FullWidthArrays, finger_posture: int, link: int, fir
 
 
 @kernel
-def put_lanes(
-    full_width: FullWidthArrays,
-    finger_posture: int,
-    T_palm_axis_group: Floats,
-    T_palm_object: Floats,
-    several: bool,
-    first: int,
-    rates: Floats,
-    sweep: SweepWork,
-) -> None:
+def put_lanes(stage: Stage, several: bool, first: int, sweep: SweepWork) -> None:
     """Write `lane` and `after` of every link at `sweep.poses`; where `several` axis groups move there are no lanes."""
-    links, lane = full_width.checked.shape[0], sweep.lane
+    full_width, lane = stage.full_width, sweep.lane
+    T_palm_axis_group = stage.axis_groups[stage.chain.joint_axis_group[first]]
+    links = full_width.checked.shape[0]
     x, y, z = T_palm_axis_group[0, 1], T_palm_axis_group[1, 1], T_palm_axis_group[2, 1]
     for r in range(links):
-        sweep.after[r] = first_after(full_width, finger_posture, r, first, rates)
+        sweep.after[r] = first_after(full_width, stage.finger_posture, r, first, stage.rates)
     for r in range(links + 1):
         if several:
             lane[r, 0], lane[r, 1] = -math.inf, math.inf
         elif r < links:
             lane[r, 0], lane[r, 1] = lane_of(full_width.links.box[r], sweep.poses[r], x, y, z)
         else:
-            lane[r, 0], lane[r, 1] = lane_of(full_width.object.box[0], T_palm_object, x, y, z)
+            lane[r, 0], lane[r, 1] = lane_of(full_width.object.box[0], stage.T_palm_object, x, y, z)
 
 
 @kernel
 def sweep_links(
-    full_width: FullWidthArrays,
-    chain: ChainArrays,
-    finger_posture: int,
-    axis_groups: Floats,
-    m: int,
-    first: int,
-    joint: int,
-    rates: Floats,
-    touch: float,
-    best: float,
-    work: Work,
-    sweep: SweepWork,
+    stage: Stage, m: int, first: int, joint: int, best: float, work: Work, sweep: SweepWork
 ) -> tuple[float, int]:
     """Return the first contact of a moving link with other links of the hand before `best`, and that link or -1.
 
     Args:
         m: the moving link. first, joint: first active joint, and the last joint that moves it; see `sweep_link`.
     """
-    met, lane = -1, sweep.lane
+    full_width, met, lane = stage.full_width, -1, sweep.lane
     for r in range(full_width.checked.shape[0]):
         if full_width.checked[m, r] == 0:
             continue
@@ -198,22 +193,7 @@ def sweep_links(
         after = sweep.after[r]
         if after > joint or lanes_apart((lane[m, 0], lane[m, 1]), (lane[r, 0], lane[r, 1])):
             continue
-        found = sweep_link(
-            full_width,
-            chain,
-            axis_groups,
-            m,
-            full_width.links,
-            r,
-            sweep.poses[r],
-            after,
-            joint,
-            rates,
-            touch,
-            best,
-            work,
-            sweep,
-        )
+        found = sweep_link(stage, m, full_width.links, r, sweep.poses[r], (after, joint), best, work, sweep)
         if found < 0.0:
             sweep.skipped[0] += 1
         elif found < best:
@@ -223,108 +203,59 @@ def sweep_links(
 
 
 @kernel
-def sweep_stage(
-    full_width: FullWidthArrays,
-    chain: ChainArrays,
-    finger_posture: int,
-    axis_groups: Floats,
-    T_palm_object: Floats,
-    length: float,
-    turns: Floats,
-    rates: Floats,
-    best: float,
-    work: Work,
-    sweep: SweepWork,
-) -> tuple[float, int]:
+def sweep_stage(stage: Stage, best: float, work: Work, sweep: SweepWork) -> tuple[float, int]:
     """Return how far a path segment goes before a moving link meets anything it must not overlap, at most `best`.
 
     Args:
-        full_width, chain: the hand. finger_posture: of the candidate. axis_groups: `T_palm_axis_group` of those with
-            active joints, (F, 3, 4).
-        T_palm_object: (3, 4). length: of the finger [m]. turns: of every joint [rad], (J,). rates: (J,).
+        stage: the segment. work, sweep: scratch space.
 
     Returns:
         the travel; the met body: -1 nothing, L the object, else a link of the hand. `sweep.winner` and `sweep.poses`,
         which has every link where it is at the start of the segment, describe it. A link that overlaps the object
         already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
     """
+    full_width, chain, finger_posture, rates = stage.full_width, stage.chain, stage.finger_posture, stage.rates
     first = 0
     while first < rates.shape[0] and rates[first] == 0.0:
         first += 1
     if first == rates.shape[0]:
         return best, -1
-    touch = SWEEP_FRACTION * length
     met, links, lane = -1, full_width.checked.shape[0], sweep.lane
-    several = place_active(full_width, chain, finger_posture, first, turns, rates, work, sweep)
-    pose_movers(full_width, chain, finger_posture, turns, sweep.poses)
-    put_lanes(
-        full_width,
-        finger_posture,
-        axis_groups[chain.joint_axis_group[first]],
-        T_palm_object,
-        several,
-        first,
-        rates,
-        sweep,
-    )
+    several = place_active(stage, first, work, sweep)
+    pose_movers(full_width, chain, finger_posture, stage.turns, sweep.poses)
+    put_lanes(stage, several, first, sweep)
     for n in range(full_width.mover_first[finger_posture], full_width.mover_first[finger_posture + 1]):
         m, joint = full_width.mover_link[n], full_width.mover_joint[n]
         if joint < first or full_width.links.root[m] < 0:
             continue
         found = best
         if not lanes_apart((lane[m, 0], lane[m, 1]), (lane[links, 0], lane[links, 1])):
-            found = sweep_link(
-                full_width,
-                chain,
-                axis_groups,
-                m,
-                full_width.object,
-                0,
-                T_palm_object,
-                first,
-                joint,
-                rates,
-                touch,
-                best,
-                work,
-                sweep,
-            )
+            found = sweep_link(stage, m, full_width.object, 0, stage.T_palm_object, (first, joint), best, work, sweep)
         if found < best:
             best, met = found, links
             keep_pair(sweep)
             if best < 0.0:
                 return best, met
-        best, other = sweep_links(
-            full_width, chain, finger_posture, axis_groups, m, first, joint, rates, touch, best, work, sweep
-        )
+        best, other = sweep_links(stage, m, first, joint, best, work, sweep)
         if other >= 0:
             met = other
     return best, met
 
 
 @kernel
-def place_active(
-    full_width: FullWidthArrays,
-    chain: ChainArrays,
-    finger_posture: int,
-    first: int,
-    turns: Floats,
-    rates: Floats,
-    work: Work,
-    sweep: SweepWork,
-) -> bool:
+def place_active(stage: Stage, first: int, work: Work, sweep: SweepWork) -> bool:
     """Place the joints of every axis group that has active ones in its frame, and in the palm's where they are several.
 
     Returns:
         whether several axis groups have active joints.
     """
-    before, several = -1, False
+    chain, rates, before, several = stage.chain, stage.rates, -1, False
     for j in range(first, rates.shape[0]):
         axis_group = chain.joint_axis_group[j]
         if rates[j] != 0.0 and axis_group != before:
-            place_joints(chain, axis_group, turns, work.place)
+            place_joints(chain, axis_group, stage.turns, work.place)
             several = before >= 0
             before = axis_group
     if several:
-        place_axes(full_width, finger_posture, turns, sweep)
+        place_axes(stage.full_width, stage.finger_posture, stage.turns, sweep)
     return several

@@ -76,9 +76,7 @@ def first_contact(
                 b,
                 along,
                 slack,
-                best,
-                moving_triangle,
-                rest_triangle,
+                (best, moving_triangle, rest_triangle),
             )
             continue
         descend = rest.count[b] > 0 or (moving.count[a] == 0 and _size(moving, a) > _size(rest, b))
@@ -163,11 +161,10 @@ def _meet_leaves(
     b: int,
     along: Triple,
     slack: float,
-    best: float,
-    moving_triangle: int,
-    rest_triangle: int,
+    found: tuple[float, int, int],
 ) -> tuple[float, int, int]:
-    """Return the best contact so far after all pairs of triangles of two leaves."""
+    """Return the best contact so far after all pairs of triangles of two leaves; `found`: before."""
+    best, moving_triangle, rest_triangle = found
     for i in range(moving.first[a], moving.first[a] + moving.count[a]):
         u, v, w = corners(moving.vertices, moving.triangles, i)
         one = (_turn(along, moved(T, u)), _turn(along, moved(T, v)), _turn(along, moved(T, w)))

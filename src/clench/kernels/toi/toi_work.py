@@ -43,7 +43,7 @@ class SweepWork(NamedTuple):
             (8,).
         begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
             (J, 7) and for parallel ones (J + 1, 3).
-        hull: scratch space of `hull_sweep`, (29, 5). near: node and element that the hull came near to last, (2,).
+        hull: scratch space of `hull_sweep`, (29, 5). near: the element that the hull came near to last, or -1, (1,).
         listed: resting elements that a short sweep can meet, (32,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
@@ -76,6 +76,23 @@ class SweepWork(NamedTuple):
     skipped: Ints
 
 
+class BodyPair(NamedTuple):
+    """A moving body and a resting one that it may meet; kernels hold both by pointers.
+
+    Args:
+        moving, m: the bodies that the moving one is among, and its number. resting, r: those of the resting one.
+        chain, rows: what moves, and how many rows of it count, see `MovingCore`. touch: gaps up to this touch [m].
+    """
+
+    moving: BodyArrays
+    m: int
+    resting: BodyArrays
+    r: int
+    chain: Floats
+    rows: int
+    touch: float
+
+
 @kernel(allocates=True)
 def make_sweep_work(joints: int, links: int) -> SweepWork:
     """Allocate the scratch space for sweeps of a hand."""
@@ -100,7 +117,7 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((joints, SPATIAL)),
         np.empty((joints + 1, 3)),
         np.empty((29, 5)),
-        np.zeros(2, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
         np.zeros(32, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
@@ -20,6 +21,14 @@ PAIR_X, PAIR_NX, PAIR_GAP = 0, 3, 6
 PAIR_FLOATS = 7
 #: Directions that differ by less are the same [-].
 SAME_DIRECTION = 1e-9
+
+
+class TouchRows(NamedTuple):
+    """Where the touches of two bodies are listed: `numbers` and `tie` of `touching_pairs`, and their first row."""
+
+    numbers: Floats
+    first: int
+    tie: float
 
 
 @entry_kernel(allocates=True)
@@ -79,7 +88,7 @@ def _add_pairs(
     work: SweepWork,
 ) -> int:
     """Append the pairs of two bodies whose gap is small; `work` has their poses. Return the number of rows in use."""
-    stack, first = work.stack, count
+    stack, rows = work.stack, TouchRows(numbers, count, tie)
     stack[0, 0], stack[0, 1] = moving.root[m], resting.root[r]
     waiting = 1 if stack[0, 0] >= 0 and stack[0, 1] >= 0 else 0
     while waiting > 0:
@@ -95,7 +104,7 @@ def _add_pairs(
                 continue
             if a < 0 and b < 0:
                 if found[0] - wa - wb >= -within:
-                    count = _add_touches(found, ka, kb, wa, wb, tie, numbers, first, count, work)
+                    count = _add_touches(found, ka, kb, wa, wb, rows, count, work)
                 continue
         waiting = split_pair(moving, a, resting, b, is_wider(moving, a, resting, b), stack, waiting)
     return count
@@ -103,28 +112,19 @@ def _add_pairs(
 
 @kernel
 def _add_touches(
-    found: Separation,
-    ka: int,
-    kb: int,
-    wa: float,
-    wb: float,
-    tie: float,
-    numbers: Floats,
-    first: int,
-    count: int,
-    work: SweepWork,
+    found: Separation, ka: int, kb: int, wa: float, wb: float, rows: TouchRows, count: int, work: SweepWork
 ) -> int:
     """Append the touches of one pair of elements, whose cores `work` has; return the number of rows in use.
 
     Parallel features touch at several places at once: their ends have rows of their own.
     """
-    a, b = work.core, work.fixed
+    a, b, tie = work.core, work.fixed, rows.tie
     d, nx, ny, nz, _, _, x, y, z = found
-    row = numbers[-1]
+    row = rows.numbers[-1]
     row[3], row[4], row[5], row[6] = nx, ny, nz, d - wb - wa
-    count = _add_row(x, y, z, wb, tie, numbers, first, count)
-    count = _add_corners(a, ka, b, kb, d, d, tie, wb, numbers, first, count)
-    count = _add_corners(b, kb, a, ka, d, 0.0, tie, wb, numbers, first, count)
+    count = _add_row(x, y, z, wb, rows, count)
+    count = _add_corners(a, ka, b, kb, d, d, wb, rows, count)
+    count = _add_corners(b, kb, a, ka, d, 0.0, wb, rows, count)
     for p in range(edge_count(ka)):
         for q in range(edge_count(kb)):
             last = (q + 1) % kb
@@ -133,23 +133,13 @@ def _add_touches(
                 x = b[q, 0] + t * (b[last, 0] - b[q, 0])
                 y = b[q, 1] + t * (b[last, 1] - b[q, 1])
                 z = b[q, 2] + t * (b[last, 2] - b[q, 2])
-                count = _add_row(x, y, z, wb, tie, numbers, first, count)
+                count = _add_row(x, y, z, wb, rows, count)
     return count
 
 
 @kernel
 def _add_corners(
-    a: Floats,
-    ka: int,
-    b: Floats,
-    kb: int,
-    d: float,
-    back: float,
-    tie: float,
-    w: float,
-    numbers: Floats,
-    first: int,
-    count: int,
+    a: Floats, ka: int, b: Floats, kb: int, d: float, back: float, w: float, rows: TouchRows, count: int
 ) -> int:
     """Append the corners of `a` that are as far from the face of `b` as the cores are, moved back along n."""
     if kb < 3:
@@ -158,19 +148,20 @@ def _add_corners(
     for p in range(ka if size > 0.0 else 0):
         x, y, z = a[p, 0], a[p, 1], a[p, 2]
         h = abs(mx * (x - b[0, 0]) + my * (y - b[0, 1]) + mz * (z - b[0, 2]))
-        if abs(h - d) <= tie and above_face(b, mx, my, mz, x, y, z):
-            n = numbers[-1]
-            count = _add_row(x - back * n[3], y - back * n[4], z - back * n[5], w, tie, numbers, first, count)
+        if abs(h - d) <= rows.tie and above_face(b, mx, my, mz, x, y, z):
+            n = rows.numbers[-1]
+            count = _add_row(x - back * n[3], y - back * n[4], z - back * n[5], w, rows, count)
     return count
 
 
 @kernel
-def _add_row(x: float, y: float, z: float, w: float, tie: float, numbers: Floats, first: int, count: int) -> int:
+def _add_row(x: float, y: float, z: float, w: float, rows: TouchRows, count: int) -> int:
     """Append a touch on the surface that lies `w` outside of a point; return the rows in use.
 
     The last row has its direction and gap. A touch is left out where there is no room, and where an earlier row of the
     same bodies, from `first` on, is the same.
     """
+    numbers, first, tie = rows.numbers, rows.first, rows.tie
     last, row = numbers[-1], numbers[count]
     row[0], row[1], row[2] = x + w * last[3], y + w * last[4], z + w * last[5]
     for k in range(3, row.shape[0]):

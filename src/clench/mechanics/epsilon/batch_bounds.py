@@ -47,8 +47,7 @@ def epsilon_bounds(
         0.0 if torsion is None else float(torsion),
         middle,
         float(length),
-        around,
-        between,
+        (around, between),
         ROUNDS,
         out,
     )

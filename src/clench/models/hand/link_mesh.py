@@ -102,7 +102,6 @@ def overlap_depth(a: LinkMesh, b: LinkMesh, poses: FloatArray) -> float:
         np.ascontiguousarray(T_b_a[:3]),
         np.ascontiguousarray(invert(T_b_a)[:3]),
         np.inf,
-        np.empty(CROSSINGS),
-        np.empty(STACK_SIZE, dtype=np.int32),
+        (np.empty(CROSSINGS), np.empty(STACK_SIZE, dtype=np.int32)),
     )
     return float(depth)

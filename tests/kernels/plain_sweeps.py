@@ -1,0 +1,64 @@
+"""Call the kernels of sweeps with numbers and arrays, of which they take bundles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from clench.kernels.geometry import box_walk
+from clench.kernels.hulls import body_sweep, hull_sweep, near_elements
+from clench.kernels.toi import toi_bounds, toi_pairs
+from clench.kernels.toi.core_motion import CorePair, MovingCore
+from clench.kernels.toi.toi_work import BodyPair
+from kernels.kernel_entries import entry
+
+_CALLED: dict[Any, Any] = {}
+
+
+def _call(kernel: Any, *arguments: Any) -> Any:
+    """Call a kernel from Python, through an entry that is made once."""
+    if kernel not in _CALLED:
+        _CALLED[kernel] = entry(kernel)
+    return _CALLED[kernel](*arguments)
+
+
+def sweep_pair(core, ka, fixed, kb, w, chain, count, touch, begin, best, placed):
+    """Sweep a core towards another one."""
+    pair = CorePair(MovingCore(core, ka, chain, count, placed), fixed, kb, float(w), float(touch))
+    return _call(toi_pairs.sweep_pair, pair, float(begin), float(best))
+
+
+def walk_core(core, ka, fixed, kb, w, chain, count, near, begin, best, placed):
+    """Walk a core towards another one."""
+    pair = CorePair(MovingCore(core, ka, chain, count, placed), fixed, kb, float(w), 0.0)
+    return _call(toi_bounds.walk_core, pair, near, begin, best)
+
+
+def stays_above(core, placed, corners, chain, count, nx, ny, nz, offset, begin, best):
+    """Look whether a core stays above a plane."""
+    return _call(
+        toi_bounds.stays_above, MovingCore(core, corners, chain, count, placed), nx, ny, nz, offset, begin, best
+    )
+
+
+def walk_to_box(core, ka, box, w, chain, count, near, begin, best, placed):
+    """Walk a core towards a box."""
+    return _call(box_walk.walk_to_box, MovingCore(core, ka, chain, count, placed), box, w, near, begin, best)
+
+
+def walk_rectangle(core, fixed, kb, box, w, chain, count, near, begin, best, placed):
+    """Walk a rectangle towards a core."""
+    pair = CorePair(MovingCore(core, 4, chain, count, placed), fixed, kb, w, 0.0)
+    return _call(box_walk.walk_rectangle, pair, box, near, begin, best)
+
+
+def _of_bodies(kernel: Any) -> Callable[..., Any]:
+    def call(moving, m, resting, r, chain, count, touch, best, work):
+        return _call(kernel, BodyPair(moving, m, resting, r, chain, count, touch), best, work)
+
+    return call
+
+
+sweep_body = _of_bodies(body_sweep.sweep_body)
+clear_travel = _of_bodies(hull_sweep.clear_travel)
+list_near = _of_bodies(near_elements.list_near)
