@@ -39,8 +39,8 @@ def close_candidates(
     for i in range(len(candidates.finger_posture)):
         work = scratch(hand)
         held = [kept(value) for value in (hand, full_width, obj)]
-        rest = [kept(value) for value in (*sections, candidates, work, sweep, answer)]
-        close_candidate(Closing(*held, T, *rest), i, 1, together)
+        rest = [kept(value) for value in (candidates, work, sweep, answer)]
+        close_candidate(Closing(*held, T, *sections, *rest), i, 1, together)
 
 
 def find_overlaps(hand: Any, tree: Any, rounds: Any, closed: bool, T: Any, sections: Any, overlaps: Any) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from clench.kernels.closing.layout import KIND_SIDE, Outline
+from clench.kernels.closing.layout import KIND_SIDE, Outline, Work
 from clench.kernels.sections import turning_pairs
 from kernels.kernel_entries import entry
 
@@ -19,7 +19,9 @@ def met(side, x, z, both, radius=0.0):
     pair = np.full(13, -1)
     pair[6] = 0
     outline = Outline(2, 0, 0, 0, 1, radius, both, 1)
-    found = turn_sides(outline, 3, 1, x, z, 0.0, 0, 1e-11, TURN, side, pair)
+    flat, line, whole = np.empty((0, 3)), np.empty(0), np.empty(0, np.int64)
+    work = Work(flat, flat, line, flat, side, flat, flat, flat, line, line, line, whole, np.empty((0, 3, 4)), pair)
+    found = turn_sides(outline, (3, 1, 0), (x, z), 0.0, 1e-11, TURN, work)
     return found, list(pair[:6]), list(pair[6:])
 
 

@@ -161,9 +161,9 @@ def sample_values() -> dict[str, Any]:
     for kind, names in kinds.items():
         values |= dict.fromkeys(names, _arrays(kind)[0])
     poses, turns, T = _arrays("f3 f1 f2")
-    names = ("hand", "full_width", "obj", "shared", "own", "candidates", "work", "sweep", "answer")
+    names = ("hand", "full_width", "obj", "candidates", "work", "sweep", "answer")
     held = {name: kept(values[name]) for name in names}
-    values["closing"] = Closing(T_palm_object=T, **held)
+    values["closing"] = Closing(T_palm_object=T, shared=sections, own=sections, **held)
     values["stage"] = Stage(held["full_width"], kept(chain), 0, poses, T, turns, turns, 0.0)
     values["planes"] = (0, 0)
     return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
