@@ -183,6 +183,13 @@ def speeds_of(pair: LinkPair, at: float) -> float:
 
 
 @kernel
+def links_of(pair: LinkPair) -> tuple[int, int]:
+    """Return the numbers of two links in the hand."""
+    link, (m, r) = pair.fingers.link, pair.rows
+    return int(link[m]), int(link[r])
+
+
+@kernel
 def place_links_at(pair: LinkPair, at: float, first: Floats, second: Floats) -> None:
     """Write the poses of two links at a place of the motion, (3, 4) each, and their joints' turns."""
     full_width, fingers, workspace = pair.full_width, pair.fingers, pair.workspace

@@ -7,6 +7,7 @@ import math
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
+from clench.kernels.hulls.enclosing_hulls import lowest_corner
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.toi_work import SweepWork
 from clench.kernels.trees.obb import slab_top
@@ -20,16 +21,9 @@ TOUCHING = 1e-12
 
 
 @kernel
-def farthest_point(
-    bodies: BodyArrays, m: int, T: Floats, nx: float, ny: float, nz: float, stack: Ints
-) -> tuple[float, float, float, float]:
-    """Return how far a body reaches along a unit vector, and a point of it there, both in the frame of its pose."""
-    x, y, z = (
-        T[0, 0] * nx + T[1, 0] * ny + T[2, 0] * nz,
-        T[0, 1] * nx + T[1, 1] * ny + T[2, 1] * nz,
-        T[0, 2] * nx + T[1, 2] * ny + T[2, 2] * nz,
-    )
-    best, found, w = -math.inf, 0, 0.0
+def farthest_vertex(bodies: BodyArrays, m: int, x: float, y: float, z: float, stack: Ints) -> tuple[float, int, int]:
+    """Return how far a body reaches along a unit vector of its frame, and the element and the vertex that do."""
+    best, found, vertex = -math.inf, 0, 0
     stack[0, 0], waiting = bodies.root[m], 1
     while waiting > 0:
         waiting -= 1
@@ -53,9 +47,30 @@ def farthest_point(
                 p = bodies.vertices[v]
                 top = x * p[0] + y * p[1] + z * p[2] + bodies.radius[e]
                 if top > best:
-                    best, found, w = top, v, bodies.radius[e]
-    p = bodies.vertices[found]
-    px, py, pz = p[0] + w * x, p[1] + w * y, p[2] + w * z
+                    best, found, vertex = top, e, v
+    return best, found, vertex
+
+
+@kernel
+def farthest_point(
+    bodies: BodyArrays, m: int, T: Floats, nx: float, ny: float, nz: float, stack: Ints
+) -> tuple[float, float, float, float]:
+    """Return how far a body reaches along a unit vector, and a point of it there, both in the frame of its pose."""
+    x, y, z = (
+        T[0, 0] * nx + T[1, 0] * ny + T[2, 0] * nz,
+        T[0, 1] * nx + T[1, 1] * ny + T[2, 1] * nz,
+        T[0, 2] * nx + T[1, 2] * ny + T[2, 2] * nz,
+    )
+    hulls = bodies.hulls
+    best, reach, p = -math.inf, 0.0, bodies.box[m]
+    for hull in range(hulls.body[m], hulls.body[m + 1]):
+        low, k = lowest_corner(hulls, hull, -x, -y, -z)
+        if hulls.radius[hull] - low > best:
+            best, reach, p = hulls.radius[hull] - low, hulls.radius[hull], hulls.points[k]
+    if hulls.body[m] == hulls.body[m + 1]:
+        best, e, v = farthest_vertex(bodies, m, x, y, z, stack)
+        reach, p = bodies.radius[e], bodies.vertices[v]
+    px, py, pz = p[0] + reach * x, p[1] + reach * y, p[2] + reach * z
     return (
         best + nx * T[0, 3] + ny * T[1, 3] + nz * T[2, 3],
         T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3],

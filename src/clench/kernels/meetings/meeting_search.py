@@ -15,13 +15,23 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.toi_work import SweepWork
 
-from .finger_motion import ROUNDING, approach_along, even_until, last_end, place_links_at, put_axes, speeds_of
+from .finger_motion import (
+    ROUNDING,
+    approach_along,
+    even_until,
+    last_end,
+    links_of,
+    place_links_at,
+    put_axes,
+    speeds_of,
+)
 from .hull_planes import find_plane, plane_between
 from .meeting_layout import FingerLinks, LinkPair, MeetingWork
-from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shorter_step, step_by_elements
+from .near_hulls import links_parting
+from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shorter_step, step_by_parts
 
-#: Hulls nearer than this are measured by their elements [m].
-NEAR = 1e-5
+#: Links whose hulls are nearer than this are measured part by part, and those nearer than that by elements [m].
+NEAR, CLOSE = 1e-5, 1e-7
 #: Up to which gap elements are measured at first, and how that grows while they are farther apart [m, -].
 REACH, WIDER = 1e-4, 4.0
 #: A pair counts as meeting after this many looks, which is safe.
@@ -78,13 +88,6 @@ def point_at(T: Floats, p: Floats) -> Vector:
         T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3],
         T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3],
     )
-
-
-@kernel
-def links_of(pair: LinkPair) -> tuple[int, int]:
-    """Return the numbers of two links in the hand."""
-    link, (m, r) = pair.fingers.link, pair.rows
-    return int(link[m]), int(link[r])
 
 
 @kernel
@@ -152,7 +155,10 @@ def look_at(
     margin, nx, ny, nz = find_plane(full_width.links, m, r, plane[0], plane[1], plane[2], sweep)
     plane[0], plane[1], plane[2] = nx, ny, nz
     step, pair[5] = 0.0, pair[5] + 1
-    if margin <= NEAR or pair[5] == LOOKS:
+    gap, n = margin, (nx, ny, nz)
+    if margin <= NEAR:
+        gap, n = links_parting(full_width.links, m, r, n, sweep)
+    if gap <= CLOSE or pair[5] == LOOKS:
         reach = workspace.reach[p] if pair[5] < LOOKS else math.inf
         gap = links_gap(full_width.links, m, r, reach, (nx, ny, nz), pair[6:], sweep)
         if gap < reach:
@@ -160,14 +166,16 @@ def look_at(
             if gap <= TOUCH or pair[5] == LOOKS:
                 put_touch(gap, n, point, at, workspace.touch)
                 return MEETS
-            step = step_by_elements(both, gap, n, pair[6:], at, end)
-            nx, ny, nz = n
-            margin = min(plane_between(full_width.links, m, r, nx, ny, nz, sweep), gap)
+            step = step_by_parts(both, gap, n, pair[6:], at, end)
         else:
-            step = gap / speeds_of(both, at)
+            n, step = (nx, ny, nz), gap / speeds_of(both, at)
         workspace.reach[p] = max(WIDER * gap, REACH)
+    elif margin <= NEAR:
+        step = step_by_parts(both, gap, n, pair[6:], at, end)
+    if margin <= NEAR:
+        margin = min(plane_between(full_width.links, m, r, n[0], n[1], n[2], sweep), gap)
     if margin > 0.0:
-        step = max(step, step_by_plane(both, (nx, ny, nz), margin, at, end))
+        step = max(step, step_by_plane(both, n, margin, at, end))
     workspace.at[p] = at + step
     return ON if at + step < (1.0 - ROUNDING) * end else FREE
 

@@ -1,4 +1,4 @@
-"""How far two links go on that are near each other: their nearest elements, and planes between elements."""
+"""How far two links go on that are near each other: their nearest elements, and planes between their parts."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from clench.kernels.toi.toi_work import (
     split_pair,
 )
 
-from .finger_motion import approach_along, even_until, place_links_at, speeds_of
+from .finger_motion import approach_along, even_until, links_of, place_links_at, speeds_of
 from .meeting_layout import LinkPair
+from .near_hulls import have_hulls, hulls_gap, parting, put_between
 
 #: Gap at which links meet [m].
 TOUCH = 1e-11
 #: How many lengths of a step are tried with one plane.
 LENGTHS = 6
-#: Elements count on a step that are nearer than so many times the gap of their links [-].
+#: Parts count on a step that are nearer than so many times the gap of their links [-].
 AROUND = 8.0
 #: A direction along which links approach each other by less than this share of their speed counts as that [-].
 FLAT = 1e-2
@@ -122,16 +123,16 @@ def shorter_step(step: float, margin: float, left: float, bend: float) -> float:
 
 
 @kernel
-def step_by_elements(pair: LinkPair, gap: float, n: Vector, near: Ints, at: float, end: float) -> float:
-    """Return how far two links advance from a place of the motion, kept apart by planes between their elements.
+def step_by_parts(pair: LinkPair, gap: float, n: Vector, near: Ints, at: float, end: float) -> float:
+    """Return how far two links advance from a place of the motion, kept apart by planes between their parts.
 
-    Elements that are farther apart than links approach each other on the step do not count.
+    The parts are their hulls; where these overlap, or a link has none, they are its elements. Parts that are farther
+    apart than links approach each other on the step do not count.
 
     Args:
         pair: the links. gap: of the links [m].
         n, near: unit vector between their nearest elements, and these. at: the place. end: of their motion.
     """
-    links, sweep, stack = pair.full_width.links, pair.sweep, pair.sweep.stack
     until, speed = even_until(pair, at, end), speeds_of(pair, at)
     _, across, _ = approach_along(pair, n, at, until)
     least = gap / speed
@@ -139,15 +140,31 @@ def step_by_elements(pair: LinkPair, gap: float, n: Vector, near: Ints, at: floa
     if step <= least:
         return least
     put_ahead(pair, at + step)
+    put_sides(n, pair.sweep)
+    found = step_by_hulls(pair, n, at, until, step, across)
+    if found < 0.0:
+        put_ahead(pair, at + step)
+        found = step_by_elements(pair, near, at, until, step, across / speed)
+    return max(found, least)
+
+
+@kernel
+def step_by_elements(pair: LinkPair, near: Ints, at: float, until: float, step: float, share: float) -> float:
+    """Return how far of a step planes between the elements of two links keep these apart; see `step_by_parts`.
+
+    Args:
+        share: of their speed, by which they approach each other along the vector of `put_sides`.
+    """
+    links, sweep, stack = pair.full_width.links, pair.sweep, pair.sweep.stack
+    speed = speeds_of(pair, at)
     # The nearest elements tell most.
     step = step_of_elements(pair, near[0], near[1], at, until, step)
-    put_sides(n, sweep)
     m, r = pair.rows
     waiting = push_roots(links, pair.fingers.link[m], links, pair.fingers.link[r], stack)
-    while waiting > 0 and step > least:
+    while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        if are_apart(links, a, b, speed * step, across * step, sweep):
+        if are_apart(links, a, b, speed * step, share * speed * step, sweep):
             continue
         if a < 0 and b < 0:
             step = step_of_elements(pair, -1 - a, -1 - b, at, until, step)
@@ -155,7 +172,30 @@ def step_by_elements(pair: LinkPair, gap: float, n: Vector, near: Ints, at: floa
         height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
         put_nearest_last(links, links, stack, waiting, height, sweep)
         waiting = height
-    return max(step, least)
+    return step
+
+
+@kernel
+def step_by_hulls(pair: LinkPair, n: Vector, at: float, until: float, step: float, across: float) -> float:
+    """Return how far of a step planes between the hulls of two links keep these apart, or -1 where hulls overlap.
+
+    Args:
+        across: how fast the links approach each other along `n`; see `step_by_parts`.
+    """
+    links, sweep = pair.full_width.links, pair.sweep
+    m, r = links_of(pair)
+    if not have_hulls(links, m, r):
+        return -1.0
+    put_between(sweep)
+    for i in range(links.hulls.body[m], links.hulls.body[m + 1]):
+        for k in range(links.hulls.body[r], links.hulls.body[r + 1]):
+            if hulls_gap(links.hulls, i, sweep.moving, k, sweep.resting, n) >= across * step:
+                continue
+            margin, side = parting(links.hulls, i, k, n, sweep)
+            if margin <= TOUCH:
+                return -1.0
+            step = step_along(pair, -1 - i, -1 - k, margin, side, at, until, step)
+    return step
 
 
 @kernel
@@ -172,9 +212,17 @@ def step_of_elements(pair: LinkPair, i: int, k: int, at: float, until: float, st
     Args:
         i, k: the elements. until: up to where every joint turns evenly.
     """
-    links, sweep, ahead = pair.full_width.links, pair.sweep, pair.sweep.placed
-    ka, kb, w = links.corners[i], links.corners[k], links.radius[i] + links.radius[k]
-    gap, n, _ = elements_gap(links, i, k, sweep)
+    gap, n, _ = elements_gap(pair.full_width.links, i, k, pair.sweep)
+    return step_along(pair, i, k, gap, n, at, until, step)
+
+
+@kernel
+def step_along(pair: LinkPair, i: int, k: int, gap: float, n: Vector, at: float, until: float, step: float) -> float:
+    """Return how far of a step, to which `workspace.ahead` belongs, planes across a direction keep two parts apart.
+
+    Args:
+        i, k: two elements, or -1 minus two hulls. gap: how far planes keep them apart now [m].
+    """
     _, speed, bend = approach_along(pair, n, at, until)
     level = min(0.5 * gap, 0.5 * TOUCH)
     if speed * step < gap - level:
@@ -183,9 +231,7 @@ def step_of_elements(pair: LinkPair, i: int, k: int, at: float, until: float, st
     for _ in range(LENGTHS):
         if step <= least:
             return step
-        put_core(links, i, pair.workspace.ahead[0], ahead)
-        put_core(links, k, pair.workspace.ahead[1], ahead[4:])
-        left = plane_gap(ahead, ka, ahead[4:], kb, n[0], n[1], n[2]) - w
+        left = gap_ahead(pair, i, k, n)
         if lowest_on(step, gap, left, bend) > level:
             return step
         step = max(shorter_step(step, gap - level, left - level, bend), least)
@@ -193,3 +239,15 @@ def step_of_elements(pair: LinkPair, i: int, k: int, at: float, until: float, st
     if step > least:
         put_ahead(pair, at + least)
     return least
+
+
+@kernel
+def gap_ahead(pair: LinkPair, i: int, k: int, n: Vector) -> float:
+    """Return how far two parts are apart along a unit vector at the poses `workspace.ahead`; see `step_along`."""
+    links, ahead, placed = pair.full_width.links, pair.workspace.ahead, pair.sweep.placed
+    if i < 0:
+        return hulls_gap(links.hulls, -1 - i, ahead[0], -1 - k, ahead[1], n)
+    put_core(links, i, ahead[0], placed)
+    put_core(links, k, ahead[1], placed[4:])
+    gap = plane_gap(placed, links.corners[i], placed[4:], links.corners[k], n[0], n[1], n[2])
+    return float(gap - links.radius[i] - links.radius[k])
