@@ -1,8 +1,9 @@
 """Find the first meetings of links of simultaneously closing fingers (docs/method.md section 5).
 
 A pair of links advances in steps that cannot pass a meeting. The pair that has advanced least goes next. A plane that
-keeps their hulls apart at both ends of a step does so in between, except for the bend of the paths. If hulls are near,
-the closest elements give the plane. If no plane keeps links apart, a step is as long as their gap allows.
+keeps their hulls apart at both ends of a step does so in between, except for the bend of the paths. If hulls of links
+are near, each pair of their parts has its own plane; if parts are near, each pair of elements. If no plane keeps links
+apart, a step is as long as their gap allows.
 """
 
 from __future__ import annotations

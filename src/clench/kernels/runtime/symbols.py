@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 
 from numba.core.compiler import Compiler
 
-#: Machine code from this size on stays apart [bytes]. Half of it compiled hardly faster, and loaded slower.
+#: Machine code from this size on stays apart [bytes]. A smaller one compiles less, and loads more files.
 LARGE: Final = 40_000
 
 
