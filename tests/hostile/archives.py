@@ -53,7 +53,7 @@ def unpacking(name: str, size: int = 3 << 30) -> bytes:
     """Return a batch one of whose arrays unpacks to gigabytes."""
     out = io.BytesIO(entries(**{name: None}))
     with (
-        zipfile.ZipFile(out, "a", zipfile.ZIP_DEFLATED) as archive,
+        zipfile.ZipFile(out, "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
         archive.open(f"{name}.npy", "w", force_zip64=True) as entry,
     ):
         form = {"descr": "<f8", "fortran_order": False, "shape": (size // 56, 7)}

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.geometry import box_walk
@@ -173,6 +173,7 @@ def test_a_walk_ends_before_the_box_is_met(seed, corners):
 
 @settings(deadline=None, max_examples=200)
 @given(st.integers(0, 10**6), st.integers(1, 3))
+@example(126, 1)
 def test_a_rectangle_walks_until_it_is_near_what_rests(seed, corners):
     rng = np.random.default_rng(seed)
     core, fixed = drawn_core(rng, 4, 0.2, 0.4), drawn_core(rng, corners, 0.2, 0.4)[:3]
@@ -192,6 +193,13 @@ def test_a_rectangle_walks_until_it_is_near_what_rests(seed, corners):
     assert begin <= found
     for s in np.linspace(begin, best if found == math.inf else found, 150):
         assert apart(s) > w
+
+
+def test_a_box_around_a_segment_is_no_longer_and_no_wider():
+    half, box = np.array([0.05, -0.08, 0.16]), np.empty((5, 3))
+    for u, v in ((half, 0.0 * half), (0.0 * half, half)):
+        put_rectangle(np.array([-u - v, u - v, u + v, v - u]), box)
+        np.testing.assert_allclose(sorted(box[4]), [0.0, 0.0, np.linalg.norm(half)], atol=1e-15)
 
 
 @pytest.mark.parametrize("sizes", [(0.3, 0.2), (0.3, 0.0), (0.0, 0.0), (1e-20, 1e-200), (1e100, 1.0)])

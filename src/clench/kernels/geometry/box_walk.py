@@ -52,12 +52,13 @@ def put_box(slab: Any, T: Floats, box: Floats) -> float:
 
 @kernel
 def square_axes(u: Vector, v: Vector) -> tuple[Vector, Vector]:
-    """Return the unit vectors along u and across both, for any sizes, up to none."""
-    size = math.sqrt(dot(u, u))
-    first = scaled(u, 1.0 / size) if size > 0.0 else (1.0, 0.0, 0.0)
+    """Return the unit vectors along u and across both, for any sizes, up to none; along v if u has no length."""
+    size, other = math.sqrt(dot(u, u)), math.sqrt(dot(v, v))
+    along, length = (u, size) if size > 0.0 else (v, other)
+    first = scaled(along, 1.0 / length) if length > 0.0 else (1.0, 0.0, 0.0)
     third = cross(first, v)
     size = math.sqrt(dot(third, third))
-    if size <= PARALLEL * math.sqrt(dot(v, v)):
+    if size <= PARALLEL * other:
         third = cross(first, (0.0, 0.0, 1.0) if abs(first[2]) < 0.5 else (0.0, 1.0, 0.0))
         size = math.sqrt(dot(third, third))
     return first, scaled(third, 1.0 / size)
