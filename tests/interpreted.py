@@ -4,6 +4,7 @@ A plugin: ``python -m pytest -p interpreted --at-most 10``. Only the kernels do:
 stays fast, which NUMBA_DISABLE_JIT would not allow. Tests that take longer so are ended, and said to be skipped.
 """
 
+import re
 import signal
 import sys
 from collections.abc import Generator
@@ -25,7 +26,7 @@ def _as_it_is(function: Any, **options: bool) -> Any:
     return function
 
 
-_compiled_already = [n for n in sys.modules if n.startswith("clench.kernels.") and n != compiling.__name__]
+_compiled_already = [n for n in sys.modules if re.match(r"clench\.kernels\.(?!runtime\b)", n)]
 assert not _compiled_already, _compiled_already
 compiling._compiled = _as_it_is
 

@@ -4,6 +4,7 @@ import ast
 import importlib.util
 import pickle
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -128,3 +129,10 @@ def test_an_index_of_another_version_on_disk_is_no_index(tmp_path, monkeypatch) 
     assert index._load_index() == {}
     path.unlink()
     assert index._load_index() == {}
+
+
+def test_kernels_run_as_plain_python_with_the_plugin() -> None:
+    tests = Path(__file__).parents[2]
+    code = "import interpreted; from clench.kernels.toi.core_motion import move_core; print(type(move_core).__name__)"
+    run = subprocess.run([sys.executable, "-c", code], cwd=tests, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "function"

@@ -104,3 +104,45 @@ def test_processes_that_compile_at_once_refer_to_the_same_symbols(folder: Path) 
     ]
     assert all(process.communicate()[0].startswith("7.5 ") and process.returncode == 0 for process in running)
     assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
+
+
+#: Two functions of one name, and two tuples of one name with other fields, given to one kernel.
+TWINS = """
+from collections import namedtuple
+from clench.kernels.runtime.compiling import entry_kernel, kernel
+import numpy as np
+
+One = namedtuple("Pair", ("a", "b", "x"))
+Two = namedtuple("Pair", ("b", "a", "x"))
+
+@kernel
+def f(x):
+    return x + 100.0
+
+first = f
+
+@kernel
+def f(x):
+    return 2.0 * x
+
+@kernel
+def of_pair(p):
+    return p.a - 10.0 * p.b
+
+@entry_kernel
+def both(x):
+    z = np.zeros(1)
+    return first(x) + f(x) + 1000.0 * of_pair(One(x, 3.0, z)) + of_pair(Two(x, 3.0, z))
+"""
+
+
+@pytest.mark.parametrize("way", ["apart", "linked"])
+def test_functions_and_tuples_of_one_name_have_symbols_of_their_own(tmp_path: Path, way: str) -> None:
+    (tmp_path / "some_kernels.py").write_text(TWINS.replace("@entry_kernel\ndef", "@entry_kernel(allocates=True)\ndef"))
+    program = CALL.split("import some_kernels")[0] + "import some_kernels as m; print(m.both(2.0))"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for _ in range(2):
+        run = subprocess.run(
+            [sys.executable, "-c", program, way], capture_output=True, text=True, check=True, env=environment
+        )
+        assert float(run.stdout) == 102.0 + 4.0 + 1000.0 * (2.0 - 30.0) + (3.0 - 20.0)

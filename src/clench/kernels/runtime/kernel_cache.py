@@ -73,11 +73,11 @@ class KernelCache(FunctionCache):
             return None
         try:
             content = self._cache_file.load(self._index_key(sig, target_context.codegen()))
+            if content is None:
+                return None
+            apart, needed, parts = content
         except _UNREADABLE:
             return None
-        if content is None:
-            return None
-        apart, needed, parts = content
         if not bring(needed):
             return None
         result = _rebuilt(target_context, *parts)

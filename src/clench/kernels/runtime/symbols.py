@@ -17,6 +17,8 @@ from typing import Any, Final, NamedTuple
 
 from numba.core.compiler import Compiler
 
+from .by_reference import ByReference
+
 #: Machine code from this size on stays apart [bytes]. A smaller one compiles less, and loads more files.
 LARGE: Final = 40_000
 
@@ -36,8 +38,19 @@ _APART: Final[dict[str, Needed]] = {}
 
 
 def has_a_fixed_symbol(function: Callable[..., Any]) -> bool:
-    """Say whether a function is the only one of its name in its module; one within a function need not be."""
-    return "<locals>" not in function.__qualname__ and function.__closure__ is None
+    """Say whether a function's module has it under its name; one within a function, or without a name, is not there."""
+    return bool(function.__qualname__.isidentifier() and function.__closure__ is None)
+
+
+def described(kind: Any) -> str:
+    """Return what tells a type from all others; the name of a tuple's type leaves out its class and its fields."""
+    if isinstance(kind, ByReference):
+        return f"&{described(kind.content)}"
+    if not hasattr(kind, "types"):
+        return str(kind)
+    parts = ",".join(described(part) for part in kind.types)
+    made = getattr(kind, "instance_class", tuple)
+    return f"{made.__module__}.{made.__qualname__}{getattr(kind, 'fields', '')}({parts})"
 
 
 def named(stamp: bytes) -> type[Compiler]:
@@ -53,7 +66,10 @@ def named(stamp: bytes) -> type[Compiler]:
         def _compile_bytecode(self) -> Any:
             identity = self.state.func_id
             if has_a_fixed_symbol(identity.func):
-                digest = hashlib.sha256(stamp + identity.modname.encode()).hexdigest()[:16]
+                kinds = ",".join(map(described, self.state.args))
+                source = identity.func.__code__
+                text = f"{identity.modname} {source.co_firstlineno} {kinds}".encode()
+                digest = hashlib.sha256(stamp + text + source.co_code).hexdigest()[:16]
                 identity.unique_id = digest
                 identity.unique_name = f"{identity.func_qualname}${digest}"
             compiled: Any = super()._compile_bytecode()  # type: ignore[no-untyped-call]
@@ -77,7 +93,10 @@ def bring(kernels: Iterable[Needed]) -> bool:
     """Load or compile kernels that machine code refers to; return whether all their symbols are there now."""
     for needed in kernels:
         if needed.symbol not in _APART:
-            getattr(import_module(needed.module), needed.name).compile(needed.arguments)
+            try:
+                getattr(import_module(needed.module), needed.name).compile(needed.arguments)
+            except (ImportError, AttributeError):
+                return False
         if needed.symbol not in _APART:
             return False
     return True
