@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import clench
-from chain_hands import HandBuilder, along_x, mount, three_links
+from chain_hands import HandBuilder, along_x, mount, three_links, turned
 from clench.core.pose import Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import JointRole
+from clench.models.shapes import Shape, ShapeKind
 from clench.solver.alternatives import finger_sets
 from clench.solver.orders import best_order
 from clench.solver.problem import make_problem
@@ -153,6 +154,22 @@ def test_fingers_that_meet_on_their_way_hold_each_other():
 def test_fingers_that_overlap_before_they_move_are_not_certified():
     free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
     assert not solve(facing(0.01), free, order="together").certified
+
+
+def crossed():
+    """Return two fingers whose bars cross like a plus sign; their edges and corners are 2 mm apart."""
+    bars = [Shape(ShapeKind.BOX, size, Pose([0.05, 0, 0])) for size in ((0.05, 0.004, 0.004), (0.05, 0.006, 0.006))]
+    builder = HandBuilder().finger("index", [bars[0]], [0.1], upper=1.5)
+    base = mount((0.05, -0.05, 0.0), turned(np.array([0.0, 0.0, 1.0]), np.pi / 2))
+    return builder.finger("thumb", [bars[1]], [0.1], base=base, upper=1.5, thumb=True).hand()
+
+
+def test_fingers_whose_sharp_links_cross_before_they_move_are_left_alone():
+    free = clench.GraspObject.load("sphere:r=0.01", pose=Pose([1.0, 0, 0]))
+    solution = solve(crossed(), free, order="together")
+    assert solution.certificate["code"] == "self_collision_at_start"
+    assert angles(solution) == pytest.approx([1.5, 1.5])
+    assert "thumb" not in solution.fingers["index"].reason
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from clench.kernels.closing.layout import CandidateArrays, Floats, Ints
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
-from clench.kernels.toi.toi_work import SweepWork
+from clench.kernels.toi.toi_work import SweepWork, bodies_overlap
 
 from .finger_motion import (
     ROUNDING,
@@ -156,6 +156,15 @@ def look_at(
     margin, nx, ny, nz = find_plane(full_width.links, m, r, plane[0], plane[1], plane[2], sweep)
     plane[0], plane[1], plane[2] = nx, ny, nz
     step, pair[5] = 0.0, pair[5] + 1
+    # Elements that cross have no gap. If none do at first, none do before a gap closes.
+    if (
+        pair[5] == 1
+        and margin <= NEAR
+        and bodies_overlap(full_width.links, m, full_width.links, r, 0.0, False, -1, sweep)
+    ):
+        _, n, point = elements_gap(full_width.links, sweep.pair[0], sweep.pair[1], sweep)
+        put_touch(0.0, n, point, at, workspace.touch)
+        return MEETS
     gap, n = margin, (nx, ny, nz)
     if margin <= NEAR:
         gap, n = links_parting(full_width.links, m, r, n, sweep)
