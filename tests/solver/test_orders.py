@@ -157,11 +157,16 @@ def test_fingers_that_overlap_before_they_move_are_not_certified():
 
 
 def crossed():
-    """Return two fingers whose bars cross like a plus sign; their edges and corners are 2 mm apart."""
-    bars = [Shape(ShapeKind.BOX, size, Pose([0.05, 0, 0])) for size in ((0.05, 0.004, 0.004), (0.05, 0.006, 0.006))]
+    """Return two fingers whose bars cross like a plus sign; no edges are nearer than 0.5 mm."""
+    bars = [
+        Shape(ShapeKind.BOX, size, Pose([0.05, 0, z]))
+        for size, z in (((0.05, 0.004, 0.004), 0.002), ((0.05, 0.006, 0.008), 0.0))
+    ]
     builder = HandBuilder().finger("index", [bars[0]], [0.1], upper=1.5)
     base = mount((0.05, -0.05, 0.0), turned(np.array([0.0, 0.0, 1.0]), np.pi / 2))
-    return builder.finger("thumb", [bars[1]], [0.1], base=base, upper=1.5, thumb=True).hand()
+    return builder.finger(
+        "thumb", [bars[1]], [0.1], base=base, axes=[np.array([0.0, 1.0, 0.0])], upper=1.5, thumb=True
+    ).hand()
 
 
 def test_fingers_whose_sharp_links_cross_before_they_move_are_left_alone():
