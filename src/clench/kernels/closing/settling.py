@@ -71,7 +71,7 @@ def closest_pair(
     copy_pose(sweep.poses[m], sweep.moving)
     copy_pose(T_palm_object if on_object else sweep.poses[met], sweep.resting)
     resting, r = (full_width.object, 0) if on_object else (full_width.links, met)
-    return body_gap(full_width.links, m, resting, r, bound, 1.0, sweep)
+    return body_gap(full_width.links, m, resting, r, -1, bound, 1.0, sweep)
 
 
 @kernel

@@ -32,7 +32,7 @@ def smallest_gap(
     best, nearest = np.inf, -1
     for m in which:
         copy_pose(poses[m], work.moving)
-        gap = body_gap(links, m, target, 0, best, 1.0, work)
+        gap = body_gap(links, m, target, 0, -1, best, 1.0, work)
         if gap < best:
             best, nearest = gap, m
     return best, nearest
@@ -49,7 +49,7 @@ def link_gap(links: BodyArrays, m: int, r: int, poses: Floats, bound: float, sla
     sweep = make_sweep_work(0, 0)
     copy_pose(poses[m], sweep.moving)
     copy_pose(poses[r], sweep.resting)
-    gap = body_gap(links, m, links, r, bound, slack, sweep)
+    gap = body_gap(links, m, links, r, -1, bound, slack, sweep)
     if gap < bound:
         i, k = sweep.pair[0], sweep.pair[1]
         put_core(links, i, sweep.moving, sweep.core)

@@ -12,6 +12,7 @@ import math
 
 from clench.kernels.closing.layout import CandidateArrays, Floats, Ints
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
+from clench.kernels.hulls.near_hulls import links_parting
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
 from clench.kernels.toi.toi_work import SweepWork, bodies_overlap
@@ -28,7 +29,6 @@ from .finger_motion import (
 )
 from .hull_planes import find_plane, plane_between
 from .meeting_layout import FingerLinks, LinkPair, MeetingWork
-from .near_hulls import links_parting
 from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shorter_step, step_by_parts
 
 #: Links whose hulls are nearer than this are measured part by part, and those nearer than that by elements [m].

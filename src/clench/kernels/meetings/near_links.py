@@ -8,6 +8,7 @@ from clench.kernels.closing.layout import Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector
+from clench.kernels.hulls.near_hulls import have_hulls, hulls_gap, parting, put_between
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import plane_gap
 from clench.kernels.toi.separating_planes import span
@@ -23,7 +24,6 @@ from clench.kernels.toi.toi_work import (
 
 from .finger_motion import approach_along, even_until, links_of, place_links_at, speeds_of
 from .meeting_layout import LinkPair
-from .near_hulls import have_hulls, hulls_gap, parting, put_between
 
 #: Gap at which links meet [m].
 TOUCH = 1e-11

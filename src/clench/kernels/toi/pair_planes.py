@@ -95,15 +95,21 @@ def palm_moves(problem: PathProblem, m: int, k: int) -> bool:
 @kernel
 def keep_normal(problem: PathProblem, r: int, work: PathWork) -> None:
     """Write the direction between the closest elements, in the frame of the second body, to `work.normal`."""
-    sweep, links, out = work.sweep, problem.links, work.normal
+    sweep, links = work.sweep, problem.links
     target, _ = target_of(problem, r)
     i, e = sweep.pair[0], sweep.pair[1]
     put_core(links, i, sweep.moving, sweep.core)
     put_core(target, e, sweep.resting, sweep.fixed)
     _, nx, ny, nz, _, _, _, _, _ = separation(sweep.core, links.corners[i], sweep.fixed, target.corners[e])
-    T = sweep.resting
+    keep_direction((nx, ny, nz), work)
+
+
+@kernel
+def keep_direction(n: Vector, work: PathWork) -> None:
+    """Write a direction between the two bodies, in the frame of the second one, to `work.normal`."""
+    T = work.sweep.resting
     for axis in range(3):
-        out[axis] = T[0, axis] * nx + T[1, axis] * ny + T[2, axis] * nz
+        work.normal[axis] = T[0, axis] * n[0] + T[1, axis] * n[1] + T[2, axis] * n[2]
 
 
 @kernel

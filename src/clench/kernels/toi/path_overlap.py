@@ -12,11 +12,13 @@ from typing import Final
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.link_meshes import ObjectMesh, depth_of, mesh_of
+from clench.kernels.hulls.near_elements import list_touching
+from clench.kernels.hulls.near_hulls import links_parting
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 
 from .pair_motion import PathProblem, PathWork, free_share, make_path_work, place_pair, put_left, target_of
-from .pair_planes import keep_normal, parted_share
-from .toi_work import ball_gap, body_gap
+from .pair_planes import keep_direction, keep_normal, parted_share
+from .toi_work import ball_gap, bodies_overlap, body_gap
 
 #: Two bodies may overlap by this much and still count as touching: the tolerance of the proof [m].
 OVERLAP: Final = 1e-5
@@ -35,20 +37,54 @@ BALLS: Final = 0.25
 
 
 @kernel
-def gap_between(problem: PathProblem, m: int, r: int, near: float, work: PathWork) -> float:
-    """Return the gap of a pair in its present place, minus its depth where the pair overlaps; `near` if larger [m].
+def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -> float:
+    """Return the gap of a pair in its present place, minus its depth where the pair overlaps; `APART` if larger [m].
 
-    The direction between the closest elements is kept as the normal of a plane that may part the pair.
+    If the hulls of two links are apart, that gap is returned, which is no larger. The direction between the hulls, or
+    between the closest elements, is kept as the normal of a plane that may part the pair.
+
+    Args:
+        was_apart: the pair did not overlap at all where it was looked at last. It has not moved by more than `OVERLAP`
+            beyond a touch since. So no closed body lies in the other one if no elements cross.
     """
+    m, r = problem.pairs[p, 0], problem.pairs[p, 1]
+    if r >= 0:
+        gap, side = links_parting(problem.links, m, r, (0.0, 0.0, 1.0), work.sweep)
+        if gap > FOUND:
+            keep_direction(side, work)
+            return min(gap, APART)
     target, b = target_of(problem, r)
     work.sweep.pair[0] = -1
-    gap = body_gap(problem.links, m, target, b, near, 1.0, work.sweep)
+    listed = list_touching(problem.links, m, target, b, APART, work.sweep)
+    gap = body_gap(problem.links, m, target, b, listed, APART, 1.0, work.sweep)
     for axis in range(3):
         work.normal[axis] = 0.0
     if work.sweep.pair[0] >= 0:
         keep_normal(problem, r, work)
+    if was_apart and are_closed(problem, m, r) and not cross(problem, p, listed, gap, work):
+        return gap
     depth = depth_between(problem, m, r, work)
     return -depth if depth > max(0.0, -gap) else gap
+
+
+@kernel
+def are_closed(problem: PathProblem, m: int, r: int) -> bool:
+    """Say whether both bodies of a pair are closed: a surface can get into an open one without crossing it."""
+    closed = problem.meshes.closed
+    return bool(closed[problem.mesh[m]] and (problem.solid.closed if r < 0 else closed[problem.mesh[r]]))
+
+
+@kernel
+def cross(problem: PathProblem, p: int, listed: int, gap: float, work: PathWork) -> bool:
+    """Say whether elements of a pair cross, by more than `TOUCH` if they are round; see `gap_between`.
+
+    The gap of elements that cross is that of their corners and edges, so no larger than how far they have moved since
+    they touched.
+    """
+    if gap > OVERLAP + problem.allowed[p]:
+        return False
+    m, (target, b) = problem.pairs[p, 0], target_of(problem, problem.pairs[p, 1])
+    return bool(bodies_overlap(problem.links, m, target, b, TOUCH, False, listed, work.sweep))
 
 
 @kernel
@@ -114,7 +150,7 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
     """
     m, r, pad = problem.pairs[p, 0], problem.pairs[p, 1], problem.allowed[p]
     put_left(problem, m, r, work)
-    left, last, k, t, exempt, looks = work.left, work.left.shape[0] - 1, 0, 0.0, 0.0, 0
+    left, last, k, t, exempt, looks, gap = work.left, work.left.shape[0] - 1, 0, 0.0, 0.0, 0, -1.0
     for axis in range(3):
         work.normal[axis] = 0.0
     while k + t <= until:
@@ -131,7 +167,7 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
         looks += 1
         if looks > MOST_LOOKS:
             return k + t, math.nan
-        gap = gap_between(problem, m, r, APART, work)
+        gap = gap_between(problem, p, gap >= 0.0, work)
         depth = -gap - pad
         if k + t == 0.0 and depth > FOUND:
             exempt = depth

@@ -228,16 +228,17 @@ def split_pair(moving: BodyArrays, a: int, resting: BodyArrays, b: int, first: b
 
 @kernel
 def body_gap(
-    moving: BodyArrays, m: int, resting: BodyArrays, r: int, bound: float, slack: float, work: SweepWork
+    moving: BodyArrays, m: int, resting: BodyArrays, r: int, listed: int, bound: float, slack: float, work: SweepWork
 ) -> float:
     """Return the gap between two bodies if it is below `bound`, else `bound`; writes the closest pair.
 
     Args:
+        listed: see `push_first`.
         slack: the result may be larger than the gap by up to this factor, which saves most of the work if many pairs
             are about as close [-]. work: has `moving` and `resting`, the bodies' poses in one frame.
     """
     stack, best = work.stack, bound
-    waiting = push_roots(moving, m, resting, r, stack)
+    waiting = push_first(moving, m, resting, r, listed, work.listed, stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]

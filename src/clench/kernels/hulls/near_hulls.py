@@ -7,12 +7,13 @@ import math
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.vectors import Vector
-from clench.kernels.hulls.enclosing_hulls import HullArrays, lowest_corner
-from clench.kernels.hulls.gjk import separating_direction
-from clench.kernels.hulls.hull_window import BOX_END, CORNERS, END, LAST, NOW, SIMPLEX
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose_inverse
 from clench.kernels.toi.toi_work import SweepWork
+
+from .enclosing_hulls import HullArrays, lowest_corner
+from .gjk import separating_direction
+from .hull_window import BOX_END, CORNERS, END, LAST, NOW, SIMPLEX
 
 #: The search for a direction ends if no other one has a gap that is larger by more than this fraction [-].
 NEARLY = 0.1

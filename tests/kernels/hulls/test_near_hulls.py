@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.geometry.bodies import pack_bodies
+from clench.kernels.hulls import near_hulls
 from clench.kernels.hulls.enclosing_hulls import pack_hulls
-from clench.kernels.meetings import hull_planes, near_hulls
+from clench.kernels.meetings import hull_planes
 from clench.kernels.toi import toi_work
 from kernels.hulls.test_gjk import distance
 from kernels.hulls.test_hull_sweep import two_parts
