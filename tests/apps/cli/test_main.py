@@ -115,6 +115,20 @@ def test_a_printed_solution_loads_no_package_that_it_does_not_need(tmp_path: Pat
     assert run.stdout.splitlines()[-1] == "[]"
 
 
+def test_the_end_of_a_command_looks_for_no_garbage() -> None:
+    program = """
+import sys
+from clench.apps.cli.main import main
+class Ring:
+    def __init__(self): self.own = self
+    def __del__(self, say=sys.stdout.write): say("collected")
+main(["--version"])
+Ring()
+"""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout == f"clench {clench.__version__}\n"
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([name, "--help"]) == 0
