@@ -89,7 +89,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _overview(commands: Mapping[str, Callable[..., int]]) -> str:
-    """Return the help of the whole program, written here because the option parser takes longer to load than all this."""
+    """Return the help of the whole program, written here because the option parser takes longer to load."""
     lines = [f"  {name:<10}{(command.__doc__ or '').splitlines()[0]}" for name, command in commands.items()]
     listed = "\n".join(lines)
     return f"usage: clench COMMAND ...\n\n{DESCRIPTION}\n\ncommands (clench COMMAND --help tells more):\n{listed}\n"
