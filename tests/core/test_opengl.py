@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from clench.core.rendering.opengl import load_late
 
 _LOAD = "from clench import Hand; print(len(Hand.load('robonaut2').fingers))"
 _FILM = "import clench.apps.cli.inputs.actuators as a; from pathlib import Path; a.make_film(Path('a.gif'), None)"
@@ -58,3 +61,31 @@ def test_drawing_leaves_the_environment_as_it_was() -> None:
         "print(dict(os.environ) == before)"
     )
     assert run(said, "").stdout == "True\n"
+
+
+def test_a_late_module_loads_when_it_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "late_one.py").write_text("import missing_one\nanswer = 42\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "late_one", raising=False)
+    load_late("late_one")
+    import late_one
+
+    assert not hasattr(late_one, "__wrapped__")  # what looks at all modules loads none
+    assert "answer" not in vars(late_one)
+    with pytest.raises(ImportError, match="missing_one"):
+        _ = late_one.answer
+    monkeypatch.setitem(sys.modules, "missing_one", late_one)
+    assert late_one.answer == 42
+    assert "__getattr__" not in vars(late_one)
+    load_late("late_one")
+    assert late_one.answer == 42
+    load_late("not_installed_anywhere")
+    assert "not_installed_anywhere" not in sys.modules
+    monkeypatch.delitem(sys.modules, "late_one")
+
+
+def test_what_draws_nothing_looks_for_no_screen() -> None:
+    # GLFW starts a process to find its library.
+    said = "import sys; from clench.core.rendering.opengl import import_mujoco as load; mujoco = load(); "
+    said += "print('glfw.library' in sys.modules, hasattr(mujoco, 'GLContext'))"
+    assert run(said, "").stdout == "False True\n"

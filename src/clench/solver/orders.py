@@ -14,9 +14,8 @@ from clench.core.exceptions import ClenchError
 from clench.models.command import ClosingOrder, GraspCommand
 from clench.scoring.criterion_registry import find_criterion, is_of_hand
 from clench.scoring.explaining import say_what_decided
-from clench.solver.analysis.examples import solve_scores
 
-from .solution import GraspSolution, SolutionStatus
+from .solution import GraspSolution, SolutionStatus, posture_reason, solve_scores
 
 #: Tiers that rank one order before another regardless of the scores, strongest first; as `_Solved.rank` lists them.
 _TIERS: Final = (
@@ -100,11 +99,12 @@ def best_order(command: GraspCommand, solve: Callable[[GraspCommand], GraspSolut
 
 def settled(command: GraspCommand, solution: GraspSolution) -> GraspCommand:
     """Return a command with the order and the posture that were chosen for a solution of it."""
-    choice = solution.choice or {}
-    if command.orders and "orders" in choice:
-        command = replace(command, order=ClosingOrder(choice["orders"]["chosen"]), orders=())
-    if "preshapes" in choice:
-        command = replace(command, preshape=dict(choice["preshapes"]["angles"]))
+    orders = (solution.choice or {}).get("orders") if command.orders else None
+    if orders is not None:
+        command = replace(command, order=ClosingOrder(orders["chosen"]), orders=())
+    posture = posture_reason(solution)
+    if posture is not None:
+        command = replace(command, preshape=dict(posture["angles"]))
     return command
 
 

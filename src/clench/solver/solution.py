@@ -310,3 +310,21 @@ class GraspSolution(Displayed, LateFields):
         from .documents import load_solution
 
         return load_solution(path)
+
+
+def solve_scores(solution: GraspSolution) -> dict[str, float]:
+    """Return the scores of a whole solution: sums over the fingers' chosen sets, and the scores of the whole hand."""
+    chosen = [f.best.scores for f in solution.fingers.values() if f.best is not None]
+    names = dict.fromkeys(name for scores in chosen for name in scores)
+    sums = {n: float(sum(s[n] for s in chosen)) for n in names if all(n in s for s in chosen)}
+    return {**sums, **(solution.choice or {}).get("final_hand_scores", {})}
+
+
+def posture_reason(solution: GraspSolution) -> Mapping[str, Any] | None:
+    """Return why clench chose the posture of a solution, or None if the command named the posture.
+
+    It leaves the reasons for the sets of the fingers unread: for them, clench would close all sets on planes.
+    """
+    choice = solution.choice
+    unread = isinstance(choice, DeferredMapping) and not choice.is_made
+    return None if choice is None or unread else choice.get("preshapes")

@@ -100,6 +100,35 @@ def test_help_loads_nothing_heavy_and_names_every_command() -> None:
         assert f"\n  {name} " in run.stdout
 
 
+def test_a_printed_solution_loads_no_package_that_it_does_not_need(tmp_path: Path) -> None:
+    """Loading one of these takes about as long as computing the solution."""
+    path = tmp_path / "C.json"
+    path.write_text('{"hand_pose": {"position": [0, 0, 0.1], "wxyz": [1, 0, 0, 0]}, "preshape": "open"}')
+    needless = ("typeguard", "asyncio", "unittest.mock", "glfw.library", "scipy.optimize", "scipy.spatial")
+    needless += ("matplotlib", "trimesh", "clarabel", "coacd", "PIL")
+    program = (
+        "import sys; from clench.apps.cli.main import main; "
+        f"main(['solve', '--hand', 'robonaut2', '--object', 'mug', '--command', {str(path)!r}]); "
+        f"print([name for name in {needless!r} if name in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_end_of_a_command_looks_for_no_garbage() -> None:
+    program = """
+import sys
+from clench.apps.cli.main import main
+class Ring:
+    def __init__(self): self.own = self
+    def __del__(self, say=sys.stdout.write): say("collected")
+main(["--version"])
+Ring()
+"""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout == f"clench {clench.__version__}\n"
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([name, "--help"]) == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numba.core.registry import cpu_target
 
-from clench.kernels.runtime.by_reference import Kept, laid_out
+from clench.kernels.runtime.by_reference import Kept, laid_out, type_of
 
 
 class Flags(NamedTuple):
@@ -62,3 +62,36 @@ def test_a_tuple_takes_as_much_room_as_the_compiler_says(value) -> None:
     kind = context.get_value_type(numba.typeof(value))
     assert len(laid_out(value)[0]) == context.get_abi_sizeof(kind)
     assert laid_out(value)[1] == context.get_abi_alignment(kind)
+
+
+def read_only() -> Any:
+    rows = np.zeros((2, 3))
+    rows.flags.writeable = False
+    return rows
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        VALUE,
+        VALUE._replace(count=1.5),
+        VALUE._replace(planes=read_only()),
+        Inner(False, np.zeros((3, 2), order="F"), VALUE.flags),
+        (np.zeros(3), 1),
+        (np.zeros(3), np.zeros(3)),
+        (),
+        np.zeros((2, 3)),
+        np.zeros((2, 3)).T,
+        np.zeros((4, 6))[::2, ::2],
+        np.zeros(2, dtype=np.uint8),
+        np.zeros(2, dtype=np.int32),
+        np.zeros(2, dtype=np.complex128),
+        read_only(),
+        True,
+        2,
+        Kept(VALUE),
+    ],
+)
+def test_types_are_those_that_numba_finds(value: Any) -> None:
+    assert type_of(value) == numba.typeof(value)
+    assert type_of(value) is type_of(value)

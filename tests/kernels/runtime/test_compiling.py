@@ -103,7 +103,7 @@ def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expe
     outside, files = set(), sorted(folder.rglob("*.py"))
     assert len(files) > 2
     for path in files:
-        assert imported_files(path) == set(compiling._read(path)[1]), path
+        assert imported_files(path) == set(map(Path, compiling._read(str(path))[1])), path
         assert all(file.is_file() for file in imported_files(path)), path
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):

@@ -27,37 +27,48 @@ IMPORTED = {
     "numba.core.codegen.JITCodeLibrary",
     "numba.core.compiler.Compiler",
     "numba.core.compiler.compile_result",
+    "numba.core.environment.Environment",
+    "numba.core.environment.lookup_environment",
     "numba.core.imputils.impl_ret_borrowed",
     "numba.core.registry.CPUDispatcher",
-    "numba.core.runtime.nrt.rtsys",
+    "numba.core.registry.cpu_target",
+    "numba.core.runtime._nrt_python",
     "numba.core.typing.templates.AttributeTemplate",
 }
 #: Attributes of these, of compiled functions, and of what the extension interface passes to functions.
 ATTRIBUTES = {
+    "llvmlite.binding.ExecutionEngine": {"add_object_file", "finalize_object"},
     "llvmlite.ir.IRBuilder": {"inttoptr", "load"},
     "llvmlite.ir.Type": {"as_pointer"},
     "numba.core.base.BaseContext": {"get_executable", "get_value_type"},
     "numba.core.caching.CompileResultCacheImpl": {"check_cachable", "reduce"},
     "numba.core.caching.FunctionCache": {"_guard_against_spurious_io_errors", "_index_key"},
-    "numba.core.caching.IndexDataCacheFile": {"_load_index", "load", "save"},
+    "numba.core.caching.IndexDataCacheFile": {"_data_name", "_load_index", "_save_data", "load", "save"},
     "numba.core.cgutils": {"alloca_once_value", "gep_inbounds"},
-    "numba.core.codegen.JITCPUCodegen": {"_create_empty_module", "set_env", "unserialize_library"},
-    "numba.core.codegen.JITCodeLibrary": {
-        "_finalize_final_module",
-        "_get_compiled_object",
-        "_set_compiled_object",
-        "enable_object_caching",
-    },
+    "numba.core.codegen.JITCPUCodegen": {"_create_empty_module", "magic_tuple", "set_env"},
+    "numba.core.codegen.JITCodeLibrary": {"_get_compiled_object"},
     "numba.core.codegen.JitEngine": {"_load_defined_symbols", "get_function_address"},
     "numba.core.compiler.Compiler": {"_compile_bytecode"},
     "numba.core.cpu.CPUContext": {"codegen"},
     "numba.core.cpu.CPUTargetOptions": {"_nrt", "no_cfunc_wrapper", "no_cpython_wrapper"},
     "numba.core.datamodel.manager.DataModelManager": {"lookup"},
+    "numba.core.environment.Environment": {"_memo", "consts", "globals"},
     "numba.core.pythonapi.PythonAPI": {"decref", "long_as_longlong", "object_getattr_string"},
-    "numba.core.registry.CPUDispatcher": {"get_call_template"},
+    "numba.core.registry.CPUDispatcher": {"get_call_template", "typeof_pyval"},
+    "numba.core.registry.cpu_target": {"target_context"},
+    "numba.core.runtime._nrt_python": {"c_helpers"},
 }
 #: Attributes of compiled functions and of their index on disk, which only objects have.
-OF_KERNELS = {"_cache", "_cache_file", "_engine", "_final_module", "_load_index", "_shared_module", "typing_context"}
+OF_KERNELS = {
+    "_cache",
+    "_cache_file",
+    "_ee",
+    "_engine",
+    "_final_module",
+    "_load_index",
+    "_shared_module",
+    "typing_context",
+}
 SOURCES = [path for folder in ("src", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
 FUTURE = "from __future__ import annotations\n"
 RUNTIME = sorted((ROOT / "src" / "clench" / "kernels" / "runtime").glob("*.py"))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,15 +32,17 @@ def caller_of_caller(x):
     return caller(x) - 1.0
 """
 
-#: Calls a kernel; prints the answer, and how often each kernel was loaded from disk.
+#: Calls a kernel; prints the answer, how often each kernel was loaded from disk for Python or a compiler, how many
+#: kinds of each there are now, and how many kernels are there by their symbol.
 CALL = """
 import sys
-from clench.kernels.runtime import kernel_cache
+from clench.kernels.runtime import kernel_cache, symbols
 kernel_cache.LARGE = 0 if "apart" in sys.argv else 10**9
 import some_kernels as m
 x = m.caller_of_caller(3.0)
 kernels = (m.large, m.small, m.caller, m.caller_of_caller)
-print(x, *(sum(k.stats.cache_hits.values()) for k in kernels), *(len(k.overloads) for k in kernels))
+hits = (sum(k.stats.cache_hits.values()) for k in kernels)
+print(x, *hits, *(len(k.overloads) for k in kernels), len(symbols._APART))
 """
 
 
@@ -57,17 +61,22 @@ def call(folder: Path, *words: str) -> str:
 
 
 def data_files(folder: Path, kernel: str) -> list[Path]:
-    return sorted((folder / "cache").rglob(f"some_kernels.{kernel}-*.nbc"))
+    return sorted((folder / "cache").rglob(f"some_kernels.{kernel}-*.code"))
+
+
+def load(file: Path) -> Any:
+    """Return what is in a file of machine code; its symbols name modules in that folder."""
+    return pickle.loads(file.read_bytes())
 
 
 def test_kernels_that_are_linked_in_are_not_loaded_again(folder: Path) -> None:
-    assert call(folder) == "7.5 0 0 0 0 1 1 1 1"
-    assert call(folder) == "7.5 0 0 0 1 0 0 0 1"
+    assert call(folder) == "7.5 0 0 0 0 1 1 1 1 0"
+    assert call(folder) == "7.5 0 0 0 1 0 0 0 1 0"
 
 
 def test_machine_code_brings_the_kernels_that_it_refers_to(folder: Path) -> None:
-    assert call(folder, "apart") == "7.5 0 0 0 0 1 1 1 1"
-    assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
+    assert call(folder, "apart") == "7.5 0 0 0 0 1 1 1 1 4"
+    assert call(folder, "apart") == "7.5 0 0 0 1 0 0 0 1 4"
 
 
 @pytest.mark.parametrize("lost", ["large", "caller"])
@@ -77,9 +86,33 @@ def test_a_lost_kernel_is_compiled_anew_under_the_same_symbol(folder: Path, lost
         path.unlink()
     first = call(folder, "apart").split()
     assert first[0] == "7.5"
-    assert first[5:] == ["1"] * 4
+    assert first[5:] == ["1", "1", "1", "1", "4"], "what calls the lost kernel is compiled with it"
     assert data_files(folder, lost), "it is on disk again"
-    assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
+    assert call(folder, "apart") == "7.5 0 0 0 1 0 0 0 1 4"
+
+
+@pytest.mark.parametrize("what", ["symbol", "version", "processor"])
+def test_machine_code_for_something_else_is_compiled_anew(folder: Path, what: str) -> None:
+    call(folder, "apart")
+    (large,), (small,) = data_files(folder, "large"), data_files(folder, "small")
+    if what == "symbol":
+        large.write_bytes(small.read_bytes())
+    else:
+        (symbol, version, processor), code = load(large)
+        other = (symbol, "0.1", processor) if what == "version" else (symbol, version, ("x", "y", "z"))
+        large.write_bytes(pickle.dumps((other, code)))
+    assert call(folder, "apart").split()[:6] == ["7.5", "0", "1", "0", "0", "1"]
+    assert call(folder, "apart") == "7.5 0 0 0 1 0 0 0 1 4"
+
+
+def test_a_damaged_file_of_machine_code_is_written_anew(folder: Path) -> None:
+    call(folder, "apart")
+    (large,) = data_files(folder, "large")
+    whole = large.stat().st_size
+    for size in (0, 100, whole // 2):
+        large.write_bytes(large.read_bytes()[:size])
+        assert call(folder, "apart").startswith("7.5 ")
+        assert large.stat().st_size == whole
 
 
 def test_a_change_of_the_source_changes_the_symbols(folder: Path) -> None:
@@ -103,7 +136,7 @@ def test_processes_that_compile_at_once_refer_to_the_same_symbols(folder: Path) 
         for _ in range(4)
     ]
     assert all(process.communicate()[0].startswith("7.5 ") and process.returncode == 0 for process in running)
-    assert call(folder, "apart") == "7.5 1 1 1 1 1 1 1 1"
+    assert call(folder, "apart") == "7.5 0 0 0 1 0 0 0 1 4"
 
 
 #: Two functions of one name, and two tuples of one name with other fields, given to one kernel.

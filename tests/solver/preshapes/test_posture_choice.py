@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 import clench
+from clench.core.caching.deferring import DeferredMapping
 from clench.models.command_file import command_from_dict, command_to_dict
 from clench.models.hand.hand import JointRole
 from clench.solver.batch.saved_question import SavedBatch
 from clench.solver.orders import settled
 from clench.solver.preshapes.postures import MOST_COMPARED, posture_options
 from clench.solver.preshapes.preshapes import opposition_zones, posture_joints
+from clench.solver.solution import posture_reason
 
 HAND = clench.Hand.load("robonaut2")
 MUG = clench.GraspObject.load("mug")
@@ -244,6 +246,20 @@ def test_postures_by_pose_win_over_open() -> None:
         assert chosen.preshape[i] == said(single)["chosen"]
         assert chosen.joint_angles[i].tolist() == list(single.joint_angles.values())
         assert list(chosen.solution(i).joint_angles.values()) == chosen.joint_angles[i].tolist()
+
+
+def test_settling_a_named_posture_leaves_the_reasons_for_the_sets_unread() -> None:
+    """For these reasons, clench would close all sets on planes."""
+    asked = command(preshape="open")
+    solution = clench.solve(HAND, MUG, asked)
+    assert settled(asked, solution) == asked
+    assert posture_reason(solution) is None
+    assert isinstance(solution.choice, DeferredMapping)
+    assert not solution.choice.is_made
+    assert solution.choice["criteria"]
+    assert posture_reason(solution) is None
+    free = clench.solve(HAND, MUG, command())
+    assert posture_reason(free) == said(free)
 
 
 def test_trackers_and_pose_errors_keep_the_first_choice() -> None:

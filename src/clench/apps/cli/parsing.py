@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
 import io
 import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
-from typing import Any, Final
+from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
 
 from clench.core.exceptions import CommandError
 
@@ -50,11 +51,16 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     """
     import tyro
 
-    @functools.wraps(command)
     def call(*values: object, **options: object) -> Callable[[], int]:
         # Deferred, so that the command's own errors are not taken for wrong arguments.
         return functools.partial(command, *values, **options)
 
+    call.__name__, call.__doc__ = command.__name__, command.__doc__
+    vars(call)["__signature__"] = signature = inspect.signature(command)
+    hints = get_type_hints(command, include_extras=True)
+    call.__annotations__ = {
+        name: _quickly_checked(kind, signature.parameters.get(name)) for name, kind in hints.items()
+    }
     box = io.StringIO()
     try:
         with contextlib.redirect_stderr(box):
@@ -64,6 +70,22 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
         if code:
             raise CommandError(f"{program}: {_sentence(box.getvalue())} Options: {program} --help.") from None
         return lambda: code
+
+
+def _quickly_checked(kind: Any, parameter: inspect.Parameter | None) -> Any:
+    """Return a type for the same values, whose default the parser checks by itself.
+
+    The parser compares a default with a type such as `int | None` or `tuple[str, ...]` by a package that checks types.
+    Loading this package takes longer than everything else that the parser does.
+    """
+    from tyro.constructors import ConstructorRegistry, PrimitiveTypeInfo
+
+    if parameter is not None and parameter.default is None:
+        # None goes first: the parser stops at the first type that fits.
+        return Union[(None, *get_args(kind))]
+    if get_origin(kind) is tuple:
+        return Annotated[tuple, ConstructorRegistry.get_primitive_spec(PrimitiveTypeInfo.make(kind, set()))]
+    return kind
 
 
 def print_completion(program: str, commands: Mapping[str, Callable[..., int]], arguments: Sequence[str]) -> int:

@@ -18,8 +18,7 @@ from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.scoring.criterion_registry import find_criterion
-from clench.solver.analysis.examples import solve_scores
-from clench.solver.solution import GraspSolution
+from clench.solver.solution import GraspSolution, solve_scores
 
 from .drawing import style
 from .drawing.camera import Image, fitted_camera

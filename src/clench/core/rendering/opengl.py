@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 import sys
 from typing import Any, Final
@@ -27,7 +27,11 @@ class OpenGLError(ClenchError):
 
 
 def import_mujoco() -> Any:
-    """Return MuJoCo, imported without OpenGL if the library that MUJOCO_GL names cannot be loaded."""
+    """Return MuJoCo, imported without OpenGL if the library that MUJOCO_GL names cannot be loaded.
+
+    GLFW, which only draws on a screen, loads when something uses it. It starts a second Python to look for its library.
+    """
+    load_late("glfw")
     try:
         import mujoco
     except Exception as error:  # whatever the graphics library raises
@@ -41,6 +45,28 @@ def import_mujoco() -> Any:
             os.environ[_VARIABLE] = asked
         _failed.append(f"MUJOCO_GL={asked} cannot be used: {' '.join(str(error).split())}")
     return mujoco
+
+
+def load_late(name: str) -> None:
+    """Let a module load when one of its names is first used; do nothing if it is loaded, or not installed."""
+    spec = None if name in sys.modules else importlib.util.find_spec(name)
+    if spec is None or spec.loader is None:
+        return
+    module, loader = importlib.util.module_from_spec(spec), spec.loader
+
+    def load(attribute: str) -> Any:
+        if attribute.startswith("__"):
+            raise AttributeError(f"module '{name}' has no attribute '{attribute}'")
+        late = vars(module).pop("__getattr__")
+        try:
+            loader.exec_module(module)
+        except BaseException:
+            vars(module)["__getattr__"] = late
+            raise
+        return getattr(module, attribute)
+
+    vars(module)["__getattr__"] = load
+    sys.modules[name] = module
 
 
 def open_context(width: int, height: int) -> Any:

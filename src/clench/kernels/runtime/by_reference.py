@@ -34,6 +34,8 @@ from numba.extending import (
 Content = TypeVar("Content")
 #: Size and alignment of numbers and addresses [bytes].
 _WORD: Final = 8
+#: Types by what `_key` returns.
+_TYPES: Final[dict[Any, Any]] = {}
 
 
 class ByReference(types.Type):
@@ -141,9 +143,41 @@ class Kept:
 
     def __init__(self, content: Any) -> None:
         self.content = content
-        self.kind = ByReference(numba.typeof(content))
+        self.kind = ByReference(type_of(content))
         self._room = np.frombuffer(laid_out(content)[0], dtype=np.uint8)
         self.address = self._room.__array_interface__["data"][0]
+
+
+def type_of(value: Any) -> Any:
+    """Return what `numba.typeof` returns; the types of arrays and tuples are made once.
+
+    For the first array, Numba loads NumPy's masked arrays. For every tuple, it asks each array in it for its type.
+    """
+    key = _key(value)
+    if key not in _TYPES:
+        _TYPES[key] = _new_type(value)
+    return _TYPES[key]
+
+
+def _new_type(value: Any) -> Any:
+    if _is_array(value):
+        layout: Any = "C" if value.flags.c_contiguous else "F" if value.flags.f_contiguous else "A"
+        return types.Array(numba.from_dtype(value.dtype), value.ndim, layout, readonly=not value.flags.writeable)
+    if isinstance(value, tuple):
+        return types.BaseTuple.from_types([type_of(part) for part in value], type(value))
+    return numba.typeof(value)
+
+
+def _key(value: Any) -> Any:
+    """Return what tells the type of a value."""
+    if _is_array(value):
+        flags = value.flags
+        return value.dtype.str, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable
+    return (type(value), *map(_key, value)) if isinstance(value, tuple) else numba.typeof(value)
+
+
+def _is_array(value: Any) -> bool:
+    return type(value) is np.ndarray and value.dtype.kind in "biuf"
 
 
 def kept(content: Content) -> Content:

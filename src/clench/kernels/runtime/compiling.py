@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final, TypeVar, overload
 
+import numpy as np
 from numba import njit
 from numba.core.registry import CPUDispatcher
 
 from clench.core import tolerances
 
-from .by_reference import by_reference
+from .by_reference import by_reference, type_of
 from .kernel_cache import index_of, keep_on_disk
 from .symbols import named
 
@@ -22,6 +24,8 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 #: How modules import kernels: beside them, from a folder above, or from this package. A test allows no other way.
 _IMPORTED: Final = re.compile(r"^\s*from (\.+|clench\.kernels\.)(\w[\w.]*) import ", re.MULTILINE)
+#: The folder of all kernels.
+_KERNELS: Final = os.path.dirname(os.path.dirname(__file__))
 
 
 @overload
@@ -74,7 +78,7 @@ def source_stamp(module: Path) -> bytes:
     Args:
         module: file of the module, in any folder.
     """
-    found, waiting = set[Path](), [module, Path(__file__), Path(tolerances.__file__)]
+    found, waiting = set[str](), [str(module), __file__, tolerances.__file__]
     while waiting:
         path = waiting.pop()
         if path not in found:
@@ -84,17 +88,22 @@ def source_stamp(module: Path) -> bytes:
 
 
 @cache
-def _read(path: Path) -> tuple[bytes, tuple[Path, ...]]:
+def _read(path: str) -> tuple[bytes, tuple[str, ...]]:
     """Return the digest of a file, and the files with kernels that it imports."""
-    content = path.read_bytes()
+    with open(path, "rb") as file:
+        content = file.read()
     files = (_file(path, start, name) for start, name in _IMPORTED.findall(content.decode()))
     return hashlib.sha256(content).digest(), tuple(files)
 
 
-def _file(path: Path, start: str, name: str) -> Path:
+def _file(path: str, start: str, name: str) -> str:
     """Return the file of a module that a file imports by `from <start><name> import`."""
-    folder = path.parents[len(start) - 1] if start.startswith(".") else Path(__file__).parents[1]
-    return folder.joinpath(*name.split(".")).with_suffix(".py")
+    folder = _KERNELS
+    if start.startswith("."):
+        folder = path
+        for _ in start:
+            folder = os.path.dirname(folder)
+    return os.path.join(folder, *name.split(".")) + ".py"
 
 
 def is_kept(function: Any) -> bool:
@@ -104,6 +113,10 @@ def is_kept(function: Any) -> bool:
 
 class CachedKernel(CPUDispatcher):
     """A kernel that other kernels hand tuples by pointer; Python calls it with values."""
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Return the type of an argument from Python."""
+        return type_of(val) if isinstance(val, np.ndarray | tuple) else super().typeof_pyval(val)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return how another kernel calls this one: once for all values of a number.

@@ -4,24 +4,86 @@ Numba prepares its compiler before it loads a function: it imports a hundred mod
 function's intermediate code. A loaded kernel only runs machine code. `KernelCache` loads that alone, and leaves the
 rest until another kernel is compiled that calls this one. Nothing here is a public interface of Numba; the version
 range of the dependency is bounded for it.
+
+A kernel that stays apart (`symbols.py`) has its machine code in a file of its own. Where only other kernels call it,
+this file is all that is read of it: neither the types of its arguments nor what describes it to a compiler.
 """
 
 from __future__ import annotations
 
+import itertools
+import os
 import pickle
+import sys
 from functools import cached_property
-from typing import Any
+from typing import Any, Final, NamedTuple
 
+import numba
 from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import compile_result
-from numba.core.runtime.nrt import rtsys
+from numba.core.environment import Environment, lookup_environment
+from numba.core.registry import cpu_target
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 
 from .symbols import LARGE, Needed, bring, has_a_fixed_symbol, keep_apart, needed_by
 
 #: Errors of reading a damaged file, or one that names modules or classes which this version does not have.
 _UNREADABLE = (ImportError, AttributeError, pickle.UnpicklingError, EOFError, TypeError, ValueError, IndexError)
+#: The cache's folder of each folder with sources.
+_FOLDERS: Final[dict[str, str]] = {}
+#: What running machine code points to.
+_POINTED_TO: Final[list[Any]] = []
+
+
+class MachineCode(NamedTuple):
+    """Machine code, and what it needs to run.
+
+    Args:
+        content: an object file. needed: kernels that it calls by their symbols.
+        environments: name, module and constants of each function in it. initializers: functions to call before.
+    """
+
+    content: bytes
+    needed: tuple[Needed, ...]
+    environments: tuple[tuple[str, str, list[Any]], ...]
+    initializers: tuple[Any, ...]
+
+    def run(self, context: Any) -> bool:
+        """Put it into the engine that holds all machine code; return whether the kernels that it calls are there."""
+        if not bring(self.needed):
+            return False
+        if not _POINTED_TO:
+            _name_memory_functions()
+        for initialize in self.initializers:
+            initialize()
+        codegen = context.codegen()
+        engine = codegen._engine
+        engine._ee.add_object_file(binding.ObjectFileRef.from_data(self.content))
+        engine.finalize_object()
+        for name, module, constants in self.environments:
+            environment = _environment(name, module, constants)
+            _POINTED_TO.append(environment)
+            codegen.set_env(name, environment)
+        return True
+
+
+def _name_memory_functions() -> None:
+    """Tell the engine where the functions for memory are that kernels call; Numba's own way compiles some of them."""
+    for name, address in _nrt_python.c_helpers.items():
+        binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
+def _environment(name: str, module: str, constants: list[Any]) -> Any:
+    """Return what a compiled function has of its module; the module itself stays unloaded, for only objects need it."""
+    found: Any = lookup_environment(name)
+    if found is None:
+        loaded = sys.modules.get(module)
+        found = Environment({"__name__": module} if loaded is None else vars(loaded))
+        found.env_name, found.consts[:] = name, constants
+        Environment._memo[name] = found
+    return found
 
 
 def keep_on_disk(dispatcher: Any, stamp: bytes) -> None:
@@ -57,10 +119,13 @@ class KernelCache(FunctionCache):
 
     @property
     def _cache_path(self) -> str:
-        return str(self._impl.locator.get_cache_path())
+        sources = os.path.dirname(self._py_func.__code__.co_filename)
+        if sources not in _FOLDERS:
+            _FOLDERS[sources] = str(self._impl.locator.get_cache_path())
+        return _FOLDERS[sources]
 
     @cached_property
-    def _cache_file(self) -> IndexDataCacheFile:
+    def _cache_file(self) -> _KernelIndex:
         return _KernelIndex(self._cache_path, self._impl.filename_base, self._stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -75,33 +140,58 @@ class KernelCache(FunctionCache):
             content = self._cache_file.load(self._index_key(sig, target_context.codegen()))
             if content is None:
                 return None
-            apart, needed, parts = content
+            code, described = content
         except _UNREADABLE:
             return None
-        if not bring(needed):
-            return None
-        result = _rebuilt(target_context, *parts)
-        if apart is not None:
-            keep_apart(apart)
-        return result
+        there = bring((code,)) if isinstance(code, Needed) else code.run(target_context)
+        return _rebuilt(target_context, *described) if there else None
+
+    def load_apart(self, needed: Needed) -> bool:
+        """Load the machine code of this kernel that other kernels call by a symbol; return whether it is there."""
+        context = cpu_target.target_context
+        try:
+            with open(os.path.join(self._cache_path, needed.file), "rb") as file:
+                known, code = pickle.load(file)
+            return known == _known_by(needed.symbol, context.codegen()) and bool(code.run(context))
+        except (OSError, *_UNREADABLE):
+            return False
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled kernel on disk; from here on its callers refer to it if it is large."""
-        library, apart = data.library, None
-        if len(library._get_compiled_object()) >= LARGE and has_a_fixed_symbol(self._py_func):
-            apart = Needed(data.fndesc.llvm_func_name, self._py_func.__module__, self._py_func.__name__, sig)
+        library = data.library
+        apart = len(library._get_compiled_object()) >= LARGE and has_a_fixed_symbol(self._py_func)
+        if apart:
             # What is linked into callers is empty: they only declare the function.
             library._shared_module = binding.parse_assembly(str(data.codegen._create_empty_module(library.name)))
-            keep_apart(apart)
         with self._guard_against_spurious_io_errors():
             self._save_parts(sig, data, apart)
 
-    def _save_parts(self, sig: Any, data: Any, apart: Needed | None) -> None:
+    def _save_parts(self, sig: Any, data: Any, apart: bool) -> None:
         if not self._impl.check_cachable(data):
             return
         self._impl.locator.ensure_cache_path()
-        parts = self._impl.reduce(data)
-        self._cache_file.save(self._index_key(sig, data.codegen), (apart, needed_by(data.library), parts))
+        library, described, environment, *more, initializers, referenced = self._impl.reduce(data)
+        name, _, (content, bitcode) = library
+        pointed_to = {
+            e.env_name: (e.env_name, e.globals.get("__name__", ""), list(e.consts)) for e in (environment, *referenced)
+        }
+        environments = tuple(pointed_to.values())
+        code = MachineCode(content, needed_by(data.library), environments, tuple(initializers or ()))
+        parts = (name, bitcode, described, pointed_to[environment.env_name], *more)
+        key = self._index_key(sig, data.codegen)
+        if not apart:
+            self._cache_file.save(key, (code, parts))
+            return
+        symbol, function = described.llvm_func_name, self._py_func
+        needed = Needed(symbol, function.__module__, function.__name__, self._cache_file.name_of_code(key))
+        self._cache_file._save_data(needed.file, (_known_by(symbol, data.codegen), code))
+        self._cache_file.save(key, (needed, parts))
+        keep_apart(needed)
+
+
+def _known_by(symbol: str, codegen: Any) -> tuple[Any, ...]:
+    """Return what tells machine code from that of other sources, versions and processors."""
+    return symbol, numba.__version__, codegen.magic_tuple()
 
 
 class _KernelIndex(IndexDataCacheFile):
@@ -113,20 +203,24 @@ class _KernelIndex(IndexDataCacheFile):
         except _UNREADABLE:
             return {}
 
+    def name_of_code(self, key: Any) -> str:
+        """Return the name of the file for the machine code of a kernel that stays apart."""
+        files = self._load_index()
+        free = (name for name in map(self._data_name, itertools.count(1)) if name not in files.values())
+        return f"{files.get(key) or next(free)}.code"
+
 
 class LoadedLibrary(JITCodeLibrary):
-    """Machine code from disk. The intermediate code that comes with it is parsed when a compiled kernel needs it.
+    """What runs as machine code from disk. Its intermediate code is parsed when a compiled kernel needs it.
 
     Args:
-        codegen: of Numba. name: of the library. machine_code, bitcode: what `serialize_using_object_code` returned.
+        codegen: of Numba. name: of the library. bitcode: the intermediate code.
     """
 
-    def __init__(self, codegen: Any, name: str, machine_code: bytes, bitcode: bytes) -> None:
+    def __init__(self, codegen: Any, name: str, bitcode: bytes) -> None:
         super().__init__(codegen, name)
         self._bitcode = bitcode
-        self.enable_object_caching()
-        self._set_compiled_object(machine_code)
-        self._finalize_final_module()
+        self._finalized = self._disable_inspection = True
 
     def get_pointer_to_function(self, name: str) -> int:
         """Return the address of a function, 0 if this library has none of the name."""
@@ -142,28 +236,19 @@ class LoadedLibrary(JITCodeLibrary):
 
 def _rebuilt(
     context: Any,
-    library_data: Any,
+    name: str,
+    bitcode: bytes,
     described: Any,
-    environment: Any,
+    pointed_to: tuple[str, str, list[Any]],
     signature: Any,
     objectmode: bool,
     lifted: Any,
     annotation: Any,
-    initializers: Any,
-    referenced: Any,
 ) -> Any:
-    """Return a compile result from what Numba's `CompileResult._reduce` wrote."""
-    for initialize in initializers or ():
-        initialize()
-    # Kernels that make arrays call the functions for memory.
-    rtsys.initialize(context)
-    name, kind, data = library_data
-    codegen = context.codegen()
-    if kind == "object":
-        library: Any = LoadedLibrary(codegen, name, *data)
-    else:
-        library = codegen.unserialize_library(library_data)
-    result = compile_result(
+    """Return a compile result, whose machine code runs, from what `KernelCache` wrote."""
+    library: Any = LoadedLibrary(context.codegen(), name, bitcode)
+    environment = _environment(*pointed_to)
+    return compile_result(
         target_context=context,
         typing_context=context.typing_context,
         library=library,
@@ -174,9 +259,4 @@ def _rebuilt(
         signature=signature,
         objectmode=objectmode,
         lifted=lifted,
-        reload_init=initializers,
-        referenced_envs=referenced,
     )
-    for referred in referenced:
-        codegen.set_env(referred.env_name, referred)
-    return result

@@ -29,8 +29,8 @@ class Needed(NamedTuple):
     symbol: str
     module: str
     name: str
-    #: Types of its arguments.
-    arguments: Any
+    #: Name of the file with its machine code, in the cache's folder of the module.
+    file: str
 
 
 #: The kernels of this process that stay apart, by symbol.
@@ -90,13 +90,14 @@ def keep_apart(needed: Needed) -> None:
 
 
 def bring(kernels: Iterable[Needed]) -> bool:
-    """Load or compile kernels that machine code refers to; return whether all their symbols are there now."""
+    """Load kernels that machine code refers to; return whether all their symbols are there now."""
     for needed in kernels:
         if needed.symbol not in _APART:
             try:
-                getattr(import_module(needed.module), needed.name).compile(needed.arguments)
+                load = getattr(import_module(needed.module), needed.name)._cache.load_apart
             except (ImportError, AttributeError):
                 return False
-        if needed.symbol not in _APART:
-            return False
+            if not load(needed):
+                return False
+            _APART[needed.symbol] = needed
     return True

@@ -23,7 +23,7 @@ from clench.core.pose import FloatArray
 from clench.scoring.calibration import Calibration
 from clench.scoring.criterion_registry import check_numbers, find_criterion
 from clench.scoring.fitting import Examples
-from clench.solver.solution import GraspSolution
+from clench.solver.solution import GraspSolution, solve_scores
 
 from .record import Record
 
@@ -131,14 +131,6 @@ def recorded_outcomes(path: str | Path) -> ScoredExamples:
     """
     with _existing(Path(path)) as record:
         return ScoredExamples([], [(solve_scores(record.read(n)), held) for n, held in record.outcomes()])
-
-
-def solve_scores(solution: GraspSolution) -> dict[str, float]:
-    """Return the scores of a whole solution: sums over the fingers' chosen sets, and the scores of the whole hand."""
-    chosen = [f.best.scores for f in solution.fingers.values() if f.best is not None]
-    names = dict.fromkeys(name for scores in chosen for name in scores)
-    sums = {n: float(sum(s[n] for s in chosen)) for n in names if all(n in s for s in chosen)}
-    return {**sums, **(solution.choice or {}).get("final_hand_scores", {})}
 
 
 def _existing(path: Path) -> Record:

@@ -15,9 +15,8 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.scoring.calibration import Calibration
 from clench.scoring.criterion_registry import ALWAYS, find_criterion, is_of_hand
-from clench.solver.analysis.examples import solve_scores
 from clench.solver.batch.grasp_batch import STATUSES, GraspBatch
-from clench.solver.solution import GraspSolution, SolutionStatus
+from clench.solver.solution import GraspSolution, SolutionStatus, solve_scores
 
 #: Statuses, best first.
 BEST_FIRST: Final = (

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from clench.solver.solution import posture_reason
+
 from .tables import console_out, plain, table_with
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ def print_preshapes(preshapes: Sequence[Preshape]) -> None:
 
 def print_posture_choice(solution: GraspSolution) -> None:
     """Print the preshape that clench chose, and the comparison; print nothing if the command left no choice."""
-    said = (solution.choice or {}).get("preshapes")
+    said = posture_reason(solution)
     if said is None:
         return
     console, compared = console_out(), said["compared"]

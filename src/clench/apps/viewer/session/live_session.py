@@ -14,6 +14,7 @@ from clench.core.exceptions import ClenchError
 from clench.models.command import GraspCommand
 from clench.solver.orders import settled
 from clench.solver.solution import SolutionStatus as Status
+from clench.solver.solution import posture_reason
 
 from .newest_wins import NewestWins
 from .quick_answer import QuickAnswer, QuickSolver
@@ -190,7 +191,7 @@ class LiveSession:
         hand, obj = self.shelf.hand(state.hand), self.shelf.object(state.object)
         free = replace(state.command, preshape={})
         solution = clench.solve(hand, obj, free)
-        self.compared = (solution.choice or {}).get("preshapes")
+        self.compared = posture_reason(solution)
         found = in_palm_frame(settled(free, solution), solution)
         if state.command.preshape and self.compared is not None:
             now = self._quick.answer(state)
