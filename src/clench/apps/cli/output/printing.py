@@ -170,7 +170,7 @@ def _print_hold(console: Console, hold: HoldReport) -> None:
     load = f"lifted {asked.height:g} m" if lifted else f"{asked.pull * asked.mass:g} N for {asked.duration:g} s"
     console.print(
         f"hold: {asked.mass:g} kg, friction {asked.friction:g}, torsion {asked.torsion:g} m, {load}; "
-        f"dropped from {_millimetres(asked.max_distance)} mm or {np.rad2deg(asked.max_angle):.3g}° on"
+        f"it counts as dropped from {asked.max_distance * 1e3:g} mm or {np.rad2deg(asked.max_angle):.3g}° on"
     )
     console.print(f"plan: {plain(hold.plan)}")
     if hold.closed is None or hold.squeezed is None:
