@@ -50,7 +50,9 @@ def test_a_value_that_is_missing_wrong_or_given_twice_names_its_option(command: 
     wrong = ["wrong"] * (option.count or 1)
     if option.kind in (int, float) or choices:
         said = refusal(command, name, *wrong)
-        expected = f"one of {', '.join(choices)}" if choices else {int: "a whole number", float: "a number"}[option.kind]
+        expected = (
+            f"one of {', '.join(choices)}" if choices else {int: "a whole number", float: "a number"}[option.kind]
+        )
         assert said.startswith(f"{name}: expected {expected}, got 'wrong'.")
     right = [choices[0] if choices else "1"] * (option.count or 1)
     assert refusal(command, name, *right, name, *right).startswith(f"{name} is given more than once; give it once")

@@ -84,7 +84,9 @@ def check_arguments(program: str, command: Callable[..., int], arguments: Sequen
         given = _walk(deque(arguments), options)
         missing = [option.name for option in options if option.required and option.name not in given]
         if missing:
-            raise CommandError(f"expected {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} missing.")
+            raise CommandError(
+                f"expected {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} missing."
+            )
     except CommandError as error:
         raise CommandError(f"{program}: {error} See {program} --help.") from None
 

@@ -85,6 +85,7 @@ def generate(
         merge: merge the parts in this folder, and do nothing else.
         json: print one JSON document on standard output.
     """
+    from clench.apps.cli.parsing import as_angle
     from clench.dataset.storage.columns import need_pyarrow
 
     need_pyarrow()
@@ -121,7 +122,7 @@ def _job(file: Path | None, given: dict[str, Any]) -> DatasetJob:
 
 
 def _range(values: tuple[float, ...], key: str) -> Any:
-    from clench.apps.cli.parsing import as_angle, as_range
+    from clench.apps.cli.parsing import as_range
 
     return as_range(values, f"--{key.replace('_', '-')}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .tables import console_out, plain, table_with
+from .tables import console_out, plain, print_table, table_with
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,21 +32,21 @@ def print_choice(solution: GraspSolution) -> None:
     if choice is None:
         out.print("The solution does not say how its sets were chosen.")
         return
-    out.print(_criteria_table(choice))
+    print_table(out, _criteria_table(choice))
     if choice["unused"]:
         out.print(f"said nothing about any set: {plain(', '.join(choice['unused']))}")
     for name, finger in solution.fingers.items():
         if name in choice["fingers"]:
-            out.print(_finger_table(finger, choice))
+            print_table(out, _finger_table(finger, choice))
             out.print(plain(f"{name}: {choice['fingers'][name]['text']}"))
             if choice["fingers"][name]["closed_again"]:
                 out.print(plain(f"{name} met another finger and was closed again; its sum is that of before."))
     if "orders" in choice:
-        out.print(_orders_table(choice["orders"]))
+        print_table(out, _orders_table(choice["orders"]))
         out.print(plain(choice["orders"]["text"]))
     front = hand_front(solution)
     if len(front) > 1:
-        out.print(_front_table(front, choice))
+        print_table(out, _front_table(front, choice))
     for name, value in choice["final_hand_scores"].items():
         out.print(plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
     out.print(f"[bold]{plain(choice['text'])}[/bold]")
