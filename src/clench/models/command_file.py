@@ -124,7 +124,7 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     grids = ("yaw_grid", "open_variants", "opposition_grid")
     sets = math.prod(len(_numbers(getattr(command, key), key, "offsets in rad")) for key in grids)
     if sets > COMMAND_SETS:
-        raise CommandError(f"{', '.join(grids)}: they make {sets} sets together; expected up to {COMMAND_SETS}.")
+        raise CommandError(f"{', '.join(grids)}: they make {sets} candidates together; expected up to {COMMAND_SETS}.")
     if command.next_steps != ():
         check_steps(hand, command.next_steps)
     if command.task_wrenches:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 APPS = Path(clench.__file__).parent / "apps"
 #: Heads of columns whose numbers count or name something.
 COUNTS = {
-    *("", "id", "seed", "touching", "posture", "step", "poses", "share", "set"),
+    *("", "id", "seed", "touching", "finger posture", "step", "poses", "share"),
     *("thumb", "index", "middle", "ring", "little"),
 }
 NUMBER = re.compile(r"[±+-]?\d[\d.e+-]*")
