@@ -160,7 +160,8 @@ def _options(command: Callable[..., int]) -> Iterator[Option]:
 def _option(name: str, hint: Any, default: Any, required: bool, placed: bool = False) -> Option:
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         hint = next(part for part in typing.get_args(hint) if part is not type(None))
-    kind, count = hint, 1
+    kind: Any = hint
+    count: int | None = 1
     if typing.get_origin(hint) is tuple:
         kind, *more = typing.get_args(hint)
         count = None if Ellipsis in more else 1 + len(more)

@@ -44,12 +44,13 @@ def print_table(console: Console, table: Table) -> None:
 
 def _fit(table: Table, width: int) -> bool:
     """Set the widths of columns if their longest words fit into a width [characters]; return whether they do."""
-    widths, cells, whole = zip(*map(_sizes, table.columns), strict=True)
-    widths, left = list(widths), width - sum(widths)
+    sizes = [_sizes(column) for column in table.columns]
+    widths = [word for word, _, _ in sizes]
+    left = width - sum(widths)
     if left < 0:
         return False
     # Short cells are whole before long ones, and cells before heads.
-    for most in (cells, whole):
+    for most in ([cells for _, cells, _ in sizes], [whole for _, _, whole in sizes]):
         for i in sorted(range(len(widths)), key=lambda i: most[i] - widths[i]):
             more = min(max(most[i] - widths[i], 0), left)
             widths[i] += more
