@@ -18,7 +18,7 @@ def form_sentence(error: msgspec.ValidationError, form: type[msgspec.Struct]) ->
         error: of `msgspec.convert`. form: of the whole document; its keys are listed after an unknown one.
     """
     text, _, place = str(error).replace("`", "'").partition(" - at '$")
-    place = place.rstrip("'").lstrip(".").replace("[...]", "[i]")
+    place = place.rstrip("'").lstrip(".")
     start = f"{place}." if place else ""
     unknown, missing = _UNKNOWN.match(text), _MISSING.match(text)
     if unknown:
