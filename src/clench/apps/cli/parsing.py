@@ -39,10 +39,10 @@ def as_angle(degrees: float, option: str) -> float:
     """Return the value of an option in degrees as an angle [rad].
 
     Raises:
-        CommandError: the angle is not above 0.
+        CommandError: the angle is not above 0 and up to 180.
     """
-    if not 0.0 < degrees < math.inf:
-        raise CommandError(f"{option}: expected a number of degrees above 0, got {degrees:g}.")
+    if not 0.0 < degrees <= 180.0:
+        raise CommandError(f"{option}: expected degrees above 0 and up to 180, got {degrees:g}.")
     return math.radians(degrees)
 
 

@@ -94,6 +94,7 @@ def view(
     from clench.kernels.runtime.warming import announce, warm_up
     from clench.mechanics.grasp.contacts import friction_range
     from clench.mechanics.grasp.loads import mass_range
+    from clench.planner.options import PlanOptions
 
     check_viewer()
     carried, gripped = as_range(mass, "--mass"), as_range(friction, "--friction")
@@ -110,6 +111,8 @@ def view(
             "seed": seed,
         },
     }
+    # The page plans when it is asked to: wrong options are told before it opens.
+    PlanOptions(**{name: value for name, value in forces["planning"].items() if value is not None})
     loaded = {"hand_file": hand_file, "palm": palm, "collision_source": collision_source}
     if files:
         if command is not None or table is not None or obstacle:
