@@ -1,4 +1,4 @@
-"""Draw a finger's alternative sets side by side: the result of every curl plane alone, and the chosen set."""
+"""Draw a finger's candidates side by side: the result of every curl plane alone, and the chosen one."""
 
 from __future__ import annotations
 
