@@ -20,7 +20,7 @@ command = clench.GraspCommand(
 )
 solution = clench.solve(hand, mug, command)
 for name, finger in solution.fingers.items():
-    print(f"{name}: {finger.status.value}, {len(finger.candidates)} alternative sets, number {finger.chosen} chosen")
+    print(f"{name}: {finger.status.value}, {len(finger.candidates)} candidates, number {finger.chosen} chosen")
 assert solution.joint_angles["thumb_roll"] == -0.2
 
 file = folder / "command.json"

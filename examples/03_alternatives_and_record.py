@@ -1,4 +1,4 @@
-"""Look at every alternative set and its scores, save a solution, and keep all of them in a record."""
+"""Look at every candidate and its scores, save a solution, and keep all of them in a record."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ hand, bottle = clench.Hand.load("robonaut2"), clench.GraspObject.load("bottle")
 
 with clench.Record(folder / "record.sqlite") as record:
     for pose in clench.approach_poses(hand, bottle, count=5, seed=7):
-        # Measure every set's penetration; without a preshape, the sets of all preshapes would be measured.
+        # Measure the penetration of every candidate. Without a preshape, this would be for all preshapes.
         command = clench.GraspCommand(hand_pose=pose, preshape="open", seed=7, check_sets=True)
         solution = clench.solve(hand, bottle, command, record=record)
     print(f"{len(record)} solves recorded")

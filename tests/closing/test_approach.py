@@ -139,7 +139,7 @@ def test_bad_input_is_named():
         approach_poses(hand, BALL, 1, 0, preshape={"bend": 10**400})
     with pytest.raises(CommandError, match=r"count of 0 or more, got -1\."):
         approach_poses(hand, BALL, -1, 0)
-    with pytest.raises(CommandError, match=r"seed of 0 or more, got -1\."):
+    with pytest.raises(CommandError, match=r"seed: expected a whole number of at least 0, got -1\."):
         approach_poses(hand, BALL, 0, -1)
     needle = Shape(ShapeKind.MESH, mesh=TriangleMesh([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]], [[0, 1, 2]]))
     with pytest.raises(ObjectError, match="object 'needle': expected a graspable body with a surface"):

@@ -61,13 +61,27 @@ TEXT_STL = (
     b"solid part\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
     b"endsolid part\n"
 )
+UNENDED_STL = TEXT_STL.removesuffix(b"endsolid part\n")
+TEXT_PLY = (
+    b"ply\nformat ascii 1.0\ncomment Ma\xdfe\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
+BINARY_PLY = (
+    TEXT_PLY[: TEXT_PLY.index(b"0 0 0")].replace(b"ascii", b"binary_little_endian")
+    + struct.pack("<9f", *[0, 0, 0, 1, 0, 0, 0, 1, 0])
+    + struct.pack("<B3i", 3, 0, 1, 2)
+)
 BINARY_STL = bytes(80) + struct.pack("<I", 1) + struct.pack("<12fH", *[0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], 0)
 
 
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (TEXT_STL[:60], "the text ends before 'endsolid'"),
+        (TEXT_STL[:60], "the text ends before 'endsolid', in the middle of a triangle"),
+        (UNENDED_STL.replace(b"endfacet", b""), "in the middle of a triangle"),
+        (UNENDED_STL.replace(b"vertex 0 1 0\n", b""), "in the middle of a triangle"),
+        (UNENDED_STL + b"facet normal 0 0 1\nendfacet", "in the middle of a triangle"),
+        (UNENDED_STL + UNENDED_STL[:30], "in the middle of a triangle"),
         (BINARY_STL[:100], "its header counts 1 triangles, which take 134 bytes, but the file has 100"),
         (b"solid" + BINARY_STL[5:100], "its header counts 1 triangles, which take 134 bytes, but the file has 100"),
         (BINARY_STL[:40], "neither text with 'solid' nor a binary header of 84 bytes, it has 40 bytes"),
@@ -84,6 +98,10 @@ def test_what_is_wrong_with_a_damaged_stl_file(data, words, monkeypatch):
     ("data", "suffix"),
     [
         (TEXT_STL, ".stl"),
+        (UNENDED_STL, ".stl"),
+        (UNENDED_STL.replace(b"part", b"facet St\xfcck").rstrip(), ".stl"),
+        (TEXT_PLY, ".ply"),
+        (BINARY_PLY, ".ply"),
         (TEXT_STL.replace(b"part", b"St\xfcck"), ".stl"),
         (BINARY_STL, ".stl"),
         (b"\xfc" * 80 + BINARY_STL[80:], ".stl"),
@@ -95,6 +113,20 @@ def test_text_in_another_encoding_is_read_without_a_library_that_guesses(data, s
     monkeypatch.setitem(sys.modules, "charset_normalizer", None)
     vertices, triangles = arrays_of(parse_mesh(data, suffix))
     np.testing.assert_array_equal(vertices[triangles[0]], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (TEXT_PLY[:60], "its header does not end: 'end_header' is missing"),
+        (TEXT_PLY.replace(b"float y", b"float \xdf"), "its header has no property 'y'"),
+        (TEXT_PLY.removesuffix(b"3 0 1 2\n"), "its header counts 4 lines, but the file has 3"),
+        (BINARY_PLY[:-3], "unexpected length"),
+    ],
+)
+def test_what_is_wrong_with_a_damaged_ply_file(data: bytes, words: str) -> None:
+    with pytest.raises(MeshError, match=words):
+        parse_mesh(data, ".ply")
 
 
 def test_a_face_without_its_vertex_is_named():

@@ -42,7 +42,7 @@ def test_the_sentence_names_what_decided_and_by_how_much():
         "plane 2 leads the full width by 0.3; range_of_motion decided it: 0.3 against 0.5 rad, worth 0.2."
     )
     assert document["text"] == (
-        "The chosen sets lead the next best (the full width for index) by 0.3; "
+        "The chosen candidates lead the next best (the full width for index) by 0.3; "
         "range_of_motion decided it: 0.3 against 0.5 rad, worth 0.2."
     )
     assert document["runner_up"]["sets"] == {"index": 0}
@@ -59,14 +59,14 @@ def test_a_set_that_wins_by_what_it_fulfils_says_so():
 
 def test_one_set_and_equal_sets():
     """Two pairs of joint angles of the same length score the same."""
-    assert explained([[candidate()]])["fingers"]["index"]["text"] == "the full width is the only set."
+    assert explained([[candidate()]])["fingers"]["index"]["text"] == "the full width is the only candidate."
     assert "nothing to choose" in explained([[candidate()]])["text"]
     motion = Calibration(weights={"range_of_motion": 1.0})
     same = explained([[candidate((0.25, 0.5)), candidate((0.5, 0.25), plane=1)]], motion)
     assert "score the same" in same["fingers"]["index"]["text"]
     assert "scores the same" in same["text"]
     copies = explained([[candidate(), candidate(plane=1)]])
-    assert copies["fingers"]["index"]["text"] == "the full width is the only set, all others have its angles."
+    assert copies["fingers"]["index"]["text"] == "the full width is the only candidate, all others have its angles."
     assert copies["fingers"]["index"]["runner_up"] is None
 
 
@@ -107,5 +107,5 @@ def test_a_criterion_of_the_hand_that_overrules_a_finger_is_said(monkeypatch):
     assert document["hand_scores"] == {"far": 0.5}
     assert document["runner_up"]["hand_scores"] == {"far": 0.1}
     assert document["fingers"]["index"]["text"] == (
-        "plane 0 is 0.4 behind the full width by itself; with the sets of the other fingers it is the best."
+        "plane 0 is 0.4 behind the full width by itself; with the candidates of the other fingers it is the best."
     )

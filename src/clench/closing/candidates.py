@@ -1,4 +1,4 @@
-"""Read the alternative sets of a finger from the kernels' results (docs/method.md section 5)."""
+"""Read the candidates of a finger from the kernels' results (docs/method.md section 5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Judge which alternative sets a rigid hand could take (docs/method.md section 5)."""
+"""Judge which candidates a rigid hand could take (docs/method.md section 5)."""
 
 from __future__ import annotations
 

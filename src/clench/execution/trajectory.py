@@ -11,6 +11,7 @@ import numpy as np
 
 from clench.core.argument_types import check_type
 from clench.core.exceptions import CommandError, FileError
+from clench.core.files.form_errors import form_sentence
 from clench.core.files.json_files import non_finite_path, read_json, write_json
 from clench.core.pose import FloatArray
 from clench.core.showing.short_repr import described
@@ -151,7 +152,7 @@ class Trajectory:
         Raises:
             FileError: the file is missing, is not JSON, or is no trajectory; the message names the key.
         """
-        return _read(read_json(path), str(path))
+        return _read(read_json(path, "a trajectory, as `clench solve --out` writes it"), str(path))
 
 
 def plan_trajectory(
@@ -283,7 +284,7 @@ def _read(data: Any, source: str) -> Trajectory:
     try:
         form = msgspec.convert(data, _Form)
     except msgspec.ValidationError as error:
-        raise FileError(source, f"{str(error).replace('`', chr(39))}.") from None
+        raise FileError(source, form_sentence(error, _Form)) from None
     check_rates(source, form.speed, form.acceleration, form.velocity_limits)
     check_points(source, [(p.time, p.positions) for p in form.points])
     check_joints(source, form.joints)

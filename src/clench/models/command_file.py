@@ -17,6 +17,7 @@ from typing import Any, Final, TypeVar
 from clench.core.exceptions import CommandError, FileError
 from clench.core.files.file_bytes import expanded, read_file
 from clench.core.files.file_limits import COMMAND_ITEMS, COMMAND_SETS, JSON_BYTES
+from clench.core.files.json_files import not_json
 from clench.core.files.nesting import TOO_DEEP, is_too_deep
 from clench.core.numbers import is_finite_number
 from clench.core.pose import Pose
@@ -45,13 +46,14 @@ def load_command(path: str | Path) -> GraspCommand:
     """
     file = expanded(path)
     try:
-        data = json.loads(read_file(file, JSON_BYTES), object_pairs_hook=_without_repeats)
+        text = read_file(file, JSON_BYTES)
+        data = json.loads(text, object_pairs_hook=_without_repeats)
     except FileError:
         raise
     except CommandError as error:
         raise CommandError(f"{path}: {error}") from None
     except ValueError as error:
-        raise FileError(path, f"not JSON ({error}).") from None
+        raise FileError(path, not_json(text, "a command file", str(error))) from None
     except RecursionError:
         raise FileError(path, f"not JSON that can be read: {TOO_DEEP}.") from None
     if is_too_deep(data):
@@ -122,7 +124,7 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     grids = ("yaw_grid", "open_variants", "opposition_grid")
     sets = math.prod(len(_numbers(getattr(command, key), key, "offsets in rad")) for key in grids)
     if sets > COMMAND_SETS:
-        raise CommandError(f"{', '.join(grids)}: they make {sets} sets together; expected up to {COMMAND_SETS}.")
+        raise CommandError(f"{', '.join(grids)}: they make {sets} candidates together; expected up to {COMMAND_SETS}.")
     if command.next_steps != ():
         check_steps(hand, command.next_steps)
     if command.task_wrenches:

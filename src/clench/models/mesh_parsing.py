@@ -18,6 +18,12 @@ from .gltf_scene import bare_glb
 #: Bytes of a binary STL file before its triangles, and of each triangle.
 _STL_HEADER: Final = 84
 _STL_TRIANGLE: Final = 50
+#: Lines of a text STL file that begin a triangle, or have a corner.
+_FACET: Final = re.compile(rb"^\s*facet\b", re.MULTILINE)
+_VERTEX: Final = re.compile(rb"^\s*vertex\b", re.MULTILINE)
+#: Lines of the header of a PLY file: it is text; it has so many elements.
+_PLY_TEXT: Final = re.compile(rb"^format\s+ascii\b", re.MULTILINE)
+_PLY_COUNT: Final = re.compile(rb"^element\s+\w+\s+(\d{1,12})\s*$", re.MULTILINE)
 #: Lines that part an OBJ file; the parser's time grows with the square of their number.
 _GROUP: Final = re.compile(rb"^(?:o|g|s|usemtl|mtllib)\b.*$", re.MULTILINE)
 _GROUP_STARTS: Final = (b"\no ", b"\ng ", b"\ns ", b"\nusemtl", b"\nmtllib")
@@ -59,10 +65,6 @@ def parse_mesh(data: bytes, suffix: str) -> Any:
     return mesh
 
 
-def _as_it_is(data: bytes) -> bytes:
-    return data
-
-
 def _text(data: bytes) -> bytes:
     """Return text in UTF-8: the parser guesses other encodings with a library that need not be there."""
     try:
@@ -80,14 +82,41 @@ def _stl(data: bytes) -> bytes:
         return data
     lowered = data.lower()
     if b"solid" in lowered and b"\0" not in data:
-        if b"endsolid" not in lowered:
-            raise MeshError("the text ends before 'endsolid'")
-        return _text(data)
+        if b"endsolid" in lowered:
+            return _text(data)
+        if not _has_whole_facets(lowered):
+            raise MeshError("the text ends before 'endsolid', in the middle of a triangle")
+        return _text(data) + b"\nendsolid\n"
     if len(data) < _STL_HEADER:
         raise MeshError(
             f"neither text with 'solid' nor a binary header of {_STL_HEADER} bytes, it has {len(data)} bytes"
         )
     raise MeshError(f"its header counts {count} triangles, which take {expected} bytes, but the file has {len(data)}")
+
+
+def _has_whole_facets(text: bytes) -> bool:
+    """Tell whether text of an STL file, in lower case, consists of complete triangles up to its last word."""
+    words = text.split()
+    begun, ended = len(_FACET.findall(text)), words.count(b"endfacet")
+    return words[-1] == b"endfacet" and begun == ended and len(_VERTEX.findall(text)) == 3 * ended
+
+
+def _ply(data: bytes) -> bytes:
+    """Let only a complete header and all lines of a text pass, and return the header in ASCII.
+
+    The parser reads no other letters, and only comments have them. It leaves missing lines out without a word.
+    """
+    head, end, rest = data.partition(b"end_header")
+    if not end:
+        raise MeshError("its header does not end: 'end_header' is missing")
+    for name in (b"x", b"y", b"z"):
+        if re.search(rb"^property\s+\w+\s+" + name + rb"\s*$", head, re.MULTILINE) is None:
+            raise MeshError(f"its header has no property '{name.decode()}'")
+    if _PLY_TEXT.search(head):
+        counted, lines = sum(map(int, _PLY_COUNT.findall(head))), sum(1 for line in rest.splitlines() if line.strip())
+        if lines < counted:
+            raise MeshError(f"its header counts {counted} lines, but the file has {lines}")
+    return head.decode("latin-1").encode("ascii", "replace") + end + rest
 
 
 def _obj(data: bytes) -> bytes:
@@ -122,7 +151,7 @@ _DAE_COPIES: Final = 16
 PARSED: Final[dict[str, Callable[[bytes], bytes]]] = {
     ".obj": _obj,
     ".stl": _stl,
-    ".ply": _as_it_is,
+    ".ply": _ply,
     ".off": _text,
     ".glb": _glb,
     ".dae": _dae,

@@ -120,7 +120,7 @@ def _finger_text(finger: FingerChoice, group: Sequence[FingerCandidate], choice:
     best = group[finger.chosen]
     name = set_name(best, group)
     if second is None:
-        return f"{name} is the only set{', all others have its angles' if len(group) > 1 else ''}."
+        return f"{name} is the only candidate{', all others have its angles' if len(group) > 1 else ''}."
     other = set_name(group[second], group)
     for what, has, lacks in zip(TIERS, finger.tiers[finger.chosen], finger.tiers[second], strict=True):
         if has and not lacks:
@@ -128,16 +128,18 @@ def _finger_text(finger: FingerChoice, group: Sequence[FingerCandidate], choice:
     gains = _gains([(best.scores, group[second].scores)], choice)
     lead = finger.totals[finger.chosen] - finger.totals[second]
     if lead < 0.0:
-        return f"{name} is {-lead:.3g} behind {other} by itself; with the sets of the other fingers it is the best."
+        return (
+            f"{name} is {-lead:.3g} behind {other} by itself; with the candidates of the other fingers it is the best."
+        )
     if lead == 0.0:
-        return f"{name} and {other} score the same; the full width goes first, then the first set."
+        return f"{name} and {other} score the same; the full width goes first, then the first candidate."
     return f"{name} leads {other} by {lead:.3g}; {say_what_decided(gains, best.scores, group[second].scores)}"
 
 
 def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     second = choice.runner_up
     if second is None:
-        return "There was nothing to choose: no finger has two sets that the scores could decide between."
+        return "There was nothing to choose: no finger has two candidates that the scores could decide between."
     changed = [k for k, (i, j) in enumerate(zip(choice.chosen, second.sets, strict=True)) if i != j]
     sets = [(groups[k][choice.chosen[k]], groups[k][second.sets[k]]) for k in changed]
     swapped = ", ".join(f"{set_name(b, groups[k])} for {names[k]}" for k, (_, b) in zip(changed, sets, strict=True))
@@ -153,7 +155,9 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     gains = _gains(pairs, choice)
     ours = {n: sum(a.get(n, 0.0) for a, _ in pairs) for n in gains}
     theirs = {n: sum(b.get(n, 0.0) for _, b in pairs) for n in gains}
-    return f"The chosen sets lead the next best ({swapped}) by {lead:.3g}; {say_what_decided(gains, ours, theirs)}"
+    return (
+        f"The chosen candidates lead the next best ({swapped}) by {lead:.3g}; {say_what_decided(gains, ours, theirs)}"
+    )
 
 
 def _doubt(choice: HandChoice) -> str:

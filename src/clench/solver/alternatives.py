@@ -1,4 +1,4 @@
-"""The alternative sets of every finger: which ones are closed, who chooses among them, and the choice itself."""
+"""The candidates of every finger: which ones are closed, who chooses among them, and the choice itself."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def _judge(problem: Problem, sets: Sequence[FingerCandidate]) -> None:
 
 @dataclass(eq=False)
 class Alternatives:
-    """The alternative sets of every finger, and the choice among them. Both are computed when first read.
+    """The candidates of every finger, and the choice among them. Both are computed when first read.
 
     Args:
         problem, calibration, context: the basis of the choice. close: returns the sets.

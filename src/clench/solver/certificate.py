@@ -119,7 +119,7 @@ def certify(
             text = f"{name} overlaps the object before it moves."
             return _refused(CertificateCode.BLOCKED_AT_START, text, [link], name)
         if c.plane is not None:
-            text = f"The set of {name} was computed on one plane; between planes nothing is known."
+            text = f"The candidate of {name} was computed on one plane; between planes nothing is known."
             return _refused(CertificateCode.ONE_PLANE, text, finger=name)
         if not c.swept:
             text = f"Links of {name} overlap other links of the hand before it moves."

@@ -248,7 +248,7 @@ def load_solution(path: str | Path) -> GraspSolution:
     Raises:
         FileError: the file is missing, is not JSON, or is not a solution.
     """
-    return solution_from_dict(read_json(path), str(path))
+    return solution_from_dict(read_json(path, "a solution, as `clench solve --out` writes it"), str(path))
 
 
 def _contact_to_dict(c: Contact) -> dict[str, Any]:

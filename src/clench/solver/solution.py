@@ -135,7 +135,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class FingerResult(LateFields):
-    """A finger's answer: how it ended, its alternative sets, and the chosen one.
+    """A finger's answer: how it ended, its candidates, and the chosen one.
 
     Args:
         name: of the finger. status, reason: how it ended. chosen: index of the chosen candidate.

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
+import clench
 from clench.apps.cli.main import main
 
 SOLVE = ["solve", "--hand", "robonaut2", "--object", "ball"]
@@ -22,29 +24,25 @@ SOLVE = ["solve", "--hand", "robonaut2", "--object", "ball"]
         (["bench", "nothing"], "Benchmark 'nothing' is not in clench bench."),
         (
             [*SOLVE, "--oder", "together"],
-            "clench solve: Unrecognized options: --oder, together. Did you mean '--order'? Options: ",
+            "clench solve: '--oder' is no option of this command. Did you mean '--order'? See clench solve --help.",
         ),
-        ([*SOLVE, "--planes", "many"], "clench solve: Error parsing --planes:"),
+        ([*SOLVE, "--planes", "many"], "clench solve: --planes: expected a whole number, got 'many'."),
         (
             [*SOLVE, "--order", "sideways"],
-            "clench solve: Invalid choice 'sideways' for argument '--order'. Expected one of proximal-first, ",
+            "clench solve: --order: expected one of proximal-first, together, fingertip, got 'sideways'.",
         ),
-        (["solve"], "clench solve: Missing from clench solve: --hand STR --object STR."),
-        (["hand"], "clench hand: Missing from clench hand: STR."),
+        (["solve"], "clench solve: expected --hand and --object, which are missing."),
+        (["hand"], "clench hand: expected MODEL, which is missing."),
+        ([*SOLVE, "--seed", "1", "--seed", "2"], "clench solve: --seed is given more than once; give it once."),
     ],
 )
-@pytest.mark.parametrize("letters_alone", [False, True])
 @pytest.mark.parametrize("as_json", [False, True])
 def test_an_error_is_a_sentence_and_beside_json_a_document(
     arguments: list[str],
     sentence: str,
-    letters_alone: bool,
     as_json: bool,
     capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # Boxes are drawn with lines or with letters alone, as standard output allows.
-    monkeypatch.setattr("tyro._fmtlib._FORCE_UTF8_BOXES", not letters_alone)
     assert main([*arguments, *["--json"] * as_json]) == 2
     captured = capsys.readouterr()
     assert captured.err.startswith(f"clench: error: {sentence}")
@@ -55,6 +53,54 @@ def test_an_error_is_a_sentence_and_beside_json_a_document(
         assert captured.err == f"clench: error: {document['error']}\n"
     else:
         assert captured.out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["execute", "FILE"], "not JSON: expected a solution, as `clench solve --out` writes it, got {}."),
+        (["export", "FILE", "--out", "g.yaml"], "not JSON: expected a solution or a list of solutions, got {}."),
+        ([*SOLVE, "--command", "FILE"], "not JSON: expected a command file, got {}."),
+        (["calibrate", "FILE"], "not JSON: expected an examples file, got {}."),
+    ],
+)
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"v 0 0 0\nv 1 0 0\n", "text that begins with 'v 0 0 0'"),
+        (b"\x89PNG\r\n", "bytes that are no text"),
+        (b" \n", "an empty file"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_with_what_was_expected(
+    arguments: list[str],
+    sentence: str,
+    content: bytes,
+    kind: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("range.obj").write_bytes(content)
+    assert main([each.replace("FILE", "range.obj") for each in arguments]) == 2
+    assert capsys.readouterr().err == f"clench: error: range.obj: {sentence.format(kind)}\n"
+
+
+def test_documents_of_another_form_name_the_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "trajectory.json"
+    file.write_text('{"schema": "clench.trajectory/1", "hand": "robonaut2"}')
+    assert main(["calibrate", str(file)]) == 2
+    assert capsys.readouterr().err.endswith("hand: unknown key; expected one of schema, record, pairs, outcomes.\n")
+    assert main(["import", str(file), "--hand", "patent15", "--out", str(tmp_path / "c.json")]) == 2
+    assert capsys.readouterr().err.endswith("trajectory.json: grasp_pose: missing.\n")
+
+
+def test_a_record_lists_one_solve_at_least(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "r.sqlite"
+    clench.Record(file).close()
+    assert main(["record", str(file), "--limit", "-1"]) == 2
+    assert capsys.readouterr().err == "clench: error: --limit: expected at least 1, got -1.\n"
 
 
 @pytest.mark.parametrize(("error", "code"), [(RuntimeError("a\nb"), 70), (KeyboardInterrupt(), 130)])

@@ -353,7 +353,7 @@ CHOICE = {
         "range_of_motion": {"weight": 1.0, "scale": 2.0, "limit": 3.0, "unit": "rad", "better": "less", "source": "x"}
     },
     "unused": ["next_step_time"],
-    "text": "The chosen sets lead.",
+    "text": "The chosen candidates lead.",
     "total": -0.3,
     "hand_scores": {},
     "final_hand_scores": {},
@@ -387,14 +387,14 @@ def test_solve_explains_its_choice(
     assert "2 plane 0 0 0.3 -0.4000 limit" in lines
     assert "x plane 1 0 0.3 -0.9000 touch" in lines
     assert "index: the full width leads plane 1 by [0.1]." in lines
-    assert "said nothing about any set: next_step_time" in lines
-    assert "The chosen sets lead." in lines
+    assert "said nothing about any candidate: next_step_time" in lines
+    assert "The chosen candidates lead." in lines
     assert any("closed again" in line for line in lines)
 
 
 def test_a_solution_without_a_choice_says_so(solver: FakeSolver, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*SOLVE, "--explain"]) == 0
-    assert "does not say how its sets were chosen" in capsys.readouterr().out
+    assert "does not say how its candidates were chosen" in capsys.readouterr().out
 
 
 def test_solve_writes_files_and_record(

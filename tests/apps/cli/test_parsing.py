@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import subprocess
@@ -10,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from clench.apps.cli import parsing
 from clench.apps.cli.command_table import COMMANDS
 from clench.apps.cli.main import main
+from clench.core.exceptions import CommandError
 
 #: Completes the last word as bash does when TAB is pressed.
 PRESS_TAB = """
@@ -46,6 +49,23 @@ def test_bash_completes_commands_options_and_choices(tmp_path: Path, capsys: pyt
 def test_zsh_gets_a_script(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--tyro-print-completion", "zsh"]) == 0
     assert capsys.readouterr().out.startswith("#compdef clench\n")
+
+
+def test_what_only_the_parser_refuses_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parsing, "check_arguments", lambda *_: None)
+    with pytest.raises(CommandError, match=r"^clench record: .*--limit.*many.* See clench record --help\.$"):
+        parsing.parse_call("clench record", COMMANDS["record"], ["a", "--limit", "many"])
+
+
+@pytest.mark.parametrize(("degrees", "angle"), [(45.0, math.pi / 4), (180.0, math.pi)])
+def test_an_angle_of_an_option_is_in_degrees(degrees: float, angle: float) -> None:
+    assert parsing.as_angle(degrees, "--a") == pytest.approx(angle)
+
+
+@pytest.mark.parametrize("degrees", [0.0, -3.0, math.nan, 181.0])
+def test_an_angle_that_is_refused_is_told_in_degrees(degrees: float) -> None:
+    with pytest.raises(CommandError, match=f"^--a: expected degrees above 0 and up to 180, got {degrees:g}"):
+        parsing.as_angle(degrees, "--a")
 
 
 @pytest.mark.parametrize(("shells", "given"), [([], "nothing"), (["fish"], "fish"), (["bash", "zsh"], "bash zsh")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import clench
-from clench.apps.cli.output import choice_tables, printing
+from clench.apps.cli.output import choice_tables, printing, tables
 from clench.apps.cli.output.plan_table import print_plan
 from clench.models.hand.hand_report import describe_hand
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 APPS = Path(clench.__file__).parent / "apps"
 #: Heads of columns whose numbers count or name something.
 COUNTS = {
-    *("", "id", "seed", "touching", "posture", "step", "poses", "share", "set"),
+    *("", "id", "seed", "touching", "finger posture", "step", "poses", "share"),
     *("thumb", "index", "middle", "ring", "little"),
 }
 NUMBER = re.compile(r"[±+-]?\d[\d.e+-]*")
@@ -28,14 +29,12 @@ NUMBER = re.compile(r"[±+-]?\d[\d.e+-]*")
 @pytest.fixture(scope="module")
 def shown() -> list[Table]:
     """All tables that solving, batching, executing and recording print."""
-    tables: list[Table] = []
+    found: list[Table] = []
     patch = pytest.MonkeyPatch()
 
     def noted(title: str, *columns: str) -> Table:
-        from clench.apps.cli.output.tables import table_with
-
-        tables.append(table_with(title, *columns))
-        return tables[-1]
+        found.append(tables.table_with(title, *columns))
+        return found[-1]
 
     patch.setattr(printing, "table_with", noted)
     patch.setattr(choice_tables, "table_with", noted)
@@ -55,7 +54,7 @@ def shown() -> list[Table]:
     printing.print_batch({**document, "certified": 1})
     printing.print_weights({"steadiness": 0.5}, "Fitted.")
     patch.undo()
-    return tables
+    return found
 
 
 def test_every_column_of_numbers_names_its_unit(shown: list[Table]) -> None:
@@ -65,6 +64,48 @@ def test_every_column_of_numbers_names_its_unit(shown: list[Table]) -> None:
     assert len(numeric) >= 20
     missing = [(t, h) for t, h in numeric if h not in COUNTS and not re.search(r"\[.+\]$", h)]
     assert missing == []
+
+
+def lines_of(table: Table, width: int) -> list[str]:
+    from rich.console import Console
+
+    console = Console(width=width, record=True, file=io.StringIO(), color_system=None)
+    tables.print_table(console, table)
+    return console.export_text().splitlines()
+
+
+def words_of(table: Table) -> set[str]:
+    from rich.text import Text
+
+    texts = [cell for column in table.columns for cell in (column.header, *column.cells)]
+    return {word for text in texts for word in Text.from_markup(str(text)).plain.split()}
+
+
+def test_every_table_keeps_its_words_whole_in_80_columns(shown: list[Table]) -> None:
+    for table in shown:
+        lines = lines_of(table, 80)
+        assert max(map(len, lines)) <= 80
+        printed = set(re.split(r"[\s┃│]+", "\n".join(lines)))
+        assert words_of(table) - printed == set(), table.title
+
+
+def test_a_table_that_is_too_wide_loses_its_frame_and_then_breaks_words() -> None:
+    def made() -> Table:
+        table = tables.table_with("", "name", "other")
+        table.add_row("a_name_that_is_long", "another_name_of_a_joint")
+        return table
+
+    assert lines_of(made(), 50)[0].startswith("┏")
+    assert lines_of(made(), 45)[2].split() == ["a_name_that_is_long", "another_name_of_a_joint"]
+    assert max(map(len, lines_of(made(), 30))) <= 30
+
+
+def test_short_cells_are_whole_before_long_ones_and_heads() -> None:
+    table = tables.table_with("", "some long head", "angles [deg]", "reason")
+    table.add_row("a", "-36.2 -15.9 55.0 8.9", "a reason in many words that has to be broken")
+    lines = lines_of(table, 60)
+    assert any("-36.2 -15.9 55.0 8.9" in line for line in lines)
+    assert not any("some long head" in line for line in lines)
 
 
 @pytest.mark.parametrize(("length", "text"), [(-1e-9, "0.000"), (-2e-6, "-0.002"), (0.0, "0.000")])
@@ -80,10 +121,28 @@ def test_every_fixed_number_of_the_command_line_and_of_pages_is_written_without_
     assert found == []
 
 
-def test_the_table_of_a_plan_names_the_confidence_as_its_document_does(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "160")
-    document = {"hand": "h", "object": "o", "grasps": [], "rejected": {}, "closed": 0, "force_closed": 0}
-    print_plan({**document, "seconds": {"total": 0.0}}, "Found none.")
+def planned(**more: object) -> dict[str, object]:
+    pose = {"position": [-0.0351, -0.0852, 0.1063]}
+    solution = {"hand_pose": pose, "contacts": [], "squeeze": {"torques": {"a": -0.345}}}
+    grasp = {"solution": solution, "kind": "precision", "preshape": "curled-145mm", "epsilon": 0.13, "confidence": 0.99}
+    rest = {"rejected": {}, "closed": 0, "force_closed": 0, "seconds": {"total": 0.0}}
+    return {"hand": "h", "object": "o", "grasps": [grasp | more], **rest}
+
+
+def test_the_table_of_a_plan_names_the_confidence_as_its_document_does(capsys: pytest.CaptureFixture[str]) -> None:
+    print_plan(planned() | {"grasps": []}, "Found none.")
     assert re.search(r"epsilon\W+confidence\W+links", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("more", [{}, {"hold": {"held": True}}])
+def test_the_table_of_a_plan_fits_80_columns_and_explains_its_columns(
+    more: dict[str, object], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    print_plan(planned(**more), "Found one.")
+    printed = capsys.readouterr().out
+    assert {"precision", "curled-145mm", "confidence", "-85", "0.345"} <= set(re.split(r"[\s┃│]+", printed))
+    assert max(map(len, printed.splitlines())) <= 80
+    for name in ("palm", "epsilon", "confidence", "links", "torque"):
+        assert f"{name}: " in " ".join(printed.split())
+    assert ("held: result of the hold test." in " ".join(printed.split())) == bool(more)

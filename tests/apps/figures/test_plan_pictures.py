@@ -16,7 +16,15 @@ from clench.apps.figures import draw_plan
 from clench.apps.figures.drawing.camera import fitted_camera
 from clench.apps.figures.drawing.stage import Stage, solution_poses, solution_solids
 from clench.apps.figures.drawing.viewpoints import focus_of, viewpoints
-from clench.apps.figures.maps.contact_map import _heat, _normals, _photographs, _sides, _Touches, draw_contacts
+from clench.apps.figures.maps.contact_map import (
+    _heat,
+    _normals,
+    _photographs,
+    _sides,
+    _Touches,
+    _visible,
+    draw_contacts,
+)
 from clench.apps.figures.maps.zone_map import _best, _ends, draw_zones
 from clench.apps.figures.sheets import grasp_sheet
 from clench.apps.figures.sheets.grasp_sheet import MOST_GRASPS, draw_grasps
@@ -144,6 +152,18 @@ def test_the_heat_is_the_share_of_grasps_that_touch_there(ball) -> None:
         assert camera.towards[2] < 0.0
         column, row = camera.project(2.0 * ball.pose.matrix[:3, 3] - top)[:2].astype(int)
         assert heat[row - 40 : row + 40, column - 40 : column + 40].max() == 0.0
+
+
+@pytest.mark.parametrize("thickness", [0.0005, 0.001, 0.004])
+def test_a_contact_behind_a_wall_is_not_marked_however_thin_the_wall_is(thickness: float) -> None:
+    wall = GraspObject.load(f"box:x={thickness},y=0.08,z=0.08")
+    middle = wall.pose.matrix[:3, 3]
+    side = np.array([0.5 * thickness, 0.0, 0.0])
+    places = np.array([middle + side, middle - side])
+    touches = _Touches(places, np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([False, True]))
+    cameras, pictures = _photographs(wall)
+    seen = [_visible(touches, p, c).tolist() for p, c in zip(pictures, cameras, strict=True)]
+    assert seen == [[camera.towards[0] > 0.0, camera.towards[0] < 0.0] for camera in cameras]
 
 
 def test_normals_of_what_is_seen_are_those_of_a_ball() -> None:

@@ -100,8 +100,10 @@ def test_a_port_in_use_is_one_sentence() -> None:
 
 
 def test_a_port_that_is_none_is_one_sentence() -> None:
-    with pytest.raises(CommandError, match="--port 99999"):
+    with pytest.raises(CommandError, match=r"^--port: expected a number from 0 to 65535, got 99999\.$"):
         Gate("127.0.0.1", 99999, None)
+    with pytest.raises(CommandError, match=r"^--host: expected an address of this machine, got 'no such host'\.$"):
+        Gate("no such host", 0, None)
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,9 @@ def test_bad_input_is_one_sentence(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "no such file" in say(capsys, str(tmp_path / "none.json"))
     assert "nohand" in say(capsys, "--hand", "nohand")
     assert "--mass" in say(capsys, "--mass", "1", "2", "3")
+    assert "seed: expected a whole number of at least 0, got -1" in say(capsys, "--seed", "-1")
+    assert "gravity: expected a direction" in say(capsys, "--gravity", "0", "0", "0")
+    assert "--port is given more than once" in say(capsys, "--port", "0", "--port", "1")
     assert "leave out --command" in say(capsys, str(tmp_path / "a.json"), "--table")
 
 

@@ -10,10 +10,10 @@ import pytest
 import clench
 from clench.closing.collision.depths import hand_depths
 from clench.closing.collision.packed_object import pack_object
-from clench.execution.simulation import simulated_hand
+from clench.execution.simulation import piece_hold, simulated_hand
 from clench.execution.simulation.convex_pieces import in_pieces
-from clench.execution.simulation.hold import Hold
-from clench.execution.simulation.piece_hold import NO_GRASP_ON_PIECES, hold_as_collided
+from clench.execution.simulation.hold import Hold, HoldReport
+from clench.execution.simulation.piece_hold import NO_GRASP_ON_PIECES, ON_PIECES, hold_as_collided
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
@@ -45,7 +45,9 @@ def test_the_grasp_that_is_tested_fits_the_pieces(grip: tuple[Hand, GraspObject,
     hand, obj, solution = grip
     report = hold_as_collided(solution, hand, obj, Hold(duration=0.2), plan_trajectory(solution, hand, obj=obj))
     assert report.as_given is not None
-    assert "solved again on the object's convex pieces; as given, it was: " in report.reason
+    said = "The hold test executed the grasp solved again on the object's convex pieces: "
+    assert report.reason.startswith((f"{said}held against ", f"{said}dropped when "))
+    assert report.reason.count(". ") == 0
     document = report.to_dict()
     assert document["as_given"]["held"] == report.as_given.held
     assert document["as_given"]["as_given"] is None
@@ -74,7 +76,10 @@ def test_the_touch_is_that_of_the_pieces_where_they_stop_the_hand(
     times: list[float] = []
     simulated = clench.SimulatedHand(hand, obj, angle_tolerance=1e-4, on_step=lambda time, _: times.append(time))
     report = clench.execute(replace(solution, next_steps=steps), simulated, speed=0.5)
-    assert "solved again on the object's convex pieces; as given, it was: Not reached: joint" in report.reason
+    said = "Executed the grasp solved again on the object's convex pieces: every joint is within "
+    assert report.reason.startswith(said)
+    first = "First, the simulation executed the grasp of the solution itself. Not reached: joint "
+    assert [note for note in report.notes if note.startswith(first)]
     assert all(joint.error == pytest.approx(0.0, abs=1e-4) for joint in report.joints.values())
     assert len(report.next_steps) == 1
     # The observer sees one motion, at the speed that was asked for.
@@ -100,4 +105,28 @@ def test_the_hold_test_is_of_the_grasp_that_reached_the_touch(grip: tuple[Hand, 
     report = clench.execute(solution, simulated)
     assert report.hold is not None
     assert report.hold.as_given is None
-    assert report.reason.count("as given, it was") == 1
+    # Two sentences: what was executed, and what held.
+    executed, held = report.reason.split(" touch. ")
+    assert executed.startswith("Executed the grasp solved again on the object's convex pieces: ")
+    assert held == report.hold.reason
+    assert held.startswith(("Held against ", "Dropped when "))
+
+
+def test_the_hold_test_of_the_solution_itself_is_a_note(grip: tuple[Hand, GraspObject, GraspSolution]) -> None:
+    hand, obj, solution = grip
+    report = clench.execute(solution, clench.SimulatedHand(hand, obj, angle_tolerance=1.0, hold=Hold(duration=0.2)))
+    assert report.hold is not None
+    assert report.hold.as_given is not None
+    given = report.hold.as_given.reason
+    assert f"The hold test also executed the grasp of the solution itself. {given}" in report.notes
+    assert report.reason.endswith(report.hold.reason)
+
+
+def test_a_grasp_on_the_pieces_that_cannot_be_tested_is_told(
+    grip: tuple[Hand, GraspObject, GraspSolution], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hand, obj, solution = grip
+    untested = HoldReport(False, "Not tested: the hand would be 2 mm deep in the table.", Hold(), "", True, {})
+    monkeypatch.setattr(piece_hold, "hold_and_pull", lambda *_, **__: untested)
+    report = hold_as_collided(solution, hand, obj, Hold(), plan_trajectory(solution, hand, obj=obj))
+    assert report.reason == f"{untested.reason} This is about {ON_PIECES}."

@@ -176,7 +176,7 @@ def test_a_slippery_ball_is_dropped(pincer: Hand, pinch: GraspSolution, ball: Gr
     assert report.hold is not None
     assert not report.success
     assert not report.hold.planned
-    assert report.notes[-1].startswith("The squeeze is not one that holds: No squeeze holds 0.1 kg")
+    assert report.notes[-1].startswith("The planned squeeze does not hold the mass. No squeeze holds 0.1 kg")
 
 
 def test_heavier_than_the_hand_can_hold(pincer: Hand, pinch: GraspSolution, ball: GraspObject) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import clench
 from clench.core.pose import Pose
+from clench.models.objects import object_report
 from clench.models.objects.object_report import describe_object
 from clench.models.objects.obstacles import table
 from clench.models.tessellation import BOX_CORNERS, BOX_TRIANGLES
@@ -76,3 +78,11 @@ def test_the_document_holds_plain_values() -> None:
     }
     assert clench.Pose.from_dict(first["pose"]) == clench.stable_poses(clench.GraspObject.load("mug"))[0].pose
     assert first["tip_angle"] == pytest.approx(math.atan2(first["margin"], first["center_height"]))
+
+
+@pytest.mark.parametrize(
+    ("probability", "share"), [(0.305, "30.5 %"), (0.001, "0.1 %"), (0.0009, "below 0.1 %"), (1e-9, "below 0.1 %")]
+)
+def test_a_rare_pose_has_no_share_of_nothing(probability: float, share: str) -> None:
+    stable = clench.stable_poses(clench.GraspObject.load("ball"))[0]
+    assert object_report._pose_row(replace(stable, probability=probability))[0] == share

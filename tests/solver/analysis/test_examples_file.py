@@ -99,11 +99,11 @@ def test_a_record_of_the_first_version_is_carried_over(tmp_path: Path) -> None:
     ("content", "message"),
     [
         ({"schema": "x"}, "schema: expected 'clench.examples/1', got 'x'"),
-        ({"pair": []}, "unknown field 'pair'"),
-        ({"pairs": [{"better": scores(1.0)}]}, "missing required field 'worse'"),
+        ({"pair": []}, "pair: unknown key; expected one of schema, record, pairs, outcomes"),
+        ({"pairs": [{"better": scores(1.0)}]}, r"pairs\[0\]\.worse: missing"),
         ({"pairs": [{"better": {}, "worse": scores(1.0)}]}, r"pairs\[0\]\.better: expected 'scores' by criterion"),
         ({"outcomes": [{"of": {"solve": 1}, "held": True}]}, r"outcomes\[0\]\.of: names a solve, but the file has no"),
-        ({"outcomes": [{"of": scores(1.0), "held": "yes"}]}, "Expected 'bool', got 'str'"),
+        ({"outcomes": [{"of": scores(1.0), "held": "yes"}]}, r"outcomes\[0\]\.held: expected bool, got str"),
         ({"record": "none.sqlite"}, "none.sqlite: no such record"),
         (
             {"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "finger": "ring", "set": 0}, "held": True}]},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import clench
 from clench.core.exceptions import CommandError
 from clench.core.pose import Pose
 from clench.mechanics.grasp.loads import GRAVITY
-from clench.solver.analysis import quality
+from clench.solver.analysis import quality, squeezing
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +146,14 @@ def test_one_contact_holds_nothing_in_every_direction(grip) -> None:
     off = solution.object_pose.position + np.array([0.01, 0.005, 0.0])
     pinch = replace(solution, contacts=tuple(two))
     assert not clench.plan_squeeze(pinch, hand, ball, mass=0.01, gravity=None, center_of_mass=off).feasible
+
+
+@pytest.mark.parametrize(
+    ("margin", "said"), [(0.5, "only 0.5 times that mass."), (2.75e-19, "not even 0.001 times that mass.")]
+)
+def test_a_margin_that_is_a_rounded_zero_is_not_told_as_a_number(margin: float, said: str) -> None:
+    found = SimpleNamespace(plan=np.zeros(3), margin=margin, unresisted=())
+    assert squeezing._sentence(found, (0.1, 0.1), False, True).endswith(said)
 
 
 def test_torque_limited_epsilon_is_a_force(grip) -> None:

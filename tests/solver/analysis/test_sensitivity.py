@@ -308,10 +308,10 @@ def test_a_solution_that_was_tampered_with_is_refused_in_a_sentence():
         clench.sensitivity(replace(solution, joint_angles={}), hand, ball)
 
 
-def test_a_finger_without_sets_has_changes_that_are_not_known():
+def test_a_finger_without_candidates_has_changes_that_are_not_known():
     hand, ball = three_links(), GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.0, 0.05]))
     solution = clench.solve(hand, ball, clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open"))
     bare = replace(solution, fingers={n: replace(f, candidates=()) for n, f in solution.fingers.items()})
     found = clench.sensitivity(bare, hand, ball)
     assert np.isinf(found.translation).all()
-    assert "has no set of index" in found.reasons["index_0"]
+    assert "has no candidate of index" in found.reasons["index_0"]

@@ -6,13 +6,15 @@ import contextlib
 import functools
 import inspect
 import io
-import itertools
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
 
 from clench.core.exceptions import CommandError
+
+from .argument_check import check_arguments
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -21,11 +23,6 @@ PRINT_COMPLETION: Final = "--tyro-print-completion"
 SHELLS: Final = ("bash", "zsh")
 #: The option that may be given several times, as well as once with several values.
 _REPEATED: Final = "--obstacle"
-#: How the parser lists choices, and the option that it takes for a misspelt one.
-_CHOICES: Final = re.compile(r"Expected one of \(([^)]*?),?\)")
-_LIKELY: Final = re.compile(r"Perhaps you meant:?\W+(--[\w-]+)")
-#: Lines of a box that are indented so far are the help of an option.
-_HELP_INDENT = 8
 
 
 def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, float] | None:
@@ -39,6 +36,17 @@ def as_range(values: tuple[float, ...], option: str) -> float | tuple[float, flo
     return None if not values else values[0] if len(values) == 1 else (values[0], values[1])
 
 
+def as_angle(degrees: float, option: str) -> float:
+    """Return the value of an option in degrees as an angle [rad].
+
+    Raises:
+        CommandError: the angle is not above 0 and up to 180.
+    """
+    if not 0.0 < degrees <= 180.0:
+        raise CommandError(f"{option}: expected degrees above 0 and up to 180, got {degrees:g}.")
+    return math.radians(degrees)
+
+
 def parse_call(program: str, command: Callable[..., int], arguments: Sequence[str]) -> Callable[[], int]:
     """Return the call that the arguments ask for; after `--help`, one that returns 0.
 
@@ -49,6 +57,8 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     Raises:
         CommandError: a wrong argument.
     """
+    gathered = _gathered(arguments)
+    check_arguments(program, command, gathered)
     import tyro
 
     def call(*values: object, **options: object) -> Callable[[], int]:
@@ -64,11 +74,11 @@ def parse_call(program: str, command: Callable[..., int], arguments: Sequence[st
     box = io.StringIO()
     try:
         with contextlib.redirect_stderr(box):
-            return tyro.cli(call, prog=program, args=_gathered(arguments), config=options_style())
+            return tyro.cli(call, prog=program, args=gathered, config=options_style())
     except SystemExit as finished:
         code = finished.code if isinstance(finished.code, int) else EXIT_BAD_INPUT
         if code:
-            raise CommandError(f"{program}: {_sentence(box.getvalue())} Options: {program} --help.") from None
+            raise CommandError(f"{program}: {_sentence(box.getvalue())} See {program} --help.") from None
         return lambda: code
 
 
@@ -145,14 +155,6 @@ def options_style() -> tuple[Any, ...]:
 
 
 def _sentence(box: str) -> str:
-    """Return the first sentence of a box of text on one line, without its title and the help of options."""
-    lines = [line.strip("│").rstrip() for line in box.splitlines() if not line.startswith(("╭", "╰"))]
-    rules = [i for i, line in enumerate(lines) if line and set(line.strip()) <= set("─-")]
-    # In boxes drawn with plain characters, the title is a line above the first rule.
-    start = 0 if box.startswith("╭") or not rules else rules[0] + 1
-    first = itertools.takewhile(lambda line: line and not set(line.strip()) <= set("─-"), lines[start:])
-    text = " ".join(line.strip() for line in first if not line.startswith(" " * _HELP_INDENT))
-    text = _CHOICES.sub(lambda found: f"Expected one of {found[1].replace(chr(39), '')}", text)
-    likely = _LIKELY.search(box)
-    meant = f" Did you mean '{likely[1]}'?" if likely else ""
-    return (text[:1].upper() + text[1:] or "Expected other arguments").rstrip(".") + "." + meant
+    """Return the text of a box on one line, for arguments that the parser refuses and `check_arguments` accepts."""
+    text = " ".join(re.sub(r"[^\x20-\x7e]|--{2,}", " ", box).split())
+    return text or "Expected other arguments."

@@ -22,7 +22,7 @@ __all__ = ["draw_plan", "draw_solution"]
 def draw_solution(
     hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, directory: str | Path
 ) -> list[Path]:
-    """Draw every finger in its curl planes, its alternative sets, and the hand from two sides.
+    """Draw every finger in its curl planes, its candidates, and the hand from two sides.
 
     Args:
         hand, obj, command: the solved problem. solution: the answer.

@@ -108,11 +108,15 @@ class Gate:
         self._token = token
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
+            socket.getaddrinfo(host, None)
             self._socket = socket.create_server((host, port), family=family, backlog=64)
-        except (OSError, OverflowError) as error:
-            why = error.strerror if isinstance(error, OSError) else None
+        except socket.gaierror:
+            raise CommandError(f"--host: expected an address of this machine, got '{host}'.") from None
+        except OverflowError:
+            raise CommandError(f"--port: expected a number from 0 to 65535, got {port}.") from None
+        except OSError as error:
             raise CommandError(
-                f"--port {port}: nothing can listen there on {host} ({why or error}); choose another --port."
+                f"--port {port}: nothing can listen there on {host} ({error.strerror}); choose another --port."
             ) from None
         self.port: int = self._socket.getsockname()[1]
         self._cookie = f"clench_token_{self.port}"

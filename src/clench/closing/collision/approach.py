@@ -63,7 +63,7 @@ def drawn_poses(hand: Hand, obj: GraspObject, seed: int, preshape: Mapping[str, 
     check_type(hand, Hand, "hand")
     check_type(obj, GraspObject, "obj")
     if seed < 0:
-        raise CommandError(f"approach poses: expected a seed of 0 or more, got {seed}.")
+        raise CommandError(f"seed: expected a whole number of at least 0, got {seed}.")
     q = _open_posture(hand, preshape)
     packed = pack_object(obj)
     surface = GraspableSurface(obj, packed)

@@ -17,6 +17,8 @@ from clench.core.exceptions import FileError
 
 from .file_limits import ARCHIVE_LIST_BYTES, ARRAY_BYTES, JSON_BYTES
 
+#: First bytes of every npy file.
+_MAGIC: Final = b"\x93NUMPY"
 #: Kinds of values: whole and real numbers; with them true and false, and text.
 _NUMBERS: Final = "iuf"
 _PLAIN: Final = _NUMBERS + "bU"
@@ -36,6 +38,8 @@ def read_array(path: str | Path) -> NDArray[Any]:
         with open(path, "rb") as file:
             if file.peek(4)[:4] == b"PK\x03\x04":
                 raise FileError(path, "expected one array (.npy), got an archive of several (.npz).")
+            if file.peek(len(_MAGIC))[: len(_MAGIC)] != _MAGIC:
+                raise FileError(path, "not a NumPy file (.npy) of numbers; it does not begin as NumPy's files do.")
             return _array(file, os.fstat(file.fileno()).st_size, path, _NUMBERS)
     except FileError:
         raise

@@ -16,6 +16,9 @@ from .file_bytes import read_file
 from .file_limits import JSON_BYTES
 from .nesting import TOO_DEEP, is_too_deep
 
+#: Bytes of a file of another kind that a message may show.
+_SHOWN = 24
+
 
 def non_finite_path(value: Any) -> str | None:
     """Return the path of the first number that is NaN or infinite, or None; lists may be nested however deep."""
@@ -44,17 +47,23 @@ def encode_document(document: dict[str, Any], name: str) -> bytes:
         raise ClenchError(f"{where}: is not a finite number and cannot be written.") from None
 
 
-def read_json(path: str | Path) -> Any:
+def read_json(path: str | Path, kind: str = "a document") -> Any:
     """Read a JSON file.
+
+    Args:
+        path: the file. kind: what it should hold, for messages about files of another kind.
 
     Raises:
         FileError: missing, unreadable, too large, or not JSON.
     """
-    return parse_json(read_file(path, JSON_BYTES), path)
+    return parse_json(read_file(path, JSON_BYTES), path, kind)
 
 
-def parse_json(data: bytes, source: str | Path) -> Any:
-    """Return parsed JSON; `source` names it in messages.
+def parse_json(data: bytes, source: str | Path, kind: str = "a document") -> Any:
+    """Return parsed JSON.
+
+    Args:
+        data: the text. source: names it in messages. kind: see `read_json`.
 
     Raises:
         FileError: not JSON, or nested too deeply.
@@ -62,12 +71,29 @@ def parse_json(data: bytes, source: str | Path) -> Any:
     try:
         value = msgspec.json.decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise FileError(source, f"not JSON ({error}).") from None
+        raise FileError(source, not_json(data, kind, str(error))) from None
     except RecursionError:
         raise FileError(source, f"not JSON that can be read: {TOO_DEEP}.") from None
     if is_too_deep(value):
         raise FileError(source, f"not JSON that can be read: {TOO_DEEP}.")
     return value
+
+
+def not_json(data: bytes, kind: str, why: str) -> str:
+    """Return what is wrong with a file that is not JSON: another kind of file, or the place of the mistake.
+
+    Args:
+        data: its content. kind: what was expected. why: the parser's reason.
+    """
+    start = data.lstrip()[:1]
+    if start in (b"{", b"["):
+        return f"not JSON ({why})."
+    try:
+        first = data[:_SHOWN].decode().strip().partition("\n")[0]
+        other = f"text that begins with '{first}'" if first else "an empty file"
+    except UnicodeDecodeError:
+        other = "bytes that are no text"
+    return f"not JSON: expected {kind}, got {other}."
 
 
 def write_json(path: str | Path, document: dict[str, Any], name: str) -> None:

@@ -109,7 +109,7 @@ def export_grasps(
         hand, obj = hand or solutions.question.hand, obj or solutions.question.obj
         solutions = [solutions.solution(int(i)) for i in np.flatnonzero(solutions.status == SolutionStatus.GRASP)]
     several = [solutions] if isinstance(solutions, GraspSolution) else list(solutions)
-    chosen = format_of(path, format)
+    chosen = format_of(path, format, read=False)
     bench = chosen is GraspFormat.DEXGRASPBENCH
     files = _files(Path(path), len(several)) if bench else (Path(path),)
     if bench and name is not None:
@@ -167,11 +167,14 @@ def import_grasps(path: str | Path, format: GraspFormat | str | None = None) -> 
         GraspFormat.DEXGRASPBENCH: read_dexgraspbench,
         GraspFormat.MOVEIT_GRASP: read_moveit_grasp,
     }
-    return readers[format_of(path, format)](path)
+    return readers[format_of(path, format, read=True)](path)
 
 
-def format_of(path: str | Path, given: GraspFormat | str | None = None) -> GraspFormat:
+def format_of(path: str | Path, given: GraspFormat | str | None, *, read: bool) -> GraspFormat:
     """Return the format of a file: the given one, or the one that the ending names.
+
+    Args:
+        path: the file. given: name of the format, None: by the ending. read: the file is there to be read.
 
     Raises:
         FileError: the ending names no format. UnknownNameError: no such format.
@@ -184,6 +187,8 @@ def format_of(path: str | Path, given: GraspFormat | str | None = None) -> Grasp
         return GraspFormat.DEXGRASPBENCH
     ending = Path(path).suffix.lower()
     if ending not in _ENDINGS:
-        endings = [*_ENDINGS, *(f"{own} (a scene)" for own in SCENES), *(f"{own} (of a dataset)" for own in DATASETS)]
-        raise FileError(path, f"the ending names no format; expected {', '.join(endings)}, or a format by name.")
+        endings, names = ", ".join(_ENDINGS), ", ".join(GraspFormat)
+        others = f" A scene ends with {', '.join(SCENES)}; a dataset with {', '.join(DATASETS)}."
+        said = f"the ending names no format; expected {endings}, or a format by name: {names}."
+        raise FileError(path, said if read else said + others)
     return _ENDINGS[ending]

@@ -9,6 +9,7 @@ from typing import Any, Final
 import msgspec
 
 from clench.core.exceptions import CommandError, FileError
+from clench.core.files.form_errors import form_sentence
 from clench.core.files.json_files import non_finite_path, read_json, write_json
 from clench.core.pose import Pose
 
@@ -41,7 +42,7 @@ def read_moveit_grasp(path: str | Path) -> list[GraspPosture]:
         many = isinstance(data, dict) and "grasps" in data
         forms = msgspec.convert(data["grasps"], list[_Grasp]) if many else [msgspec.convert(data, _Grasp)]
     except msgspec.ValidationError as error:
-        raise FileError(path, f"{str(error).replace('`', chr(39))}.") from None
+        raise FileError(path, form_sentence(error, _Grasp)) from None
     return [_posture(form, str(path)) for form in forms]
 
 

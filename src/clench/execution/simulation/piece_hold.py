@@ -19,9 +19,12 @@ from .hold import Hold, HoldReport
 from .pulling import hold_and_pull
 from .simulated_actuators import Drive
 
+#: What is said of a grasp on the pieces.
+ON_PIECES: Final = "the grasp solved again on the object's convex pieces"
 #: What is said if the command has no grasp on the pieces.
 NO_GRASP_ON_PIECES: Final = (
-    "The simulation collides convex pieces, which lie a little off the mesh, and this command has no grasp on them."
+    "The simulation collides convex pieces, which lie a little off the mesh. The command has no grasp on them, so the "
+    "grasp of the solution was executed."
 )
 
 
@@ -56,16 +59,30 @@ def hold_as_collided(
     again = solve_on_pieces(solution, hand, collided, trajectory)
     if again is None:
         report = hold_and_pull(solution, hand, obj, hold, trajectory, **options)
-        return replace(report, reason=f"{report.reason} {NO_GRASP_ON_PIECES} This is of the grasp as given.")
+        return replace(report, reason=f"{report.reason} {NO_GRASP_ON_PIECES}")
     drive = options.get("drive", Drive.SERVO)
     given = hold_and_pull(solution, hand, obj, hold, trajectory, show_progress=show, drive=drive)
     report = hold_and_pull(again.solution, hand, collided, hold, again.trajectory, **options)
-    return replace(report, reason=f"{report.reason} {told_as_given(given.reason)}", as_given=given)
+    return replace(report, reason=_on_pieces(report), as_given=given)
 
 
-def told_as_given(reason: str) -> str:
-    """Return the sentence beside a result of a grasp on the pieces: the result of the grasp as given."""
-    return f"This is of the grasp solved again on the object's convex pieces; as given, it was: {reason}"
+def notes_on_given(touch: str, held: HoldReport | None) -> tuple[str, ...]:
+    """Return a sentence for each result of the grasp of the solution itself, if another grasp was executed.
+
+    Args:
+        touch: why the touch of the solution was not reached, empty if it was. held: the hold test, None without one.
+    """
+    notes = [f"First, the simulation executed the grasp of the solution itself. {touch}"] if touch else []
+    if held is not None and held.as_given is not None:
+        notes.append(f"The hold test also executed the grasp of the solution itself. {held.as_given.reason}")
+    return tuple(notes)
+
+
+def _on_pieces(report: HoldReport) -> str:
+    """Return the reason of a hold test on the pieces: what was executed, and what came of it."""
+    if not report.pulls:
+        return f"{report.reason} This is about {ON_PIECES}."
+    return f"The hold test executed {ON_PIECES}: {report.reason[:1].lower()}{report.reason[1:]}"
 
 
 def solve_on_pieces(

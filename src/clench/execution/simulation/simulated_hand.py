@@ -34,11 +34,12 @@ from .hold import Hold, HoldReport
 from .mujoco_scene import TIMESTEP, Scene, body_pose, build_scene
 from .piece_hold import (
     NO_GRASP_ON_PIECES,
+    ON_PIECES,
     CollidedGrasp,
     as_collided,
     hold_as_collided,
+    notes_on_given,
     solve_on_pieces,
-    told_as_given,
 )
 from .simulated_actuators import Drive, check_drive, sentences
 from .stepping import Stepper
@@ -143,6 +144,7 @@ class SimulatedHand:
                 *_notes(touch.scene, solution),
                 *sentences(touch.scene.drives.driven, self.drive),
                 *self._notes_on_hold(held),
+                *notes_on_given(touch.as_given, held),
                 *notes_on_steps(solution, steps),
             ),
             driven_by=touch.scene.drives.driven.by,
@@ -165,8 +167,10 @@ class SimulatedHand:
             touch = self._close(touch.scene, touch.grasp, watched=True)
         if collided is None:
             return touch
-        more = NO_GRASP_ON_PIECES if touch.grasp is grasp else told_as_given(given.reason)
-        return replace(touch, reason=f"{touch.reason} {more}")
+        if touch.grasp is grasp:
+            return replace(touch, reason=f"{touch.reason} {NO_GRASP_ON_PIECES}")
+        ended = f": {touch.reason[:1].lower()}{touch.reason[1:]}" if touch.success else f". {touch.reason}"
+        return replace(touch, reason=f"Executed {ON_PIECES}{ended}", as_given=given.reason)
 
     def _scene(self, grasp: CollidedGrasp) -> Scene:
         start = grasp.trajectory.positions[0]
@@ -229,7 +233,7 @@ class SimulatedHand:
             notes = ["Angles and contacts are of a run with the object held in place, alone."]
             notes += ["There are no pictures: the hold test was not carried out."] * (self.film is not None)
         if not held.planned:
-            notes.append(f"The squeeze is not one that holds: {held.plan}")
+            notes.append(f"The planned squeeze does not hold the mass. {held.plan}")
         return tuple(notes)
 
     def _run(self, scene: Scene, trajectory: Trajectory, watch: TouchWatch, samples: _Samples) -> Any:
@@ -300,6 +304,7 @@ class _Touch:
         watch, samples: what was seen on the way.
         joints: by name. contacts: those of the solution. touched_links: at the end.
         success: the hand reached the grasp. reason: one sentence.
+        as_given: why the touch of the solution itself was not reached, if another grasp was executed.
     """
 
     grasp: CollidedGrasp
@@ -312,6 +317,7 @@ class _Touch:
     touched_links: tuple[str, ...]
     success: bool
     reason: str
+    as_given: str = ""
 
 
 @dataclass

@@ -18,6 +18,9 @@ from .stable_poses import StablePose, graspable_points, stable_poses
 
 SCHEMA: Final = "clench.object/1"
 
+#: Probability that is shown as a number; a smaller one would be 0.0 %.
+_LEAST_SHARE: Final = 0.001
+
 
 @dataclass(frozen=True)
 class BodyReport:
@@ -150,7 +153,8 @@ def _pose_row(stable: StablePose) -> tuple[str, ...]:
     else:
         base = f"rolls, {stable.facets} facets in {math.degrees(stable.spread):.0f}°"
     down = tuple((-stable.pose.rotation[2]).tolist())
-    return f"{100.0 * stable.probability:.1f} %", _vector(down, 3), f"{stable.center_height * 1e3:.1f}", base
+    share = f"{100.0 * stable.probability:.1f} %" if stable.probability >= _LEAST_SHARE else "below 0.1 %"
+    return share, _vector(down, 3), f"{stable.center_height * 1e3:.1f}", base
 
 
 def _vector(values: tuple[float, ...], digits: int = 6) -> str:

@@ -18,6 +18,7 @@ import msgspec
 import numpy as np
 
 from clench.core.exceptions import ClenchError, FileError
+from clench.core.files.form_errors import form_sentence
 from clench.core.files.json_files import non_finite_path, read_json
 from clench.core.pose import FloatArray
 from clench.scoring.calibration import Calibration
@@ -101,14 +102,14 @@ def read_examples(path: str | Path) -> ScoredExamples:
     Raises:
         FileError: missing, malformed, or with a solve, finger or set that is not there; the message names the key.
     """
-    data = read_json(path)
+    data = read_json(path, "an examples file")
     bad = non_finite_path(data)
     if bad is not None:
         raise FileError(path, f"{bad}: expected a finite number.")
     try:
         file = msgspec.convert(data, _File)
     except msgspec.ValidationError as error:
-        raise FileError(path, f"{str(error).replace('`', chr(39))}.") from None
+        raise FileError(path, form_sentence(error, _File)) from None
     if file.schema != SCHEMA:
         raise FileError(path, f"schema: expected '{SCHEMA}', got {file.schema!r}.")
     solves: dict[int, GraspSolution] = {}

@@ -134,7 +134,7 @@ def _not_covered(solution: GraspSolution, hand: Hand, moved: Sequence[Finger]) -
     for finger in moved:
         result = solution.fingers[finger.name]
         if result.best is None:
-            return f"the solution has no set of {finger.name}; in which order it closed is not known"
+            return f"the solution has no candidate of {finger.name}; in which order it closed is not known"
         if solution.rounds != 1:
             return "its joints were gone through more than once; changes are known for one round alone"
         if any(c.breakaway and c.follower in finger.joints for c in hand.couplings):

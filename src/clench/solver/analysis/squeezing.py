@@ -39,6 +39,8 @@ from .holding import HeldSolution, hold
 DOWN = (0.0, 0.0, -1.0)
 #: Force of the disturbances of something without weight [N].
 _LEAST_DISTURBANCE = 1e-3
+#: Share of a mass that is worth a number: a smaller one is a rounded zero.
+_LEAST_SHARE = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +233,8 @@ def _sentence(found: SqueezeForces, masses: tuple[float, float], feasible: bool,
     if not feasible and found.unresisted:
         return f"No squeeze holds {held}: {left_out}"
     if not feasible:
-        return f"No squeeze holds {held}: only {found.margin:.3g} times that mass."
+        most = f"only {found.margin:.3g} times" if found.margin >= _LEAST_SHARE else f"not even {_LEAST_SHARE:g} times"
+        return f"No squeeze holds {held}: {most} that mass."
     friction = f"{100 * found.reserve:.3g} % of the friction" if found.reserve < 1.0 else "all of the friction"
     text = f"Holds {held}, with disturbances up to {found.margin:.3g} times the weight, and counts on {friction}."
     if found.loss > (1.0 + 1e-6) / LOSS_RESERVE:

@@ -78,7 +78,7 @@ def export(
             raise CommandError("export: a scene shows grasps as they are; leave out --root, --name, --hold and forces.")
         check_writable(out)
         return _export_scene(read_grasps(solutions, hand, object, (hand_file, palm), scale), out, json)
-    chosen = format_of(out, format)
+    chosen = format_of(out, format, read=False)
     one_each = chosen == "dexgraspbench" and (out.is_dir() or not out.suffix)
     (check_folder if one_each else check_writable)(out)
     planned = {"mass": as_range(mass, "--mass"), "friction": as_range(friction, "--friction")}

@@ -6,7 +6,6 @@ import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,6 +85,7 @@ def generate(
         merge: merge the parts in this folder, and do nothing else.
         json: print one JSON document on standard output.
     """
+    from clench.apps.cli.parsing import as_angle
     from clench.dataset.storage.columns import need_pyarrow
 
     need_pyarrow()
@@ -98,7 +98,7 @@ def generate(
         **({"path": False} if without_path else {}),
     }
     numbers: dict[str, float | None] = {"count": count, "seed": seed, "unit": unit, "min_fingers": min_fingers}
-    numbers["approach_angle"] = None if approach_angle is None else radians(approach_angle)
+    numbers["approach_angle"] = None if approach_angle is None else as_angle(approach_angle, "--approach-angle")
     numbers |= {"apart": apart, "effort": effort, "most": most}
     given |= {key: value for key, value in numbers.items() if value is not None}
     given |= {key: value for key, value in (("gravity", gravity), ("approach", approach)) if value is not None}

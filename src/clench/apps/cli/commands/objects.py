@@ -41,20 +41,20 @@ def object_(
 
 def print_object(report: ObjectReport) -> None:
     """Print the report on an object."""
-    from clench.apps.cli.output.tables import console_out, plain, table_with
+    from clench.apps.cli.output.tables import console_out, plain, print_table, table_with
 
     out = console_out()
     summary = table_with("object", "", "")
     for label, text in report.summary_rows():
         summary.add_row(plain(label), plain(text))
-    out.print(summary)
+    print_table(out, summary)
     rows = report.pose_rows()
     if rows:
         title = f"stable poses on a table, {min(len(rows), _MOST_ROWS)} of {len(rows)}, the most probable first"
         poses = table_with(title, "share", "points down", "centre [mm]", "stands on")
         for row in rows[:_MOST_ROWS]:
             poses.add_row(*map(plain, row))
-        out.print(poses)
+        print_table(out, poses)
     said = [] if report.no_stable_pose is None else [("no stable pose", report.no_stable_pose)]
     for label, text in [*said, *(("warning", warning) for warning in report.warnings)]:
         out.print(f"[yellow]{label}:[/yellow] {plain(text)}")

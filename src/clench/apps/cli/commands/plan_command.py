@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from clench.apps.cli.inputs.choices import Kind
 from clench.apps.cli.inputs.scene_options import with_scene
-from clench.apps.cli.parsing import as_range
+from clench.apps.cli.parsing import as_angle, as_range
 
 if TYPE_CHECKING:
     from clench.execution.simulation.hold import HoldReport
@@ -82,8 +82,6 @@ def plan(
         html: file (.html) for a page that shows all grasps in any browser, without a network (docs/pictures.md).
         json: print one JSON document on standard output.
     """
-    from math import radians
-
     import clench
     from clench.apps.cli.output.plan_table import print_plan
     from clench.apps.cli.output.printing import print_files
@@ -104,7 +102,7 @@ def plan(
         "fingers": fingers or None,
         "min_fingers": min_fingers,
         "approach": approach,
-        "approach_angle": radians(approach_angle),
+        "approach_angle": as_angle(approach_angle, "--approach-angle"),
         "pose_sigma": pose_sigma,
         "most": most,
         "seconds": seconds,

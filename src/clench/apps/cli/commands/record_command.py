@@ -44,6 +44,8 @@ def record(
         raise FileError(path, "no such record.")
     if outcome is not None and id is None:
         raise CommandError("record: --outcome belongs to a solve; give its --id.")
+    if limit < 1:
+        raise CommandError(f"--limit: expected at least 1, got {limit}.")
     with clench.Record(path) as recorded:
         if id is not None and outcome is not None:
             recorded.note_outcome(id, held=outcome == "held")

@@ -67,7 +67,7 @@ def solve(
         html: file (.html) for a page that shows the closing in any browser, without a network (docs/pictures.md).
         record: SQLite record to append the solution to.
         pose_error: show the effect of an error of the object's pose up to this many metres and degrees, e.g. 0.002 2.
-        explain: print the alternative sets with their scores, and why the chosen ones won.
+        explain: print the candidates of every finger with their scores, and why the chosen ones won.
         forces: print how steady the grasp is, and the forces that hold the object.
         mass: of the object, for the forces, which it prints [kg]; 0.1 by default; two numbers are a range.
         friction: of links on the object, for the printed forces; two numbers are a range; by default that of hand file

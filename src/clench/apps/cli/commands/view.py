@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from clench.apps.cli.inputs.choices import Kind, Order, Source
 from clench.apps.cli.inputs.command_files import read_command
 from clench.apps.cli.inputs.scene_options import scene_code, with_scene
-from clench.apps.cli.parsing import as_range
+from clench.apps.cli.parsing import as_angle, as_range
 from clench.core.exceptions import CommandError
 
 if TYPE_CHECKING:
@@ -88,14 +88,13 @@ def view(
         without_browser: print the address, and open no browser.
         json: print the address as one JSON document on standard output.
     """
-    from math import radians
-
     from clench.apps.viewer.opening import open_session
     from clench.apps.viewer.serving import check_viewer, serve
     from clench.core.defaults import MASS
     from clench.kernels.runtime.warming import announce, warm_up
     from clench.mechanics.grasp.contacts import friction_range
     from clench.mechanics.grasp.loads import mass_range
+    from clench.planner.options import PlanOptions
 
     check_viewer()
     carried, gripped = as_range(mass, "--mass"), as_range(friction, "--friction")
@@ -108,10 +107,12 @@ def view(
             "fingers": fingers or None,
             "min_fingers": min_fingers,
             "approach": approach,
-            "approach_angle": radians(approach_angle),
+            "approach_angle": as_angle(approach_angle, "--approach-angle"),
             "seed": seed,
         },
     }
+    # The page plans when it is asked to: wrong options are told before it opens.
+    PlanOptions(**{name: value for name, value in forces["planning"].items() if value is not None})
     loaded = {"hand_file": hand_file, "palm": palm, "collision_source": collision_source}
     if files:
         if command is not None or table is not None or obstacle:

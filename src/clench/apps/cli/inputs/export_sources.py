@@ -168,7 +168,7 @@ def _contents(file: Path) -> list[tuple[str, GraspSolution | SavedBatch]]:
 
     if file.suffix == ".npz":
         return [(str(file), SavedBatch(file))]
-    data = read_json(file)
+    data = read_json(file, "a solution or a list of solutions")
     listed = [(f"{file}[{i}]", each) for i, each in enumerate(data)] if isinstance(data, list) else [(str(file), data)]
     return [(source, clench.GraspSolution.from_dict(each, source)) for source, each in listed]
 

@@ -1,11 +1,11 @@
-"""Tables of a choice: the criteria, the sets of every finger, the closing orders and the Pareto front."""
+"""Tables of a choice: the criteria, the candidates of every finger, the closing orders and the Pareto front."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .tables import console_out, plain, table_with
+from .tables import console_out, plain, print_table, table_with
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -25,34 +25,34 @@ def plain_front(solution: GraspSolution) -> list[dict[str, Any]]:
 
 
 def print_choice(solution: GraspSolution) -> None:
-    """Print the criteria, the sets of every finger, and the sentences; print nothing if the solution has none."""
+    """Print the criteria, the candidates of every finger, and the sentences; print nothing if the solution has none."""
     from clench.solver.analysis.pareto import hand_front
 
     out, choice = console_out(), solution.choice
     if choice is None:
-        out.print("The solution does not say how its sets were chosen.")
+        out.print("The solution does not say how its candidates were chosen.")
         return
-    out.print(_criteria_table(choice))
+    print_table(out, _criteria_table(choice))
     if choice["unused"]:
-        out.print(f"said nothing about any set: {plain(', '.join(choice['unused']))}")
+        out.print(f"said nothing about any candidate: {plain(', '.join(choice['unused']))}")
     for name, finger in solution.fingers.items():
         if name in choice["fingers"]:
-            out.print(_finger_table(finger, choice))
+            print_table(out, _finger_table(finger, choice))
             out.print(plain(f"{name}: {choice['fingers'][name]['text']}"))
             if choice["fingers"][name]["closed_again"]:
                 out.print(plain(f"{name} met another finger and was closed again; its sum is that of before."))
     if "orders" in choice:
-        out.print(_orders_table(choice["orders"]))
+        print_table(out, _orders_table(choice["orders"]))
         out.print(plain(choice["orders"]["text"]))
     front = hand_front(solution)
     if len(front) > 1:
-        out.print(_front_table(front, choice))
+        print_table(out, _front_table(front, choice))
     for name, value in choice["final_hand_scores"].items():
         out.print(plain(f"{name} of the hand: {value:.4g} {choice['criteria'][name]['unit']}"))
     out.print(f"[bold]{plain(choice['text'])}[/bold]")
     if choice["combinations_tried"] and choice.get("proved"):
         judged, every = choice["combinations_tried"], choice["combinations"]
-        out.print(f"No combination of one set per finger is better ({judged} of {every} had to be judged).")
+        out.print(f"No combination of one candidate per finger is better ({judged} of {every} had to be judged).")
 
 
 def _criteria_table(choice: Mapping[str, Any]) -> Table:
@@ -72,11 +72,11 @@ def _criteria_table(choice: Mapping[str, Any]) -> Table:
 
 
 def _finger_table(finger: FingerResult, choice: Mapping[str, Any]) -> Table:
-    """List a finger's sets: the scores that counted, the weighted sum, and how each ended."""
+    """List a finger's candidates: the scores that counted, the weighted sum, and how each ended."""
     said = choice["fingers"][finger.name]
     names = [n for n in choice["criteria"] if any(n in c.scores for c in finger.candidates)]
     title = f"{finger.name} (* chosen, 2 runner-up, P on the Pareto front, x may not be taken)"
-    result = table_with(title, "", "set", "posture", *_with_units(names, choice), "sum [-]", "status")
+    result = table_with(title, "", "candidate", "finger posture", *_with_units(names, choice), "sum [-]", "status")
     for i, candidate in enumerate(finger.candidates):
         mark = "*" if i == finger.chosen else "2" if i == said["runner_up"] else ""
         mark += "P" if i in said["pareto"] else ""
@@ -98,8 +98,8 @@ def _orders_table(orders: Mapping[str, Any]) -> Table:
 
 
 def _front_table(front: Sequence[HandSets], choice: Mapping[str, Any]) -> Table:
-    """List combinations over all fingers that no other beats in every criterion, by the numbers of their sets."""
-    title = f"Pareto front of the hand, {len(front)} combinations by weighted sum (* chosen; sets from 0)"
+    """List combinations over all fingers that no other beats in every criterion, by the numbers of their candidates."""
+    title = f"Pareto front of the hand, {len(front)} combinations by weighted sum (* chosen; candidates from 0)"
     result = table_with(title, "", *front[0].sets, *_with_units(front[0].scores, choice), "sum [-]")
     for entry in front[:_MOST_ROWS]:
         scores = [f"{v:.4g}" for v in entry.scores.values()]

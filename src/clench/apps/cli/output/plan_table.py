@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
-from .tables import console_out, plain, table_with
+from .tables import console_out, plain, print_table, table_with
+
+#: What the columns say that need a word.
+_MEANINGS: Final = {
+    "palm": "position of the palm link in the world",
+    "epsilon": "the smallest wrench that the grasp does not resist, for forces that add up to 1 N",
+    "confidence": "share of grasps with this score that held in simulation",
+    "links": "number of links that touch",
+    "torque": "the largest joint torque of the squeeze",
+    "held": "result of the hold test",
+}
 
 
 def print_plan(document: Mapping[str, Any], text: str) -> None:
@@ -24,7 +34,9 @@ def print_plan(document: Mapping[str, Any], text: str) -> None:
         row += ["" if sure is None else f"{100 * sure:z.0f} %", str(len(links))]
         row += [f"{torque:z.3f}", *(["yes" if grasp["hold"]["held"] else "no"] if tried else [])]
         table.add_row(*map(plain, row))
-    console.print(table)
+    print_table(console, table)
+    meanings = _MEANINGS if tried else {name: said for name, said in _MEANINGS.items() if name != "held"}
+    console.print(plain(". ".join(f"{name}: {said}" for name, said in meanings.items()) + "."))
     console.print(plain(text))
     fallen = {reason: n for reason, n in document["rejected"].items() if n}
     if fallen:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from clench.solver.solution import posture_reason
 
-from .tables import console_out, plain, table_with
+from .tables import console_out, plain, print_table, table_with
 
 if TYPE_CHECKING:
     from clench.solver.preshapes.preshapes import Preshape
@@ -29,7 +29,7 @@ def print_preshapes(preshapes: Sequence[Preshape]) -> None:
         low, high = (f"{1e3 * length:z.0f}" for length in said["aperture_range"])
         best = f"{1e3 * said['aperture']:z.0f}"
         table.add_row(plain(said["name"]), f"{low} to {high}", best, f"{said['quality']:z.2f}")
-    console.print(table)
+    print_table(console, table)
 
 
 def print_posture_choice(solution: GraspSolution) -> None:
@@ -47,5 +47,5 @@ def print_posture_choice(solution: GraspSolution) -> None:
         scores = [f"{each['scores'][key]:.4g}" if key in each["scores"] else "" for key in names]
         row = (marks.get(name, ""), name, each["status"], *scores, f"{each['total']:z.4f}")
         table.add_row(*map(plain, row))
-    console.print(table)
+    print_table(console, table)
     console.print(plain(said["text"]), soft_wrap=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .tables import console_out, plain, table_with
+from .tables import console_out, plain, print_table, table_with
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,7 +32,7 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     )
     for name, finger in solution.fingers.items():
         table.add_row(*map(plain, _finger_row(name, finger, solution)))
-    console.print(table)
+    print_table(console, table)
     for name, finger in solution.fingers.items():
         if finger.cause is not None:
             console.print(
@@ -76,12 +76,12 @@ def print_forces(solution: GraspSolution) -> None:
     for contact, mu, force in zip(squeeze["contacts"], squeeze["friction"], squeeze["forces"], strict=True):
         numbers = [f"{mu:g}", f"{float(np.linalg.norm(force)):z.2f}", *(f"{f:z.2f}" for f in force)]
         table.add_row(*map(plain, (contact["finger"], contact["link"], *numbers)))
-    console.print(table)
+    print_table(console, table)
     table = table_with("squeeze, degrees of freedom", "joint", "torque [Nm]", "offset [deg]")
     for name, torque in squeeze["torques"].items():
         offset = squeeze["offsets"].get(name)
         table.add_row(plain(name), f"{torque:z.3f}", "" if offset is None else f"{np.rad2deg(offset):z.2f}")
-    console.print(table)
+    print_table(console, table)
 
 
 def print_pose_error(error: PoseErrorReport) -> None:
@@ -92,7 +92,7 @@ def print_pose_error(error: PoseErrorReport) -> None:
     for name, predicted, measured in zip(error.sensitivity.joints, error.predicted, error.measured, strict=True):
         stopped = error.sensitivity.stopped_by.get(name, "")
         table.add_row(*map(plain, (name, stopped, _degrees(predicted), _degrees(measured))))
-    console.print(table)
+    print_table(console, table)
     for text, links in (("still touch", error.kept), ("touch as well", error.gained)):
         if links:
             listed = ", ".join(f"{link} {share:.0%}" for link, share in links.items())
@@ -108,11 +108,11 @@ def print_hand(report: HandReport) -> None:
     summary = table_with(f"hand {report.name}", "", "")
     for row in report.summary_rows():
         summary.add_row(*map(plain, row))
-    console.print(summary)
+    print_table(console, summary)
     joints = table_with("joints", "finger", "joint", "role", "closes", "open [deg]", "limits [deg]")
     for joint in report.joint_rows():
         joints.add_row(*map(plain, joint[:-1]))
-    console.print(joints)
+    print_table(console, joints)
     console.print("why:")
     for joint in report.joint_rows():
         console.print(f"  [bold]{plain(joint[1])}[/bold]: {plain(joint[-1])}", soft_wrap=True)
@@ -121,7 +121,7 @@ def print_hand(report: HandReport) -> None:
         table = table_with("coupled joints", "joint", "follows", "why")
         for coupling in couplings:
             table.add_row(*map(plain, coupling))
-        console.print(table)
+        print_table(console, table)
     pairs = ", ".join(f"{a} - {b}" for a, b in report.allowed_pairs)
     console.print(f"may overlap: {plain(pairs) or 'none'}")
     if not report.findings:
@@ -148,12 +148,12 @@ def print_report(report: ExecutionReport) -> None:
         for name, joint in report.joints.items():
             angles = (joint.computed, joint.reached, joint.error)
             table.add_row(plain(name), *(f"{np.rad2deg(a):z.3f}" for a in angles))
-        console.print(table)
+        print_table(console, table)
     if report.contacts:
         table = table_with("contacts", "finger", "link", "gap [mm]", "moved from computed [mm]")
         for c in report.contacts:
             table.add_row(plain(c.finger), plain(c.link), _millimetres(c.gap), _millimetres(c.displacement))
-        console.print(table)
+        print_table(console, table)
     times = ", ".join(f"{n} {t:z.3f} s" if t is not None else f"{n} never" for n, t in report.first_touch.items())
     if times:
         console.print(f"first touch: {plain(times)}")
@@ -170,7 +170,7 @@ def _print_hold(console: Console, hold: HoldReport) -> None:
     load = f"lifted {asked.height:g} m" if lifted else f"{asked.pull * asked.mass:g} N for {asked.duration:g} s"
     console.print(
         f"hold: {asked.mass:g} kg, friction {asked.friction:g}, torsion {asked.torsion:g} m, {load}; "
-        f"dropped from {_millimetres(asked.max_distance)} mm or {np.rad2deg(asked.max_angle):.3g}° on"
+        f"it counts as dropped from {asked.max_distance * 1e3:g} mm or {np.rad2deg(asked.max_angle):.3g}° on"
     )
     console.print(f"plan: {plain(hold.plan)}")
     if hold.closed is None or hold.squeezed is None:
@@ -181,7 +181,7 @@ def _print_hold(console: Console, hold: HoldReport) -> None:
     for direction, pulled in hold.pulls.items():
         moved = _millimetres(pulled.motion.distance), f"{np.rad2deg(pulled.motion.angle):z.2f}"
         table.add_row(direction if lifted else f"pull {direction}", "yes" if pulled.held else "no", *moved)
-    console.print(table)
+    print_table(console, table)
     if hold.touch_spread is not None:
         console.print(f"fingers touched the free object within {hold.touch_spread * 1e3:z.0f} ms")
 
@@ -195,7 +195,7 @@ def _print_steps(console: Console, steps: Sequence[NextStepReached]) -> None:
         moved = "" if step.motion is None else _millimetres(step.motion.distance)
         row = (str(number), known[step.reached], f"{np.rad2deg(error):z.3f}", touching, known[step.held], moved)
         table.add_row(*map(plain, row))
-    console.print(table)
+    print_table(console, table)
 
 
 def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
@@ -208,7 +208,7 @@ def print_entries(entries: Sequence[RecordEntry], total: int) -> None:
         seed = "" if e.seed is None else str(e.seed)
         row = (str(e.id), e.time[:19], e.hand, e.object, e.status.value, str(e.touching_fingers), seed)
         table.add_row(*map(plain, row))
-    console.print(table)
+    print_table(console, table)
 
 
 def print_batch(document: Mapping[str, Any]) -> None:
@@ -218,7 +218,7 @@ def print_batch(document: Mapping[str, Any]) -> None:
     table = table_with(f"{document['hand']} on {document['object']}: {count} poses", "status", "poses", "share")
     for name, number in {**document["status"], "certified": document["certified"]}.items():
         table.add_row(plain(name), str(number), f"{100.0 * number / max(count, 1):z.1f} %")
-    console.print(table)
+    print_table(console, table)
     rate = f", {count / seconds:z.0f} a second" if count and seconds > 0.0 else ""
     console.print(f"solved in {seconds:z.2f} s{rate}")
 
@@ -230,7 +230,7 @@ def print_weights(weights: Mapping[str, float], sentence: str) -> None:
         table = table_with("fitted weights", "criterion", "weight [-]")
         for name, weight in weights.items():
             table.add_row(plain(name), f"{weight:.4g}")
-        console.print(table)
+        print_table(console, table)
     console.print(plain(sentence))
 
 

@@ -174,9 +174,18 @@ def _painted(picture: Picture, colors: FloatArray) -> Image:
 def _dots(axes: Axes, touches: Sequence[_Touches], picture: Picture, camera: Camera) -> None:
     """Mark the visible contacts, with another mark for thumbs."""
     for of_thumb, mark in ((False, _FINGER), (True, _THUMB)):
-        points = np.concatenate([np.empty((0, 3)), *(t.point[t.of_thumb == of_thumb] for t in touches)])
-        shown = points[~picture.hides(camera, points)]
+        of_kind = [t.point[(t.of_thumb == of_thumb) & _visible(t, picture, camera)] for t in touches]
+        shown = np.concatenate([np.empty((0, 3)), *of_kind])
         axes.plot(*(0.5 * camera.project(shown)[:, :2]).T, ls="", **mark)
+
+
+def _visible(touches: _Touches, picture: Picture, camera: Camera) -> NDArray[np.bool_]:
+    """Tell which contacts a camera sees, shape (C,).
+
+    A wall may be thinner than the picture's depth is exact. So a contact must also be on a side that faces the camera.
+    """
+    faces: NDArray[np.bool_] = touches.normal @ camera.towards > 0.0
+    return faces & ~picture.hides(camera, touches.point)
 
 
 def _explain(figure: Figure, hand: Hand, obj: GraspObject, count: int) -> None:
@@ -186,7 +195,7 @@ def _explain(figure: Figure, hand: Hand, obj: GraspObject, count: int) -> None:
     grasps = f"{count} planned grasp{'' if count == 1 else 's'} touch{'es' if count == 1 else ''}"
     title = f"{hand.name} and {obj.name}: where {grasps} the object" if count else f"{obj.name}: no grasp was planned"
     style.write(figure, _GAP / width, 1.0 - 14 / height, title, fontsize=14, fontweight="bold", va="top")
-    said = "From above and from below. All views have one scale."
+    said = "From above and from below, at one scale. Each view marks the contacts on the sides that it shows."
     style.write(figure, _GAP / width, 1.0 - 42 / height, said, fontsize=10, va="top", color=style.CHOSEN)
     has_thumb = any(finger.is_thumb for finger in hand.fingers)
     handles = [Line2D([], [], ls="", label="contact of a finger", **_FINGER)]

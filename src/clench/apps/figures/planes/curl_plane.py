@@ -308,7 +308,7 @@ def _explain(
         for text in textwrap.wrap(f"none: {result.reason}", 58)[:4]:
             line(text, 16.0, fontsize=9.5)
     top -= 6.0
-    line(f"Chosen set: {set_name(scenes.candidate)}", fontsize=11, fontweight="bold", color=style.CHOSEN)
+    line(f"Chosen candidate: {set_name(scenes.candidate)}", fontsize=11, fontweight="bold", color=style.CHOSEN)
     for text in _meaning(scenes.candidate):
         line(text, 16.0, fontsize=9.5)
     _legend(figure, left)

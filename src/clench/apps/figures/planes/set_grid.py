@@ -1,4 +1,4 @@
-"""Draw a finger's alternative sets side by side: the result of every curl plane alone, and the chosen set."""
+"""Draw a finger's candidates side by side: the result of every curl plane alone, and the chosen one."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str
         if k == 0:
             _scale_bar(axes)
     more = f" ({len(shown)} of {len(alike)} shown)" if len(shown) < len(alike) else ""
-    title = f"Finger '{result.name}' of {hand} on {obj}: the sets of joint angles to choose from{more}"
+    title = f"Finger '{result.name}' of {hand} on {obj}: the candidates to choose from{more}"
     style.write(figure, _GAP / width, 1.0 - 14 / height, title, fontsize=14, fontweight="bold", va="top")
     for i, text in enumerate(_explanation(made[0], scenes[0], result, chosen)):
         below = 1.0 - (40 + 18 * i) / height
@@ -169,14 +169,14 @@ def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, 
     if len(scenes.plan.axis_groups) > 1:
         axis_group = f" Its joints form {len(scenes.plan.axis_groups)} axis groups; drawn are planes of "
         axis_group += f"{', '.join(j.name for j in scene.joints)}."
-    first = "One set per curl plane, closed as if only that plane existed"
+    first = "One candidate per curl plane, closed as if only that plane existed"
     if all(c.plane is None for c in result.candidates):
-        first = "One set, over the full width: joints about axes that are not parallel move at once, in no plane"
+        first = "One candidate, over the full width: joints about axes that are not parallel move at once, in no plane"
     elif any(c.plane is None for c in result.candidates):
         first += "; and one over the full width, which stops at touches between the planes, too"
     why = {
         True: "it stops at the first touch anywhere across the finger's width",
-        False: "it scores best among the sets",
+        False: "it scores best among the candidates",
     }[chosen.plane is None]
     second = f"Chosen: {set_name(chosen)}: {why}."
     return [f"{first}.{axis_group}", second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
