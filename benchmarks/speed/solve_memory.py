@@ -40,12 +40,14 @@ def main(hand_model: str, path: str) -> None:
     """Solve once on a small object, then on the mesh, and print what was seen."""
     hand = clench.Hand.load(hand_model)
     _solve_once(hand, clench.GraspObject.load("box:x=0.05,y=0.05,z=0.08"))
-    before = _status("VmRSS")
+    before = _status("VmRSS")["VmRSS"]
     _forget_peak()
     with np.load(path) as arrays:
         obj = clench.GraspObject.from_meshes([(arrays["vertices"], arrays["triangles"])], name="fine")
     _solve_once(hand, obj)
-    numbers = {"peak_mb": _status("VmHWM"), "before_mb": before, "held_mb": _status("VmRSS")}
+    # One read: of two, the one that comes later may be of more memory than the peak before.
+    told = _status("VmHWM", "VmRSS")
+    numbers = {"peak_mb": told["VmHWM"], "before_mb": before, "held_mb": told["VmRSS"]}
     print(json.dumps({name: number for name, number in numbers.items() if number is not None}))
 
 
@@ -60,13 +62,14 @@ def _forget_peak() -> None:
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
 
-def _status(key: str) -> float | None:
-    """Return a number that Linux tells about this process [MB]."""
+def _status(*keys: str) -> dict[str, float | None]:
+    """Return numbers that Linux tells about this process at one moment [MB]; None where it tells none."""
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     except OSError:
-        return None
-    return next((int(line.split()[1]) * 1024 / _MB for line in lines if line.startswith(f"{key}:")), None)
+        lines = []
+    told = dict(line.split(":", 1) for line in lines)
+    return {key: int(told[key].split()[0]) * 1024 / _MB if key in told else None for key in keys}
 
 
 if __name__ == "__main__":

@@ -165,8 +165,9 @@ def test_bad_options_write_nothing(
     options: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    call = ["generate", "--hands", "robonaut2", "--objects", "mug", "--count", "1", "--out", "out", *options]
-    assert main(call) == 2
+    given = {"--hands": "robonaut2", "--objects": "mug", "--count": "1", "--out": "out"}
+    rest = [word for name, value in given.items() if name not in options for word in (name, value)]
+    assert main(["generate", *rest, *options]) == 2
     error = capsys.readouterr().err
     assert said in error
     assert "Traceback" not in error
