@@ -13,11 +13,25 @@ from mug_grasp import MugGrasp, make_mug_grasp
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 
-#: Files that one worker would still be busy with while the other has nothing left to do.
+#: Files of half a minute and more, the longest first: one worker would still be busy with them while the other has
+#: nothing left to do.
 LONGEST = (
-    "test_engine.py",
+    "test_hostile_files.py",
+    "test_guides.py",
+    "test_symbols.py",
+    "test_ros2.py",
+    "test_cuda_closing.py",
+    "test_viewer_page.py",
+    "test_generating.py",
+    "test_hull_sweep.py",
     "test_examples.py",
+    "test_kernel_cache.py",
+    "test_readme.py",
+    "test_exported_files.py",
+    "test_plan_grasps.py",
+    "test_engine.py",
     "test_figures.py",
+    "test_against_oracle.py",
     "test_fuzz.py",
     "test_invariance.py",
     "test_width.py",
@@ -33,7 +47,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with what takes longest; skip, visibly, what needs the shared folder where it is absent."""
-    items.sort(key=lambda item: item.path.name not in LONGEST)
+    order = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path.name, len(order)))
     if SHARED.is_dir():
         return
     for item in items:

@@ -10,9 +10,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 #: What reading one file may take [bytes], [s].
 MEMORY = 2 << 30
@@ -29,18 +33,26 @@ class Outcome(NamedTuple):
     seconds: float
 
 
-def read_apart(files: Iterable[tuple[str, Path]]) -> list[Outcome]:
-    """Read files, each in a process of its own; `kind` is one of `READERS`."""
-    asked = [json.dumps([kind, str(path)]) for kind, path in files]
-    done = subprocess.run(
+@contextmanager
+def reading_apart() -> Iterator[Callable[[str, Path], Outcome]]:
+    """Give a function that reads a file in a process of its own; its `kind` is one of `READERS`."""
+    with subprocess.Popen(
         [sys.executable, "-m", "hostile.apart"],
         cwd=Path(__file__).parents[1],
-        input="\n".join(asked),
-        capture_output=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         text=True,
-        check=True,
-    )
-    return [Outcome(*json.loads(line)) for line in done.stdout.splitlines()]
+    ) as server:
+        asked, answers = server.stdin, server.stdout
+        assert asked is not None
+        assert answers is not None
+
+        def read(kind: str, path: Path) -> Outcome:
+            asked.write(json.dumps([kind, str(path)]) + "\n")
+            asked.flush()
+            return Outcome(*json.loads(answers.readline()))
+
+        yield read
 
 
 def hand(path: str) -> None:
@@ -160,6 +172,49 @@ _LOADERS = (thing, command, solution, trajectory, moved, grasps, calibration, ha
 READERS: dict[str, Callable[[str], None]] = {read.__name__: read for read in (*_ANSWERS, *_LOADERS)}
 
 
+@cache
+def _good_files() -> dict[str, Callable[[Path], Path]]:
+    """Return writers of files that are read without an error, by kind."""
+    from fuzz.originals import COMMAND
+
+    from .archives import good_batch
+    from .data import record, solution_with
+    from .meshes import OBJ, file
+    from .models import mjcf
+
+    def batch(folder: Path) -> Path:
+        np.savez(folder / "b.npz", **good_batch())
+        return folder / "b.npz"
+
+    def rows(folder: Path) -> Path:
+        np.save(folder / "poses.npy", np.array([[1.0, 0, 0, 0, 0, 0, -0.05]]))
+        return folder / "poses.npy"
+
+    return {
+        "hand": mjcf(),
+        "thing": file("thing.obj", OBJ),
+        "solve": file("command.json", json.dumps({"hand_pose": COMMAND["hand_pose"]})),
+        "execute": solution_with(lambda document: None),
+        "export": batch,
+        "poses": rows,
+        "record": record(),
+    }
+
+
+def _prepare(kind: str, folder: Path) -> None:
+    """Read a good file of a kind, once: what its reader imports and loads is then there in every child."""
+    place = folder / kind
+    if kind not in _good_files() or place.exists():
+        return
+    place.mkdir()
+    code = 0
+    try:
+        READERS[kind](str(_good_files()[kind](place)))
+    except SystemExit as end:
+        code = int(end.code or 0)
+    assert code in (0, 1), f"a good file for {kind!r} ended with {code}"
+
+
 def _in_child(read: Callable[[str], None], path: str, place: int) -> None:
     """Read a file under limits, and end this process with the exit code that the command line would give."""
     from clench.core.exceptions import ClenchError
@@ -221,13 +276,16 @@ def serve() -> None:
     import clench.models.objects.object_loading
 
     clench.Hand.load("patent15")
-    asked: list[Any] = [json.loads(line) for line in sys.stdin]
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # where good files are answered
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as place:
         os.chdir(folder)  # where engines leave their logs
-        for kind, path in asked:
+        for line in sys.stdin:
+            kind, path = json.loads(line)
+            _prepare(kind, Path(folder))
             outcome = _outcome(kind, path, place.fileno())
-            sys.stdout.write(json.dumps(outcome) + "\n")
-            sys.stdout.flush()
+            answers.write(json.dumps(outcome) + "\n")
+            answers.flush()
 
 
 if __name__ == "__main__":

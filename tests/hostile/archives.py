@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from .bombs import zip_bomb
 from .data import DEEP, LISTS, header, npy, saved
-from .meshes import file, link, zipped
+from .meshes import file, link
 from .models import Writer, urdf, with_file
 
 
@@ -51,16 +52,10 @@ def batch_of(make: Callable[[], bytes]) -> Writer:
 
 def unpacking(name: str, size: int = 3 << 30) -> bytes:
     """Return a batch one of whose arrays unpacks to gigabytes."""
-    out = io.BytesIO(entries(**{name: None}))
-    with (
-        zipfile.ZipFile(out, "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
-        archive.open(f"{name}.npy", "w", force_zip64=True) as entry,
-    ):
-        form = {"descr": "<f8", "fortran_order": False, "shape": (size // 56, 7)}
-        np.lib.format.write_array_header_1_0(entry, form)
-        for _ in range(size >> 20):
-            entry.write(bytes(1 << 20))
-    return out.getvalue()
+    head, form = io.BytesIO(), {"descr": "<f8", "fortran_order": False, "shape": (size // 56, 7)}
+    np.lib.format.write_array_header_1_0(head, form)
+    others = {f"{key}.npy": saved(array) for key, array in good_batch().items() if key != name}
+    return zip_bomb(f"{name}.npy", size, head.getvalue(), others)
 
 
 def claiming(name: str, size: int) -> bytes:
@@ -124,10 +119,10 @@ REFUSED: dict[str, tuple[str, Writer]] = {
     "npz object of a long name": ("export", batch(object_model="a" * 5000 + ".stl")),
     "npz hand device": ("export", batch(hand_model="/dev/zero")),
     "npz object address": ("export", batch(object_model="http://127.0.0.1:9/a.stl")),
-    "3mf that unpacks": ("thing", lambda folder: file("thing.3mf", zipped("thing.3mf", "3D/3dmodel.model"))(folder)),
-    "3mf as a stl": ("thing", file("thing.stl", zipped("thing.3mf", "3D/3dmodel.model", 1 << 20))),
+    "3mf that unpacks": ("thing", lambda folder: file("thing.3mf", zip_bomb("3D/3dmodel.model"))(folder)),
+    "3mf as a stl": ("thing", file("thing.stl", zip_bomb("3D/3dmodel.model", 1 << 20))),
     "3mf of a link": (
         "hand",
-        lambda folder: with_file(urdf("link.stl", "l.3mf"), "l.3mf", zipped("l.3mf", "3D/3dmodel.model"))(folder),
+        lambda folder: with_file(urdf("link.stl", "l.3mf"), "l.3mf", zip_bomb("3D/3dmodel.model"))(folder),
     ),
 }

@@ -19,7 +19,8 @@ import numpy as np
 
 from fuzz.originals import COMMAND
 
-from .meshes import file, link, zipped
+from .bombs import zip_bomb
+from .meshes import file, link
 from .models import Writer, endless_file
 
 DEEP = 100_000
@@ -210,7 +211,7 @@ def says_that_it_is_large(folder: Path) -> Path:
 
 def archive(folder: Path) -> Path:
     path = folder / "poses.npy"
-    path.write_bytes(zipped("poses.npy", "arr_0.npy"))
+    path.write_bytes(zip_bomb("arr_0.npy"))
     return path
 
 

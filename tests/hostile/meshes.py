@@ -1,15 +1,14 @@
 """Mesh files that were made to do harm, by name: each writes its files into a folder and returns the one to load."""
 
 import base64
-import io
 import json
 import struct
-import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from .bombs import zip_bomb
 from .models import Writer, endless_file, png
 
 GLB_JSON, GLB_BIN = 0x4E4F534A, 0x004E4942
@@ -149,18 +148,6 @@ def draco(tree: dict[str, Any]) -> None:
     }
 
 
-def zipped(name: str, inside: str, size: int = 3 << 30) -> bytes:
-    """Return an archive that unpacks to gigabytes."""
-    out = io.BytesIO()
-    with (
-        zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open(inside, "w", force_zip64=True) as entry,
-    ):
-        for _ in range(size >> 20):
-            entry.write(bytes(1 << 20))
-    return out.getvalue()
-
-
 def ply(header: str, body: bytes = bytes(64)) -> Writer:
     return file("thing.ply", header.encode() + b"end_header\n" + body)
 
@@ -225,7 +212,7 @@ REFUSED: dict[str, Writer] = {
     "gltf elsewhere": file(
         "thing.gltf", '{"asset": {"version": "2.0"}, "buffers": [{"uri": "../../../etc/passwd", "byteLength": 64}]}'
     ),
-    "glb zipped": file("thing.glb", zipped("thing.glb", "a.stl", 1 << 20)),
+    "glb zipped": file("thing.glb", zip_bomb("a.stl", 1 << 20)),
 }
 
 #: What has a harmless part that clench reads: it is loaded, and nothing else is touched.

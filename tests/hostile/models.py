@@ -8,6 +8,8 @@ from pathlib import Path
 
 from fuzz.originals import MJCF, URDF, link_stl
 
+from .bombs import packed_zeros
+
 Writer = Callable[[Path], Path]
 
 
@@ -117,9 +119,10 @@ def endless_mesh(folder: Path) -> Path:
 
 def many_large_meshes(folder: Path) -> Path:
     faces = 150_000
-    data = bytes(80) + struct.pack("<I", faces) + bytes(50 * faces)
     for i in range(120):
-        (folder / f"{i}.stl").write_bytes(data)
+        with (folder / f"{i}.stl").open("wb") as mesh:
+            mesh.write(bytes(80) + struct.pack("<I", faces))
+            mesh.truncate(84 + 50 * faces)
     return written(
         folder, MJCF.replace("</asset>", "".join(f'<mesh file="{i}.stl"/>' for i in range(120)) + "</asset>")
     )
@@ -172,9 +175,9 @@ def long_chain(folder: Path) -> Path:
 
 def picture_that_unpacks(folder: Path) -> Path:
     """Write a small picture whose packed data are a gigabyte."""
-    packer = zlib.compressobj(9)
-    data = b"".join(packer.compress(bytes(1 << 20)) for _ in range(1024)) + packer.flush()
-    (folder / "t.png").write_bytes(png(64, 64, data))
+    size = 1 << 30
+    checksum = struct.pack(">I", size % 65_521 << 16 | 1)  # Adler-32 of so many zeros
+    (folder / "t.png").write_bytes(png(64, 64, packed_zeros(size, zlib.MAX_WBITS)[:-4] + checksum))
     return mjcf(head=TEXTURE)(folder)
 
 

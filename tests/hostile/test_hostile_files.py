@@ -3,7 +3,7 @@
 import pytest
 
 from . import archives, data, meshes, models
-from .apart import Outcome, read_apart
+from .apart import Outcome, reading_apart
 
 SOURCES = {
     "models": {name: ("hand", write) for name, write in models.REFUSED.items()},
@@ -19,19 +19,19 @@ SOURCES = {
 
 
 @pytest.fixture(scope="module")
-def outcomes(tmp_path_factory):
-    """Return what comes of every file, by source and name; the files of a source are read when one is asked for."""
-    found: dict[str, dict[str, Outcome]] = {}
+def server():
+    """Give what reads a file in a process of its own."""
+    with reading_apart() as read:
+        yield read
+
+
+@pytest.fixture
+def outcome_of(server, tmp_path):
+    """Return a function that writes a file, and returns what comes of it."""
 
     def of(source: str, name: str) -> Outcome:
-        if source not in found:
-            folder = tmp_path_factory.mktemp(source)
-            files = []
-            for number, (kind, write) in enumerate(SOURCES[source].values()):
-                (folder / str(number)).mkdir()
-                files.append((kind, write(folder / str(number))))
-            found[source] = dict(zip(SOURCES[source], read_apart(files), strict=True))
-        return found[source][name]
+        kind, write = SOURCES[source][name]
+        return server(kind, write(tmp_path))
 
     return of
 
@@ -40,8 +40,8 @@ REFUSED = [(source, name) for source in ("models", "meshes", "data", "archives")
 
 
 @pytest.mark.parametrize(("source", "name"), REFUSED, ids=[" ".join(pair) for pair in REFUSED])
-def test_refused_with_one_sentence(outcomes, source, name):
-    outcome = outcomes(source, name)
+def test_refused_with_one_sentence(outcome_of, source, name):
+    outcome = outcome_of(source, name)
     assert outcome.code == 2, outcome
     sentences = [line for line in outcome.text.splitlines() if line.startswith("clench: error: ")]
     assert len(sentences) == 1, outcome
@@ -51,8 +51,8 @@ def test_refused_with_one_sentence(outcomes, source, name):
 
 
 @pytest.mark.parametrize("name", SOURCES["harmless"])
-def test_read_without_harm(outcomes, name):
-    outcome = outcomes("harmless", name)
+def test_read_without_harm(outcome_of, name):
+    outcome = outcome_of("harmless", name)
     assert outcome.code in (0, 1, 2), outcome
     for sign in ("Traceback", "internal error", "root:", "Error:"):
         assert sign not in outcome.text.replace("clench: error:", ""), outcome

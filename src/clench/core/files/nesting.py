@@ -9,10 +9,10 @@ from .file_limits import DOCUMENT_DEPTH
 TOO_DEEP = f"it has more than {DOCUMENT_DEPTH} lists and objects inside each other"
 
 
-def is_too_deep(value: Any, most: int = DOCUMENT_DEPTH) -> bool:
-    """Return whether plain values have more than so many lists and dictionaries inside each other."""
+def is_too_deep(value: Any) -> bool:
+    """Return whether plain values have more than `DOCUMENT_DEPTH` lists and dictionaries inside each other."""
     level = [value] if isinstance(value, dict | list) else []
-    for _ in range(most):
+    for _ in range(DOCUMENT_DEPTH):
         level = [
             item
             for holder in level

@@ -21,8 +21,6 @@ from clench.solver.analysis.squeezing import SqueezePlan
 
 from .columns import COLUMNS
 
-#: Stages at which a grasp fails after it was closed.
-STAGES: Final = ("squeeze", "path", "hold")
 _STAGE_OF: Final = {Rejection.NO_SQUEEZE: "squeeze", Rejection.NO_WAY: "path"}
 #: The strict limits of the hold test: distance [m], angle [rad].
 STRICT: Final = (0.005, float(np.deg2rad(5.0)))

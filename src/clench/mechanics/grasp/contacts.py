@@ -215,13 +215,13 @@ def edge_directions(count: int, turned: float = 0.0) -> FloatArray:
     return directions
 
 
-def pair_friction(hand: Hand, link: int, body: Body, default: float = FRICTION) -> float:
-    """Return the friction of a link on a body [-]: the smaller of theirs, else the known one, else the default.
+def pair_friction(hand: Hand, link: int, body: Body) -> float:
+    """Return the friction of a link on a body [-]: the smaller of theirs, else the known one, else `FRICTION`.
 
     No pair grips better than its more slippery side; an unknown side is taken to be as good as the known one.
     """
     known = [mu for mu in (hand.links[link].friction, body.friction) if mu is not None]
-    return min(known, default=default)
+    return min(known, default=FRICTION)
 
 
 def check_friction(friction: ArrayLike, key: str = "friction") -> None:

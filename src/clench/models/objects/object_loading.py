@@ -133,9 +133,9 @@ def object_from_meshes(
     return GraspObject(name, tuple(bodies), Pose.identity() if pose is None else pose, source, tuple(warnings))
 
 
-def shape_body(shape: Shape, role: BodyRole = BodyRole.GRASPABLE) -> Body:
+def shape_body(shape: Shape) -> Body:
     """Return a body of one primitive, named as the shape."""
-    return Body(shape.name or str(shape.kind), (shape,), role)
+    return Body(shape.name or str(shape.kind), (shape,), BodyRole.GRASPABLE)
 
 
 def scaled_body(body: Body, factor: float) -> Body:
@@ -207,7 +207,7 @@ def _checked_shape(shape: Shape, name: str, role: BodyRole) -> tuple[Body, tuple
     count = shape.kind.lengths
     if not all(math.isfinite(v) for v in shape.size) or not all(v > 0 for v in shape.size[:count]):
         raise ObjectError(f"{name}: a {shape.kind} needs {count} finite half sizes above 0 m, got {shape.size}.")
-    return Body(name, (shape,), role), ()
+    return Body(name, (shape,), BodyRole.GRASPABLE), ()
 
 
 def _part(given: MeshPart | tuple[Any, ...], where: str) -> MeshPart:

@@ -84,11 +84,11 @@ def write(target: Any, x: float, y: float, text: str, **options: Any) -> Any:
     return label
 
 
-def halo(width: float = 3.0) -> list[Any]:
+def halo() -> list[Any]:
     """Return the effect that keeps text readable on top of lines."""
     from matplotlib.patheffects import withStroke
 
-    return [withStroke(linewidth=width, foreground=PAPER)]
+    return [withStroke(linewidth=3.0, foreground=PAPER)]
 
 
 def number_label(target: Any, place: tuple[float, float], numbers: list[int]) -> None:

@@ -15,7 +15,7 @@ from clench.solver.solution import Candidate, FingerResult
 
 from .finger_scenes import FingerScenes
 from .loops import Loop
-from .plane_scene import JointMotion, LinkSection, PlaneContact, PlaneScene, bounds
+from .plane_scene import JointMotion, PlaneContact, PlaneScene, bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -109,7 +109,7 @@ def draw_plane(axes: Axes, scene: PlaneScene, *, small: bool = False) -> None:
         _body(axes, link.loops, style.mixed(color, style.PAPER, 0.93), style.mixed(color, style.PAPER, 0.5), 1.0, 4.0)
     if not small:
         for joint in scene.joints:
-            _motion(axes, joint, scene.closed_links)
+            _motion(axes, joint)
     for link in scene.closed_links:
         color = style.joint_color(link.joint)
         _body(axes, link.loops, style.mixed(color, style.PAPER, 0.55), color, 1.2 if small else 2.2, 6.0)
@@ -147,16 +147,12 @@ def _fill(axes: Axes, loops: Iterable[Loop], color: str, order: float) -> None:
         axes.add_artist(PathPatch(path, facecolor=color, edgecolor="none", zorder=order))
 
 
-def _stroke(axes: Axes, loops: Iterable[Loop], color: str, width: float, order: float, dashes: str = "-") -> None:
+def _stroke(axes: Axes, loops: Iterable[Loop], color: str, width: float, order: float) -> None:
     from matplotlib.patches import PathPatch
 
     path = _path(loops)
     if path is not None:
-        axes.add_artist(
-            PathPatch(
-                path, fill=False, edgecolor=color, linewidth=width, linestyle=dashes, zorder=order, joinstyle="round"
-            )
-        )
+        axes.add_artist(PathPatch(path, fill=False, edgecolor=color, linewidth=width, zorder=order, joinstyle="round"))
 
 
 def _body(axes: Axes, loops: Sequence[Loop], fill: str, edge: str, width: float, order: float) -> None:
@@ -166,7 +162,7 @@ def _body(axes: Axes, loops: Sequence[Loop], fill: str, edge: str, width: float,
         _fill(axes, [loop], fill, order + 0.5)
 
 
-def _motion(axes: Axes, joint: JointMotion, links: Sequence[LinkSection]) -> None:
+def _motion(axes: Axes, joint: JointMotion) -> None:
     """Draw a joint's range of motion as an arc from open to limit, and the used part as a wedge."""
     from matplotlib.patches import Wedge
 

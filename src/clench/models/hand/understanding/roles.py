@@ -194,7 +194,7 @@ def _apply(plan: FingerPlan, joints: list[Joint], findings: list[Finding]) -> No
             joints[j], direction=direction, direction_reason=reason, open_value=value, open_reason=where
         )
     if against:
-        findings.append(_contradiction(plan, joints, against))
+        findings.append(_contradiction(joints, against))
 
 
 def _open_value(plan: FingerPlan, n: int, joint: Joint, direction: int) -> tuple[float, str]:
@@ -208,7 +208,7 @@ def _open_value(plan: FingerPlan, n: int, joint: Joint, direction: int) -> tuple
     return value, f"limit nearest to straight: {where}"
 
 
-def _contradiction(plan: FingerPlan, joints: list[Joint], against: list[int]) -> Finding:
+def _contradiction(joints: list[Joint], against: list[int]) -> Finding:
     names = tuple(joints[j].name for j in against)
     left = [(joints[j].upper if joints[j].direction > 0 else joints[j].lower) - joints[j].open_value for j in against]
     degrees = ", ".join(f"{abs(np.rad2deg(angle)):.0f} deg" for angle in left)
