@@ -115,6 +115,19 @@ def test_a_damaged_file_of_machine_code_is_written_anew(folder: Path) -> None:
         assert large.stat().st_size == whole
 
 
+@pytest.mark.parametrize("name", ["large", "caller"])
+def test_machine_code_with_a_wrong_bit_is_compiled_anew(folder: Path, name: str) -> None:
+    call(folder, "apart")
+    for path in data_files(folder, name):
+        whole = bytearray(path.read_bytes())
+        start = whole.index(b"\x7fELF") if b"\x7fELF" in whole else len(whole) // 3
+        for place in range(start + 100, start + 400, 60):
+            damaged = whole.copy()
+            damaged[place] ^= 4
+            path.write_bytes(damaged)
+            assert call(folder, "apart").startswith("7.5 ")
+
+
 def test_a_change_of_the_source_changes_the_symbols(folder: Path) -> None:
     call(folder, "apart")
     (folder / "some_kernels.py").write_text(MODULE.format(offset="10.5"))

@@ -17,6 +17,7 @@ import pickle
 import sys
 from functools import cached_property
 from typing import Any, Final, NamedTuple
+from zlib import crc32
 
 import numba
 from llvmlite import binding
@@ -41,18 +42,20 @@ class MachineCode(NamedTuple):
     """Machine code, and what it needs to run.
 
     Args:
-        content: an object file. needed: kernels that it calls by their symbols.
+        content: an object file. checksum: of the content, since the processor would run whatever a bad disk returns.
+        needed: kernels that it calls by their symbols.
         environments: name, module and constants of each function in it. initializers: functions to call before.
     """
 
     content: bytes
+    checksum: int
     needed: tuple[Needed, ...]
     environments: tuple[tuple[str, str, list[Any]], ...]
     initializers: tuple[Any, ...]
 
     def run(self, context: Any) -> bool:
-        """Put it into the engine that holds all machine code; return whether the kernels that it calls are there."""
-        if not bring(self.needed):
+        """Put it into the engine that holds all machine code; return whether it is whole, with all that it calls."""
+        if crc32(self.content) != self.checksum or not bring(self.needed):
             return False
         if not _POINTED_TO:
             _name_memory_functions()
@@ -176,7 +179,7 @@ class KernelCache(FunctionCache):
             e.env_name: (e.env_name, e.globals.get("__name__", ""), list(e.consts)) for e in (environment, *referenced)
         }
         environments = tuple(pointed_to.values())
-        code = MachineCode(content, needed_by(data.library), environments, tuple(initializers or ()))
+        code = MachineCode(content, crc32(content), needed_by(data.library), environments, tuple(initializers or ()))
         parts = (name, bitcode, described, pointed_to[environment.env_name], *more)
         key = self._index_key(sig, data.codegen)
         if not apart:
