@@ -46,6 +46,10 @@ CALLS: list[tuple[Callable[..., Any], tuple[str, ...], dict[str, Any]]] = [
     (clench.check_hand, ("hand",), {}),
     (clench.SimulatedHand, ("hand", "obj"), {}),
     (clench.HardwareHand, ("hand",), {"driver": None}),
+    (clench.plan_grasps, ("hand", "obj"), {"count": 1}),
+    (clench.stable_poses, ("obj",), {}),
+    (clench.draw_solution, ("hand", "obj", "command", "solution"), {"directory": "none"}),
+    (clench.write_page, ("hand", "obj"), {"path": "none.html", "shown": None}),
 ]
 WRONG = ["mug", (0.0, 0.0, 0.1), np.zeros(7), {"hand_pose": {"position": [0, 0, 0]}}, 3]
 
@@ -68,6 +72,20 @@ def test_each_argument_of_another_type_is_named(
         with pytest.raises(clench.CommandError, match=rf"^{wrong}: expected a clench\.\w+.*{MAKERS[wrong]}") as error:
             function(**{**right, wrong: value}, **others)
         assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("wrong", ["x", (0.0, 0.0, 0.1), 3])
+def test_surroundings_of_another_type_are_named(wrong: object) -> None:
+    ball = clench.GraspObject.load("ball")
+    with pytest.raises(clench.CommandError, match=r"^body: expected a clench\.Body, got .*; clench\.obstacle\("):
+        ball.with_body(wrong)
+    with pytest.raises(clench.CommandError, match=r"^other: expected a clench\.GraspObject, got"):
+        ball.with_object(wrong)
+    with pytest.raises(clench.CommandError, match=r"^pose: expected a clench\.Pose, got"):
+        clench.obstacle("sphere:r=0.01", wrong)
+    if wrong != 3:
+        with pytest.raises(clench.ObjectError, match=r"^table: expected a finite height"):
+            clench.table(wrong)
 
 
 @pytest.mark.parametrize("wrong", ["x", (0.0, 0.0, 0.1), np.eye(4), None])
@@ -115,3 +133,10 @@ def test_a_pose_is_a_command_that_asks_for_nothing_else(inputs: dict[str, Any]) 
     assert np.array_equal(*tracked)
     errors = [clench.pose_error(hand, obj, asked).to_dict() for asked in (pose, command)]
     assert errors[0] == errors[1]
+
+
+@pytest.mark.parametrize("wrong", [None, "mug", 3, [3]])
+def test_a_page_takes_grasps_alone(inputs: dict[str, Any], wrong: Any, tmp_path: Path) -> None:
+    with pytest.raises(clench.CommandError, match=r"^shown: expected solutions, a plan or a planned grasp, got \w+\.$"):
+        clench.write_page(tmp_path / "page.html", inputs["hand"], inputs["obj"], wrong)
+    assert not list(tmp_path.iterdir())

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 import clench
+from clench.core.argument_types import check_type
 from clench.core.exceptions import CommandError, MotionError
 from clench.core.files.json_files import check_writable, write_atomically
 from clench.core.pose import FloatArray
@@ -68,7 +69,7 @@ def write_page(
     certificate, the contacts and the numbers of every grasp.
 
     Args:
-        path: the file, usually .html. hand, obj: what was solved.
+        path: the file, usually .html. hand, obj: the solved models.
         shown: a solution, several of the same hand and object, a plan, or one of its grasps.
         trajectory: of a single solution; without one, a path is planned in engine geometry. In other geometry, the
             joints go straight to the touch.
@@ -92,17 +93,13 @@ def page_html(
     trajectory: Trajectory | None = None,
 ) -> str:
     """Return the page that `write_page` writes."""
-    from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+    from clench.planner.grasp_plan import GraspPlan
 
-    if isinstance(shown, GraspSolution):
-        entries: list[GraspSolution | PlannedGrasp] = [shown]
-    elif isinstance(shown, PlannedGrasp):
-        entries = [shown]
-    else:
-        entries = list(shown)
-    if not entries:
-        why = f" {shown.text}" if isinstance(shown, GraspPlan) else ""
-        raise CommandError(f"page: expected at least one grasp to show.{why}")
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
+    entries = _entries(shown)
     first = entries[0] if isinstance(entries[0], GraspSolution) else entries[0].solution
     solids = [
         *hand_solids(hand, first.collision_source, _DEVIATION, _MOST_TRIANGLES),
@@ -115,6 +112,28 @@ def page_html(
     if isinstance(shown, GraspPlan):
         heading = f"<p>{text(shown.text)}</p>"
     return _page(title, solids, made, heading)
+
+
+def _entries(
+    shown: GraspSolution | GraspPlan | PlannedGrasp | Sequence[GraspSolution],
+) -> list[GraspSolution | PlannedGrasp]:
+    """Return the grasps of a page as a list.
+
+    Raises:
+        CommandError: there is none, or `shown` is something else.
+    """
+    from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
+
+    if isinstance(shown, GraspSolution | PlannedGrasp):
+        return [shown]
+    entries = list(shown) if isinstance(shown, GraspPlan | Sequence) and not isinstance(shown, str) else [shown]
+    wrong = [entry for entry in entries if not isinstance(entry, GraspSolution | PlannedGrasp)]
+    if wrong:
+        raise CommandError(f"shown: expected solutions, a plan or a planned grasp, got {type(wrong[0]).__name__}.")
+    if not entries:
+        why = f" {shown.text}" if isinstance(shown, GraspPlan) else ""
+        raise CommandError(f"page: expected at least one grasp to show.{why}")
+    return entries
 
 
 def hand_page_html(hand: Hand) -> str:
@@ -141,7 +160,7 @@ def _shown(
     trajectory: Trajectory | None,
     frames: int,
 ) -> Shown:
-    """Return what a page shows of a solution or of a planned grasp."""
+    """Return the contents of a page for a solution or a planned grasp."""
     planned = None if isinstance(entry, GraspSolution) else entry
     solution = entry if planned is None else planned.solution
     assert isinstance(solution, GraspSolution)
