@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from clench.kernels.geometry import box_walk
-from clench.kernels.hulls import body_sweep, hull_sweep, near_elements
+from clench.kernels.hulls import body_sweep, hull_sweep, hull_window, listed_sweep, near_elements
 from clench.kernels.toi import toi_bounds, toi_pairs
 from clench.kernels.toi.core_motion import CorePair, MovingCore
 from clench.kernels.toi.toi_work import BodyPair
@@ -61,4 +61,28 @@ def _of_bodies(kernel: Any) -> Callable[..., Any]:
 
 sweep_body = _of_bodies(body_sweep.sweep_body)
 clear_travel = _of_bodies(hull_sweep.clear_travel)
-list_near = _of_bodies(near_elements.list_near)
+_list_near = _of_bodies(near_elements.list_near)
+
+
+def list_near(moving, m, resting, r, chain, count, touch, end, work):
+    """List the elements that a body comes near to, from no plane on."""
+    _call(hull_window.forget_planes, work.hull)
+    return _list_near(moving, m, resting, r, chain, count, touch, end, work)
+
+
+def list_pairs(moving, m, resting, r, chain, count, touch, end, listed, work):
+    """List the pairs of elements that may meet."""
+    pair = BodyPair(moving, m, resting, r, chain, count, touch)
+    found = _call(listed_sweep.list_pairs, pair, end, listed, work)
+    return work.stack[::-1][: max(found, 0), :2], found
+
+
+def sweep_listed(moving, m, resting, r, chain, count, touch, best, listed, work):
+    """Sweep listed elements."""
+    return _call(listed_sweep.sweep_listed, BodyPair(moving, m, resting, r, chain, count, touch), best, listed, work)
+
+
+def shorten(moving, resting, chain, motion, n, start, top, end, work):
+    """Shorten a window that begins at 0, in which a plane does not keep a hull off."""
+    pair = BodyPair(moving, 0, resting, 0, chain, len(chain), 0.0)
+    return _call(hull_sweep.shorten, pair, motion, n, start, top, 0.0, end, work)

@@ -37,7 +37,7 @@ def test_a_direction_parts_two_hulls_that_are_apart(seed, kinds, away):
     apart = distance(moved, clouds[1])
     for other, corners in ((0, np.empty((0, 3))), (-1, np.ascontiguousarray(clouds[1]))):
         n = np.append(rng.normal(size=3), 0.0)
-        parted = separating_direction(hulls, 0, T, others, other, corners, GOOD, 0.0, np.empty((5, 4)), n)
+        parted = separating_direction(hulls, 0, T, others, other, corners, GOOD, np.empty((5, 4)), n)
         gap = (moved @ n[:3]).min() - (clouds[1] @ n[:3]).max()
         assert np.linalg.norm(n[:3]) == pytest.approx(1.0)
         assert gap <= apart + 1e-6

@@ -8,16 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.geometry.bodies import Elements, no_body, pack_bodies
-from clench.kernels.hulls import hull_motion, near_elements
+from clench.kernels.hulls import hull_motion, hull_sweep, hull_window, near_elements
 from clench.kernels.hulls.enclosing_hulls import pack_hulls
+from clench.kernels.hulls.hull_window import BOX
 from clench.kernels.toi import core_motion
 from clench.kernels.toi import toi_work as sweeping
 from kernels.kernel_entries import entry
-from kernels.plain_sweeps import clear_travel, list_near, sweep_body, sweep_pair
+from kernels.plain_sweeps import clear_travel, list_near, shorten, sweep_body, sweep_pair
 from kernels.toi.test_toi_bodies import KINDS, TOUCH, cores, drawn_chain, patch, pose
 
 make_sweep_work, list_touching = entry(sweeping.make_sweep_work), entry(near_elements.list_touching)
 lowest_between, move_core = entry(hull_motion.lowest_between), entry(core_motion.move_core)
+way_to_box, is_far = entry(hull_window.way_to_box), entry(hull_sweep.is_far)
+motion_of_hull, put_pose = entry(hull_motion.motion_of_hull), entry(hull_motion.put_pose)
+height, least_height = entry(hull_motion.height), entry(hull_window.least_height)
 
 
 def two_parts(rng, kind):
@@ -144,3 +148,52 @@ def test_no_path_between_two_heights_sags_lower_than_told(start, end, sag, share
     assert low <= path.min() + 1e-12
     if share == 1.0:
         assert low == pytest.approx(path.min(), abs=1e-5)
+
+
+def test_way_to_a_box_leads_to_its_nearest_point():
+    for seed in range(50):
+        rng, window = np.random.default_rng(seed), np.zeros((56, 6))
+        box = pose(rng, rng.normal(size=3))
+        half, middle = rng.uniform(0.01, 1.0, 3), rng.normal(size=3) * 2.0
+        window[BOX : BOX + 3, :4], window[BOX : BOX + 3, 4] = box, half
+        inside = np.clip(box[:, :3].T @ (middle - box[:, 3]), -half, half)
+        way = box[:, :3] @ inside + box[:, 3] - middle
+        n = way_to_box(middle, window)
+        assert np.linalg.norm(n) == pytest.approx(1.0)
+        if np.linalg.norm(way) > 1e-9:
+            np.testing.assert_allclose(n, way / np.linalg.norm(way), atol=1e-9)
+
+
+def test_a_part_that_is_far_is_never_met():
+    near = 0
+    for seed in range(200):
+        rng, window = np.random.default_rng(seed), np.zeros((56, 6))
+        ours, theirs = pose(rng, 0.4 * rng.normal(size=3)), pose(rng, 0.4 * rng.normal(size=3))
+        half, other, speed = rng.uniform(0.01, 0.5, 3), rng.uniform(0.01, 0.5, 3), rng.uniform(0.0, 1.0)
+        window[BOX : BOX + 3, :4], window[BOX : BOX + 3, 4] = ours, half
+        box = np.column_stack([theirs, other])
+        motion = hull_motion.HullMotion(0, 0.01, speed, 0.0, 0.0, 0.0, 0.0)
+        one = ours[:, :3] @ (half[:, None] * rng.uniform(-1, 1, (3, 200))) + ours[:, 3:]
+        two = theirs[:, :3] @ (other[:, None] * rng.uniform(-1, 1, (3, 200))) + theirs[:, 3:]
+        apart = np.linalg.norm(one[:, :, None] - two[:, None, :], axis=0).min() - 0.01 - 0.002
+        if apart <= 0.5 * speed:
+            assert not is_far(box, motion, 0.002, 0.5, window)
+            near += 1
+    assert 20 < near < 180
+
+
+@pytest.mark.parametrize("gap", [3.0, 8.1, 8.2])
+def test_a_window_never_ends_later_than_it_was_looked_at(gap):
+    """Over more than a turn, the bound on the height falls below what no point can reach at its highest speed."""
+    moving, chain = pack_bodies([two_parts(np.random.default_rng(0), "soup")]), np.array([[8.0, 0.0, 0.0]])
+    work = make_sweep_work(2, 0)
+    work.moving[:], work.resting[:] = np.eye(3, 4), np.eye(3, 4)
+    motion = motion_of_hull(moving, 0, chain, 1, work)
+    n, size = (0.0, 0.0, 1.0), motion.speed / 8.0
+    for rows, s in (((0, 3), 0.0), ((3, 6), 1.0)):
+        put_pose(chain, 1, s, work, work.hull[rows[0] : rows[1]])
+    start = height(moving.hulls, motion, work.hull[:3], n)
+    top = start - gap * size
+    assert least_height(moving.hulls, motion, n, start, 1.0, work.hull) <= top
+    found = shorten(moving, moving, chain, motion, n, start, top, 1.0, work)
+    assert (found == 1.0) if gap > 8.0 else (gap / 8.0 <= found < 1.0)

@@ -11,7 +11,7 @@ from clench.core.tolerances import SWEEP_FRACTION, TOUCH_FRACTION
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.advance import advance
 from clench.kernels.sections.later_planes import enter_axis_group, is_held
-from clench.kernels.sections.plane_contact import describe_contact, settle_contact
+from clench.kernels.sections.plane_contact import describe_contact
 from clench.kernels.sections.plane_pose import copy_pose, pose_axis_groups
 from clench.kernels.toi.full_width import FullWidthArrays, describe_pair, last_mover, pose_movers
 from clench.kernels.toi.toi_links import Stage, sweep_stage
@@ -19,7 +19,6 @@ from clench.kernels.toi.toi_work import SweepWork
 
 from .layout import (
     CONTACT_DOF,
-    CONTACT_GAP,
     CONTACT_JOINT,
     SUNK,
     CandidateArrays,
@@ -41,8 +40,7 @@ def close_dof(closing: Closing, sections: SectionArrays, base: int, axis_group: 
     """Move one degree of freedom, or all at once, until a contact or a limit holds every joint.
 
     The travel at which a follower starts or stops moving (its own limit) splits the motion into path segments. On each
-    of them the planes of the candidate, if it has any, give a first bound, and the full-width sweep, where requested,
-    what comes before it.
+    of them the full-width sweep, where requested, or else the plane of the candidate gives the first contact.
 
     Args:
         sections, base: whose row `plane - base` belongs to `plane`. axis_group: of the planes. dof: or `ALL`.
@@ -68,17 +66,19 @@ def close_dof(closing: Closing, sections: SectionArrays, base: int, axis_group: 
         for j in range(joints[0], joints[1]):
             fastest += abs(rates[j])
         reach = end + TOUCH_FRACTION / max(fastest, 1.0)
-        moved, plane = advance(hand, axis_group, sections, base, planes, closing.obj.closed, turns, rates, reach, work)
-        met = -1
+        plane, met = -1, -1
         if full_width.requested[i]:
             axis_groups = answer.pose[i]
             pose_axis_groups(hand, finger_posture, turns, work, axis_groups)
             touch = SWEEP_FRACTION * hand.axis_group_length[axis_group]
             stage = Stage(full_width, chain, finger_posture, axis_groups, T_palm_object, turns, rates, touch)
-            moved, met = sweep_stage(stage, moved, work, sweep)
+            moved, met = sweep_stage(stage, reach, work, sweep)
             if moved < 0.0:
                 answer.overlap[i] = sweep.winner[2]
                 return False
+        else:
+            closed = closing.obj.closed
+            moved, plane = advance(hand, axis_group, sections, base, planes, closed, turns, rates, reach, work)
         moved = min(moved, end)
         for j in range(joints[0], joints[1]):
             turns[j] += rates[j] * moved
@@ -133,10 +133,7 @@ def stops_same(chain: ChainArrays, contact: Ints, dof: int, joint: int) -> bool:
 def write_contact(
     closing: Closing, sections: SectionArrays, base: int, joint: int, plane: int, met: int, i: int
 ) -> None:
-    """Write a contact that stops a degree of freedom up to `joint`; in a further round it replaces the earlier one.
-
-    If a contact on a plane and one of the full width are the same, the plane describes it, because it has more data.
-    """
+    """Write a contact that stops a degree of freedom up to `joint`; in a further round it replaces the earlier one."""
     hand, answer, work, finger_posture = (
         closing.hand,
         closing.answer,
@@ -154,12 +151,7 @@ def write_contact(
     answer.contacts[i] = max(answer.contacts[i], n + 1)
     if plane >= 0:
         describe_contact(hand, sections, base, axis_group, plane, dof, answer.turn[i], work, contact, point)
-        if met < 0:
-            return
-        start = hand.first_axis_group[finger_posture]
-        settle_contact(hand, start, sections, sections, answer.turn[i], contact, point, work)
-        if abs(point[CONTACT_GAP]) <= 2.0 * TOUCH_FRACTION * hand.axis_group_length[axis_group]:
-            return
+        return
     full_width, sweep = closing.full_width, closing.sweep
     pose_movers(full_width, hand.chain, finger_posture, answer.turn[i], sweep.poses)
     describe_pair(full_width, closing.T_palm_object, met, dof, axis_group, sweep, contact, point)

@@ -54,7 +54,7 @@ class Job(NamedTuple):
     tree: MeshTree
     rounds: RoundArrays
     closed: bool
-    crossing: bool
+    only_planes: bool
     times: int
     together: bool
     T_palm_object: Floats
@@ -90,7 +90,7 @@ def close_on_device(problem: ProblemArrays, T_palm_objects: Floats, arena: Arena
             tree=target.tree,
             rounds=target.rounds,
             closed=bool(target.closed),
-            crossing=bool(command.crossing),
+            only_planes=not command.full_width,
             times=command.times,
             together=bool(command.together),
             T_palm_object=T_palm_objects,
@@ -218,6 +218,7 @@ def _sweep_at(s: SweepWork, n: int) -> SweepWork:
         s.turned[n],
         s.level[n],
         s.hull[n],
+        s.round[n],
         s.near[n],
         s.listed[n],
         s.pair[n],
@@ -239,7 +240,7 @@ def _cut(job: Job) -> None:
     for finger_posture in range(job.crossed.shape[1]):
         job.crossed[n, finger_posture] = -1
     job.overflow[n] = wanted
-    if planar and job.crossing and wanted == 0:
+    if planar and job.only_planes and wanted == 0:
         obj = ObjectArrays(job.tree, job.rounds, job.closed, job.full_width.object)
         look_for_overlaps(job.hand, obj, T, shared, job.crossed[n], work)
 

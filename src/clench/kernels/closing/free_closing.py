@@ -35,7 +35,7 @@ def close_free(
         overflow = cut_first_axis_groups(hand, target.tree, target.rounds, T_palm_object, shared, space.work.pose)
         if overflow > 0:
             return int(overflow)
-        if command.crossing:
+        if not command.full_width:
             look_for_overlaps(hand, target, T_palm_object, shared, crossed, space.work)
     for i in range(candidates.finger_posture.shape[0]):
         clear_answer(answer, i)
@@ -73,6 +73,7 @@ def find_blocked(
                 command.own[finger_posture],
                 command.resting[finger_posture],
                 problem.mesh,
+                problem.target.bodies,
                 T_palm_object,
                 command.full_width,
                 space.depth,

@@ -208,11 +208,11 @@ def no_rounds() -> RoundArrays:
 
 
 class CandidateArrays(NamedTuple):
-    """List the candidates: one plane of a finger posture, or all of its planes (the full width).
+    """List the candidates: one plane of a finger posture, or its full width.
 
     Args:
         finger_posture: (I,). low, high: range of planes, counted from the first plane of each axis group of the finger
-            posture, (I,).
+            posture, (I,): one plane, or none for the full width.
         until: place in the motion from which each joint is held from outside, infinite without one, (I, J).
     """
 

@@ -26,7 +26,6 @@ from .layout import (
     CONTACT_WHICH,
     ChainArrays,
     Floats,
-    HandArrays,
     Ints,
 )
 from .solve_layout import Closing
@@ -44,22 +43,10 @@ def settle(closing: Closing, i: int) -> None:
     touch = TOUCH_FRACTION * hand.axis_group_length[start]
     for n in range(answer.contacts[i]):
         contact, point = answer.contact[i, n], answer.point[i, n]
-        axis_group = contact[CONTACT_AXIS_GROUP]
         if contact[CONTACT_PLANE] < 0:
             settle_pair(full_width, hand.chain, finger_posture, turns, T_palm_object, contact, point, touch, sweep)
             continue
         settle_contact(hand, start, closing.shared, closing.own, turns, contact, point, work)
-        if full_width.requested[i] and later_turned(hand, finger_posture, axis_group, turns):
-            settle_carried(full_width, hand, finger_posture, turns, T_palm_object, contact, point, sweep)
-
-
-@kernel
-def later_turned(hand: HandArrays, finger_posture: int, axis_group: int, turns: Floats) -> bool:
-    """Say whether joints of later axis groups have turned: the contact's plane does not tell where it is by now."""
-    for j in range(turns.shape[0]):
-        if axis_group < hand.chain.joint_axis_group[j] < hand.first_axis_group[finger_posture + 1] and turns[j] != 0.0:
-            return True
-    return False
 
 
 @kernel
@@ -72,33 +59,6 @@ def closest_pair(
     copy_pose(T_palm_object if on_object else sweep.poses[met], sweep.resting)
     resting, r = (full_width.object, 0) if on_object else (full_width.links, met)
     return body_gap(full_width.links, m, resting, r, -1, bound, 1.0, sweep)
-
-
-@kernel
-def settle_carried(
-    full_width: FullWidthArrays,
-    hand: HandArrays,
-    finger_posture: int,
-    turns: Floats,
-    T_palm_object: Floats,
-    contact: Ints,
-    point: Floats,
-    sweep: SweepWork,
-) -> None:
-    """Describe a contact on a plane by elements if its link, carried on by later axis groups, still touches."""
-    m, met = int(hand.outlines.link[contact[CONTACT_OUTLINE]]), full_width.checked.shape[0]
-    bound = 2.0 * PASSED_GAP
-    if closest_pair(full_width, T_palm_object, m, met, bound, sweep) > PASSED_GAP:
-        return
-    put_core(full_width.links, sweep.pair[0], sweep.poses[m], sweep.core)
-    put_core(full_width.object, sweep.pair[1], T_palm_object, sweep.fixed)
-    ka, kb = full_width.links.corners[sweep.pair[0]], full_width.object.corners[sweep.pair[1]]
-    _, nx, ny, nz, _, _, x, y, z = separation(sweep.core, ka, sweep.fixed, kb)
-    if holds_exactly(full_width, hand.chain, finger_posture, turns, contact, (x, y, z), (nx, ny, nz), sweep):
-        keep_pair(sweep)
-        describe_pair(
-            full_width, T_palm_object, met, contact[CONTACT_DOF], contact[CONTACT_AXIS_GROUP], sweep, contact, point
-        )
 
 
 @kernel

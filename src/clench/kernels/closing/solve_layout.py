@@ -71,7 +71,6 @@ class CommandArrays(NamedTuple):
         present: candidate of each finger that goes before others up to `margin` better [steps of a sum], or -1, (F,).
         times: number of passes through the degrees of freedom of a finger. together: all joints of a hand move at once.
         full_width: candidates over the full width are among those of the plan. chosen: every finger has one candidate.
-        crossing: the sections of the first axis groups tell which finger postures overlap the object at the start.
         several: finger postures of one finger differ in posture. nested: links lie inside each other at the start.
         idle: fingers asked for that no joint closes. alone: the hand has one finger.
     """
@@ -94,7 +93,6 @@ class CommandArrays(NamedTuple):
     together: bool
     full_width: bool
     chosen: bool
-    crossing: bool
     several: bool
     nested: bool
     idle: int

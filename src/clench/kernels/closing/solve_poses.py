@@ -37,7 +37,14 @@ def solve_poses(
         problem: hand, object and command. T_palm_objects: where the object is, (N, 3, 4). arena: scratch space.
         found, solved: written. stages: which ones, as a sum.
     """
-    space = make_workspace(problem, arena, found, solved)
+    run_stages(problem, T_palm_objects, make_workspace(problem, arena, found, solved), found, solved, stages)
+
+
+@kernel(allocates=True)
+def run_stages(
+    problem: ProblemArrays, T_palm_objects: Floats, space: Workspace, found: Closed, solved: Solved, stages: int
+) -> None:
+    """Run stages of a solve. It points to its scratch space, which compiles faster than handing over the values."""
     for n in range(T_palm_objects.shape[0]):
         if found.overflow[n] == 0:
             continue

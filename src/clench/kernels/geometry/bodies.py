@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.memory import in_parts
+from clench.kernels.grid.distance_grid import DistanceGrid, grid_around, no_grid
 from clench.kernels.hulls.enclosing_hulls import HullArrays, pack_hulls
 from clench.kernels.trees.bvh import MeshTree, build_tree
 from clench.kernels.trees.node_boxes import SLAB, element_balls, local_elements, node_slabs, node_spans
@@ -19,6 +20,8 @@ Ints = NDArray[np.int32]
 
 #: By how much boxes are grown, more than rounding [m].
 ROUNDING: Final = 1e-9
+#: A body of so many elements is swept faster without a grid.
+FEW: Final = 8
 
 
 class BodyArrays(NamedTuple):
@@ -38,6 +41,7 @@ class BodyArrays(NamedTuple):
         right: right child of an inner node, (N,). root: of each body's tree, -1 for a body without elements, (B,).
         box: middle and half size of the box around each body [m], (B, 6); half sizes below zero without elements.
         hulls: convex hulls around the parts of each body; a body may have none.
+        grid: of distances from the one body; bodies that move have none.
     """
 
     vertices: Floats
@@ -54,6 +58,7 @@ class BodyArrays(NamedTuple):
     root: Ints
     box: Floats
     hulls: HullArrays
+    grid: DistanceGrid
 
 
 class Elements(NamedTuple):
@@ -102,8 +107,8 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
         vertices += len(part.vertices)
         elements += len(part.elements)
         nodes += len(part.node)
-    joined: Any = [np.concatenate(column) for column in list(zip(*packed, strict=True))[:-1]]
-    joined.append(pack_hulls([_parts(body) for body in bodies]))
+    joined: Any = [np.concatenate(column) for column in list(zip(*packed, strict=True))[:-2]]
+    joined += [pack_hulls([_parts(body) for body in bodies]), no_grid()]
     return BodyArrays(*joined)
 
 
@@ -117,6 +122,11 @@ def _parts(body: Elements) -> list[tuple[Floats, float]]:
 def pack_triangles(tree: MeshTree) -> BodyArrays:
     """Return the triangles of a tree as one body, which shares the tree's arrays."""
     return _body(tree, np.zeros(len(tree.triangles))) if len(tree.triangles) else no_body()
+
+
+def with_grid(body: BodyArrays) -> BodyArrays:
+    """Return one body with an empty grid around it, which sweeps towards it fill; a body of few elements needs none."""
+    return body._replace(grid=grid_around(body.box[0])) if len(body.elements) > FEW else body
 
 
 def no_body() -> BodyArrays:
@@ -142,6 +152,7 @@ def _nothing(bodies: int) -> BodyArrays:
         root=np.full(bodies, -1, np.int32),
         box=np.tile(box, (bodies, 1)),
         hulls=pack_hulls([()] * bodies),
+        grid=no_grid(),
     )
 
 
@@ -169,6 +180,7 @@ def _body(tree: MeshTree, radius: Floats) -> BodyArrays:
         root=np.zeros(1, dtype=np.int32),
         box=np.concatenate([0.5 * (low + high), 0.5 * (high - low) + ROUNDING])[None],
         hulls=pack_hulls([()]),
+        grid=no_grid(),
     )
 
 

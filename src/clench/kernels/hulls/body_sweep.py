@@ -6,6 +6,7 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector
+from clench.kernels.grid.round_sweep import has_grid, sweep_round
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.spatial_motion import axis_of, is_spatial, turned_about, way_of
@@ -13,6 +14,7 @@ from clench.kernels.toi.toi_bodies import NONE, keep_earliest, measure, sweep_el
 from clench.kernels.toi.toi_work import BodyPair, SweepWork, item_of, push_roots
 
 from .hull_sweep import NEAR, clear_travel
+from .listed_sweep import sweep_listed
 from .near_elements import list_near
 
 #: The elements sweep so far at first from where hulls are near, as a multiple of `NEAR`; each time farther by `LONGER`.
@@ -31,6 +33,8 @@ def sweep_body(pair: BodyPair, best: float, work: SweepWork) -> float:
         pair: the bodies.
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
+    if has_grid(pair):
+        return sweep_round(pair, best, work)
     moving, root = pair.moving, pair.moving.root[pair.m]
     if root >= 0 and item_of(moving, root) < 0:
         return sweep_elements(pair, best, -1, work)
@@ -66,7 +70,7 @@ def sweep_stepwise(pair: BodyPair, best: float, work: SweepWork) -> float:
         listed = list_near(ahead, span, work)
         if listed < 0:
             span = best - done
-        found = sweep_elements(ahead, span, listed, work)
+        found = sweep_listed(ahead, span, listed, work)
         if found < 0.0:
             return found if done == 0.0 else UNSURE
         if found < span:

@@ -101,7 +101,6 @@ def separating_direction(
     other: int,
     corners: Floats,
     good: float,
-    least: float,
     work: Floats,
     n: Floats,
 ) -> bool:
@@ -111,7 +110,6 @@ def separating_direction(
         hulls, hull: the hull that the direction leads to. T: its pose in the frame of the other one, (3, 4).
         others, other: the other one; if its number is -1, the hull of `corners`, (K, 3).
         good: the search ends if no direction has a gap that is larger by more than this fraction [-].
-        least: or if every direction has a gap that is smaller [m].
         work: scratch space, (5, 4): four corners and their weights. n: written, a unit vector in the frame of
             the other one; what it has before is where the search begins, (3,).
     """
@@ -132,7 +130,7 @@ def separating_direction(
         if low + top > bound:
             bound, n[0], n[1], n[2] = low + top, x, y, z
             parted = bound > 0.0
-        if size > 0 and (length - bound <= good * length or length < least):
+        if size > 0 and length - bound <= good * length:
             break
         p, a, b = s[size], hulls.points[i], others.points[k] if other >= 0 else corners[k]
         for r in range(3):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
@@ -19,11 +20,11 @@ from .enclosing_hulls import HullArrays
 from .gjk import lowest_of, separating_direction
 from .hull_motion import HullMotion, height, motion_of_hull, put_pose
 from .hull_window import (
-    BOX_END,
     CORNERS,
     END,
     LAST,
     NOW,
+    PLANES,
     SIMPLEX,
     begin_window,
     forget_planes,
@@ -31,11 +32,10 @@ from .hull_window import (
     keeps_off_hull,
     least_height,
     push_children,
-    put_box_corners,
     put_element,
     remember_plane,
-    renew_planes,
     square_from_box,
+    way_to_box,
 )
 
 #: Windows at most.
@@ -50,11 +50,10 @@ TRIALS = 6
 LEFT = 0.04
 #: A node whose gap is above this share of its ball's radius shortens the window; others are split [-].
 FAR = 1.0
-#: No plane is looked for between a hull and a node that is nearer than this share of the radius of the node's ball, or
-#: of the gap that ended the window before [-].
+#: No plane is looked for between a hull and a node that is nearer than this share of the radius of the node's ball [-].
 SOME = 1.0
-#: How near to the best direction the directions between a hull and a node, and a hull and an element, are [-].
-ROUGH, FINE = 0.3, 0.02
+#: How near to the best direction the directions between a hull and an element are [-].
+FINE = 0.02
 
 
 @kernel
@@ -86,7 +85,6 @@ def clear_hull(pair: BodyPair, hull: int, best: float, sweep: SweepWork) -> floa
     put_pose(pair.chain, pair.rows, 0.0, sweep, window[NOW:END])
     for c in range(3):
         window[LAST, c] = window[NOW + c, 3] - pair.resting.box[pair.r, c]
-    window[LAST, 3] = 0.0
     sweep.near[0] = -1
     s, end = 0.0, best
     for _ in range(WINDOWS):
@@ -106,14 +104,23 @@ def clear_window(pair: BodyPair, motion: HullMotion, s: float, end: float, sweep
 
     `END` has the pose there.
     """
-    begin_window(pair.moving, motion, pair.chain, pair.rows, s, end, sweep)
+    begin_window(pair.moving, motion, pair.chain, pair.rows, end, sweep)
     parts, r = pair.resting.hulls, pair.r
     for part in range(parts.body[r], parts.body[r + 1]):
-        if end >= s:
-            end = keep_off(pair, motion, parts, part, 0, parts.radius[part] + pair.touch, s, end, sweep)
+        w = parts.radius[part] + pair.touch
+        if end >= s and not is_far(parts.box[part], motion, w, end - s, sweep.hull):
+            end = keep_off(pair, motion, parts, part, 0, w, s, end, sweep)
     if parts.body[r] < parts.body[r + 1]:
         return end
     return clear_of_tree(pair, motion, s, end, sweep)
+
+
+@kernel
+def is_far(box: Floats, motion: HullMotion, w: float, length: float, window: Floats) -> bool:
+    """Say whether the ball around a box, grown by `w`, is too far from the hull to be met in a window."""
+    half = math.sqrt(box[0, 4] * box[0, 4] + box[1, 4] * box[1, 4] + box[2, 4] * box[2, 4])
+    reach = half + w + motion.radius + motion.speed * length
+    return bool(square_from_box(box[:, 3], window) > reach * reach)
 
 
 @kernel
@@ -123,7 +130,7 @@ def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, swee
     The element that ended the window before is looked at first.
     """
     window, stack, known = sweep.hull, sweep.stack, sweep.near[0]
-    resting, touch = pair.resting, pair.touch
+    hulls, resting, touch = pair.moving.hulls, pair.resting, pair.touch
     if known >= 0:
         end = keep_off_element(pair, motion, known, s, end, sweep)
     stack[0, 0], waiting = resting.root[pair.r], 1
@@ -132,7 +139,7 @@ def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, swee
         n = stack[waiting, 0]
         ball, away = resting.node[n, 3], square_from_box(resting.node[n], window)
         reach = ball + motion.radius + touch + motion.speed * (end - s)
-        if away > reach * reach or keeps_off_box(resting.slab[n], touch, window):
+        if away > reach * reach or keeps_off_box(hulls, motion, resting.slab[n], touch, end - s, window):
             continue
         if known < 0 and away > (SOME * ball) ** 2:
             split, end = keep_off_node(pair, motion, n, s, end, sweep)
@@ -151,26 +158,21 @@ def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, swee
 def keep_off_node(
     pair: BodyPair, motion: HullMotion, n: int, s: float, end: float, sweep: SweepWork
 ) -> tuple[bool, float]:
-    """Look for a plane that keeps a hull off a node; return whether the node is to be split, and the window's end."""
-    hulls, resting, touch = pair.moving.hulls, pair.resting, pair.touch
-    window, slab = sweep.hull, resting.slab[n]
-    now, least = window[NOW:END], SOME * window[LAST, 3] + motion.radius
-    put_box_corners(slab, window)
-    box, simplex, direction = window[CORNERS:BOX_END], window[SIMPLEX:CORNERS], window[LAST]
-    if not separating_direction(hulls, motion.hull, now, hulls, -1, box, ROUGH, least, simplex, direction):
-        return True, end
-    v = (direction[0], direction[1], direction[2])
-    start, top = height(hulls, motion, now, v), slab_top(slab, v[0], v[1], v[2]) + touch
+    """Look for a plane that keeps a hull off a node; return whether the node is to be split, and the window's end.
+
+    The plane lies across the shortest way from the middle of the node to the box around the hull.
+    """
+    hulls, resting, window, slab = pair.moving.hulls, pair.resting, sweep.hull, pair.resting.slab[n]
+    v = way_to_box(resting.node[n], window)
+    start, top = height(hulls, motion, window[NOW:END], v), slab_top(slab, v[0], v[1], v[2]) + pair.touch
     if start <= top:
         return True, end
     low = least_height(hulls, motion, v, start, end - s, window)
-    if low > top:
-        remember_plane(v, start, low, window)
-        return False, end
-    if start - top < FAR * resting.node[n, 3]:
+    if low <= top and start - top < FAR * resting.node[n, 3]:
         return True, end
-    end = shorten(pair, motion, v, start, top, s, end, sweep)
-    renew_planes(hulls, motion, end - s, window)
+    remember_plane(v, start, low, end - s, window)
+    if low <= top:
+        end = shorten(pair, motion, v, start, top, s, end, sweep)
     return False, end
 
 
@@ -203,22 +205,22 @@ def keep_off(
         w: by which the other one is grown [m]. The rest as in `clear_window`.
     """
     hulls, window, points = pair.moving.hulls, sweep.hull, sweep.hull[CORNERS : CORNERS + corners]
-    if keeps_off_hull(others, other, points, w, window):
+    if keeps_off_hull(hulls, motion, others, other, points, w, end - s, window):
         return end
     now, simplex, direction = window[NOW:END], window[SIMPLEX:CORNERS], window[LAST]
-    if not separating_direction(hulls, motion.hull, now, others, other, points, FINE, 0.0, simplex, direction):
+    if not separating_direction(hulls, motion.hull, now, others, other, points, FINE, simplex, direction):
         return -1.0
     n = (direction[0], direction[1], direction[2])
     low, _ = lowest_of(others, other, points, -n[0], -n[1], -n[2])
     start, top = height(hulls, motion, now, n), w - low
     if start - top <= NEAR * motion.speed:
+        # What lists the elements near by begins with this plane.
+        remember_plane(n, start, -math.inf, -1.0, window)
         return -1.0
     low = least_height(hulls, motion, n, start, end - s, window)
-    remember_plane(n, start, low, window)
+    remember_plane(n, start, low, end - s, window)
     if low <= top:
-        window[LAST, 3] = start - top
         end = shorten(pair, motion, n, start, top, s, end, sweep)
-        renew_planes(hulls, motion, end - s, window)
     return end
 
 
@@ -235,22 +237,21 @@ def shorten(
 ) -> float:
     """Return an earlier end of a window: until then a hull is above `top` along a direction.
 
-    `END` gets the pose there.
+    `END` gets the pose there, and the plane that was remembered last the bound on its height.
 
     Args:
         n: the direction, from what rests to the hull. start: height of the hull along it at `s`.
         top: height of what rests [m].
     """
     hulls, window, gap, length = pair.moving.hulls, sweep.hull, start - top, end - s
-    least = gap / motion.speed
+    # No point reaches what rests before `least`; the window was looked at up to its end alone.
+    least = min(gap / motion.speed, length)
     left = least_height(hulls, motion, n, start, length, window) - top
-    for _ in range(TRIALS):
-        length = max(length * (1.0 - LEFT) * gap / (gap - left), least)
+    for trial in range(TRIALS + 1):
+        length = max(length * (1.0 - LEFT) * gap / (gap - left), least) if trial < TRIALS else least
         put_pose(pair.chain, pair.rows, s + length, sweep, window[END:SIMPLEX])
-        if length <= least:
-            return s + length
         left = least_height(hulls, motion, n, start, length, window) - top
-        if left > 0.0:
-            return s + length
-    put_pose(pair.chain, pair.rows, s + least, sweep, window[END:SIMPLEX])
-    return s + least
+        if left > 0.0 or length <= least:
+            break
+    window[PLANES, 4], window[PLANES, 5] = left + top, s + length - s
+    return s + length

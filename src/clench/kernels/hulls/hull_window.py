@@ -24,21 +24,24 @@ from .hull_motion import HullMotion, bend_along, height, lowest_between, put_pos
 
 #: Poses of the moving body in the resting one's frame where the window begins, and where it ends.
 NOW, END = 0, 3
-#: Scratch space of `separating_direction`. Corners of the element or of the box that is looked at.
-SIMPLEX, CORNERS, BOX_END = 6, 11, 19
-#: The planes found last, the latest first: normal, the hull's height over it where the window begins, least height.
-PLANES = 19
-#: The direction that was found last, and the gap that ended the window before.
-LAST = 25
-#: The box around the hull where the window begins: its pose, and half its sizes in the last column.
-BOX = 26
+#: Scratch space of `separating_direction`. Corners of the element that is looked at.
+SIMPLEX, CORNERS = 6, 11
+#: The planes found last, the latest first: normal, the hull's height over it where the window begins, a bound on its
+#: height in a window of some length, and that length. Heights are infinite until they are asked for.
+PLANES = 14
+#: The direction that was found last.
+LAST = 20
+#: The box around the hull where the window begins: its pose, and half its sizes after that.
+BOX = 21
+#: For each listed element a unit vector that leads from it to the hull.
+LISTED = 24
 
 
 @kernel
 def begin_window(
-    moving: BodyArrays, motion: HullMotion, chain: Floats, count: int, s: float, end: float, sweep: SweepWork
+    moving: BodyArrays, motion: HullMotion, chain: Floats, count: int, end: float, sweep: SweepWork
 ) -> None:
-    """Begin a window: place the hull at its end, the box around the hull and the planes at its start.
+    """Begin a window: place the hull at its end, and the box around the hull at its start; no height is known.
 
     `NOW` has the pose at the start already.
     """
@@ -47,8 +50,7 @@ def begin_window(
     put_hull_box(hulls.box[motion.hull], window)
     for k in range(PLANES, LAST):
         if window[k, 3] > -math.inf:
-            window[k, 3] = height(hulls, motion, window[NOW:END], (window[k, 0], window[k, 1], window[k, 2]))
-    renew_planes(hulls, motion, end - s, window)
+            window[k, 3], window[k, 4], window[k, 5] = math.inf, -math.inf, -1.0
 
 
 @kernel
@@ -73,6 +75,21 @@ def square_from_box(ball: Floats, window: Floats) -> float:
 
 
 @kernel
+def way_to_box(ball: Floats, window: Floats) -> Vector:
+    """Return the unit vector from the middle of a ball to the box around the hull, or any one if it lies inside."""
+    x, y, z = ball[0] - window[BOX, 3], ball[1] - window[BOX + 1, 3], ball[2] - window[BOX + 2, 3]
+    nx = ny = nz = 0.0
+    for c in range(3):
+        along = window[BOX, c] * x + window[BOX + 1, c] * y + window[BOX + 2, c] * z
+        back = min(max(along, -window[BOX + c, 4]), window[BOX + c, 4]) - along
+        nx, ny, nz = nx + back * window[BOX, c], ny + back * window[BOX + 1, c], nz + back * window[BOX + 2, c]
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if size == 0.0:
+        return 1.0, 0.0, 0.0
+    return nx / size, ny / size, nz / size
+
+
+@kernel
 def least_height(
     hulls: HullArrays, motion: HullMotion, n: Vector, start: float, length: float, window: Floats
 ) -> float:
@@ -92,39 +109,65 @@ def forget_planes(window: Floats) -> None:
 
 
 @kernel
-def renew_planes(hulls: HullArrays, motion: HullMotion, length: float, window: Floats) -> None:
-    """Compute the least heights over the planes in a window that has another end."""
-    for k in range(PLANES, LAST):
-        if window[k, 3] > -math.inf:
-            n = (window[k, 0], window[k, 1], window[k, 2])
-            window[k, 4] = least_height(hulls, motion, n, window[k, 3], length, window)
-
-
-@kernel
-def remember_plane(n: Vector, start: float, low: float, window: Floats) -> None:
+def remember_plane(n: Vector, start: float, low: float, length: float, window: Floats) -> None:
     """Put a plane before the others, and forget the last one."""
     for k in range(LAST - 1, PLANES, -1):
-        for c in range(5):
+        for c in range(6):
             window[k, c] = window[k - 1, c]
     window[PLANES, 0], window[PLANES, 1], window[PLANES, 2] = n
-    window[PLANES, 3], window[PLANES, 4] = start, low
+    window[PLANES, 3], window[PLANES, 4], window[PLANES, 5] = start, low, length
 
 
 @kernel
-def keeps_off_box(slab: Any, touch: float, window: Floats) -> bool:
+def stays_over(hulls: HullArrays, motion: HullMotion, k: int, top: float, length: float, window: Floats) -> bool:
+    """Say whether a plane tells that a hull stays above a height over it in a window of some length.
+
+    A bound for a longer window holds as well: only one that does not suffice is renewed.
+    """
+    if window[k, 4] > top:
+        return True
+    if window[k, 3] <= top or window[k, 5] == length:
+        return False
+    n = (window[k, 0], window[k, 1], window[k, 2])
+    if window[k, 3] == math.inf:
+        window[k, 3] = height(hulls, motion, window[NOW:END], n)
+        if window[k, 3] <= top:
+            return False
+    window[k, 4], window[k, 5] = least_height(hulls, motion, n, window[k, 3], length, window), length
+    return bool(window[k, 4] > top)
+
+
+@kernel
+def keeps_off_box(
+    hulls: HullArrays, motion: HullMotion, slab: Any, touch: float, length: float, window: Floats
+) -> bool:
     """Say whether one of the planes keeps the hull off a box."""
     for k in range(PLANES, LAST):
-        if slab_top(slab, window[k, 0], window[k, 1], window[k, 2]) + touch < window[k, 4]:
+        if window[k, 3] == -math.inf:
+            return False
+        top = slab_top(slab, window[k, 0], window[k, 1], window[k, 2]) + touch
+        if stays_over(hulls, motion, k, top, length, window):
             return True
     return False
 
 
 @kernel
-def keeps_off_hull(others: HullArrays, other: int, corners: Floats, w: float, window: Floats) -> bool:
+def keeps_off_hull(
+    hulls: HullArrays,
+    motion: HullMotion,
+    others: HullArrays,
+    other: int,
+    corners: Floats,
+    w: float,
+    length: float,
+    window: Floats,
+) -> bool:
     """Say whether one of the planes keeps the hull off another one, grown by `w`; see `lowest_of`."""
     for k in range(PLANES, LAST):
+        if window[k, 3] == -math.inf:
+            return False
         low, _ = lowest_of(others, other, corners, -window[k, 0], -window[k, 1], -window[k, 2])
-        if w - low < window[k, 4]:
+        if stays_over(hulls, motion, k, w - low, length, window):
             return True
     return False
 
@@ -137,17 +180,6 @@ def put_element(resting: BodyArrays, e: int, window: Floats) -> int:
         for c in range(3):
             window[CORNERS + k, c] = p[c]
     return int(resting.corners[e])
-
-
-@kernel
-def put_box_corners(slab: Any, window: Floats) -> None:
-    """Write the corners of the box around a node, without its margin."""
-    for k in range(8):
-        u = 1.0 if k & 1 else -1.0
-        v = 1.0 if k & 2 else -1.0
-        w = 1.0 if k & 4 else -1.0
-        for c in range(3):
-            window[CORNERS + k, c] = slab[c] + u * slab[3 + c] + v * slab[6 + c] + w * slab[9 + c]
 
 
 @kernel

@@ -13,11 +13,12 @@ from .gjk import lowest_of, separating_direction
 from .hull_motion import HullMotion, height, motion_of_hull, put_pose
 from .hull_sweep import FINE
 from .hull_window import (
-    BOX_END,
     CORNERS,
     END,
     LAST,
+    LISTED,
     NOW,
+    PLANES,
     SIMPLEX,
     begin_window,
     forget_planes,
@@ -36,6 +37,8 @@ from .hull_window import (
 def list_near(pair: BodyPair, end: float, sweep: SweepWork) -> int:
     """List in `sweep.listed` the elements of the resting body that the moving one may touch before `end`.
 
+    The planes that `clear_travel` found last come first here.
+
     Returns:
         how many there are, or -1 where there are too many, or where the moving body has no hulls: then any can be met.
     """
@@ -45,9 +48,8 @@ def list_near(pair: BodyPair, end: float, sweep: SweepWork) -> int:
         return -1
     for hull in range(moving.hulls.body[m], moving.hulls.body[m + 1]):
         motion = motion_of_hull(moving, hull, chain, count, sweep)
-        forget_planes(window)
         put_pose(chain, count, 0.0, sweep, window[NOW:END])
-        begin_window(moving, motion, chain, count, 0.0, end, sweep)
+        begin_window(moving, motion, chain, count, end, sweep)
         found = list_near_hull(moving.hulls, motion, pair.resting, pair.r, pair.touch, end, found, sweep)
         if found < 0:
             return -1
@@ -86,7 +88,7 @@ def is_off_hulls(
     hulls: HullArrays, motion: HullMotion, resting: BodyArrays, r: int, near: float, window: Floats
 ) -> bool:
     """Say whether planes keep a hull off all hulls of a body; not if that has none."""
-    parts, none = resting.hulls, window[CORNERS:BOX_END]
+    parts, none = resting.hulls, window[CORNERS:PLANES]
     for part in range(parts.body[r], parts.body[r + 1]):
         w = parts.radius[part] + near
         if not is_kept_off(hulls, motion, parts, part, none, w, 0.0, window):
@@ -114,7 +116,7 @@ def list_near_hull(
         reach = resting.node[n, 3] + motion.radius + touch + motion.speed * end
         if square_from_box(resting.node[n], window) > reach * reach:
             continue
-        if keeps_off_box(resting.slab[n], touch, window):
+        if keeps_off_box(hulls, motion, resting.slab[n], touch, end, window):
             continue
         if resting.count[n] == 0:
             waiting = push_children(resting, n, window, stack, waiting)
@@ -142,10 +144,10 @@ def is_kept_off(
 ) -> bool:
     """Say whether a plane keeps a hull off another one, see `lowest_of`, grown by `w`, in a whole window."""
     now = window[NOW:END]
-    if keeps_off_hull(others, other, corners, w, window):
+    if keeps_off_hull(hulls, motion, others, other, corners, w, length, window):
         return True
     simplex, direction = window[SIMPLEX:CORNERS], window[LAST]
-    if not separating_direction(hulls, motion.hull, now, others, other, corners, FINE, 0.0, simplex, direction):
+    if not separating_direction(hulls, motion.hull, now, others, other, corners, FINE, simplex, direction):
         return False
     n = (direction[0], direction[1], direction[2])
     start = height(hulls, motion, now, n)
@@ -153,7 +155,7 @@ def is_kept_off(
     top, _ = lowest_of(others, other, corners, -n[0], -n[1], -n[2])
     if low <= w - top:
         return False
-    remember_plane(n, start, low, window)
+    remember_plane(n, start, low, length, window)
     return True
 
 
@@ -166,4 +168,6 @@ def add_once(e: int, found: int, sweep: SweepWork) -> int:
     if found == sweep.listed.shape[0]:
         return -1
     sweep.listed[found] = e
+    for c in range(3):
+        sweep.hull[LISTED + found, c] = sweep.hull[LAST, c]
     return found + 1

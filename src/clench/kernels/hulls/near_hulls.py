@@ -13,7 +13,7 @@ from clench.kernels.toi.toi_work import SweepWork
 
 from .enclosing_hulls import HullArrays, lowest_corner
 from .gjk import separating_direction
-from .hull_window import BOX_END, CORNERS, END, LAST, NOW, SIMPLEX
+from .hull_window import CORNERS, END, LAST, NOW, PLANES, SIMPLEX
 
 #: The search for a direction ends if no other one has a gap that is larger by more than this fraction [-].
 NEARLY = 0.1
@@ -67,8 +67,8 @@ def parting(hulls: HullArrays, i: int, k: int, n: Vector, sweep: SweepWork) -> t
     T, found = sweep.resting, sweep.hull[LAST]
     for c in range(3):
         found[c] = n[0] * T[0, c] + n[1] * T[1, c] + n[2] * T[2, c]
-    none = sweep.hull[CORNERS:BOX_END]
-    separating_direction(hulls, i, sweep.hull[NOW:END], hulls, k, none, NEARLY, 0.0, sweep.hull[SIMPLEX:], found)
+    none = sweep.hull[CORNERS:PLANES]
+    separating_direction(hulls, i, sweep.hull[NOW:END], hulls, k, none, NEARLY, sweep.hull[SIMPLEX:], found)
     x, y, z = found[0], found[1], found[2]
     side = (
         T[0, 0] * x + T[0, 1] * y + T[0, 2] * z,

@@ -54,7 +54,7 @@ def enter_axis_group(closing: Closing, axis_group: int, i: int) -> None:
     )
     wanted = cut_planes(hand, axis_group, (low, high), obj.tree, obj.rounds, T, own, base, work.pose[1])
     answer.overflow[i] = max(answer.overflow[i], wanted)
-    if wanted > 0 or closing.full_width.requested[i] != 0 or high - low > 1:
+    if wanted > 0:
         return
     place_joints(hand.chain, axis_group, answer.turn[i], work.place)
     touch = TOUCH_FRACTION * hand.axis_group_length[axis_group]
@@ -105,9 +105,7 @@ def is_held(closing: Closing, axis_group: int, dof: int, i: int) -> bool:
     The axis group's own plane lies elsewhere and may show the link a little off the object or inside it, where a sweep
     would begin with neither a touch nor a gap.
     """
-    hand, candidates, work, answer = closing.hand, closing.candidates, closing.work, closing.answer
-    if candidates.high[i] - candidates.low[i] != 1:
-        return False
+    hand, work, answer = closing.hand, closing.work, closing.answer
     chain, turns = hand.chain, answer.turn[i]
     place_joints(chain, axis_group, turns, work.place)
     for n in range(answer.contacts[i]):

@@ -113,7 +113,7 @@ def cut_planes(
 
 @entry_kernel
 def needs_planes(candidates: CandidateArrays) -> bool:
-    """Say whether any candidate has planes; the full width has none around exactly swept shapes."""
+    """Say whether any candidate has a plane; the full width has none."""
     planes = 0
     for i in range(candidates.finger_posture.shape[0]):
         planes += candidates.high[i] - candidates.low[i]

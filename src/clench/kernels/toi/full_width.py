@@ -29,9 +29,10 @@ from clench.kernels.geometry.core_distance import AT_CORNER, edge_count, face_no
 from clench.kernels.geometry.crossing import across
 from clench.kernels.geometry.link_boxes import boxes_meet
 from clench.kernels.geometry.vectors import Vector, dot, plus, scaled
+from clench.kernels.grid.grid_bound import is_box_off
 from clench.kernels.hulls.near_elements import list_touching
 from clench.kernels.runtime.compiling import entry_kernel, kernel
-from clench.kernels.sections.plane_pose import copy_pose
+from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
 
 from .separating import side
 from .spatial_motion import turned_about
@@ -229,7 +230,9 @@ def find_link_overlap(
     for m in range(links):
         copy_pose(poses[m], sweep.moving)
         copy_pose(T_palm_object, sweep.resting)
-        if overlap_truly(full_width.links, m, full_width.object, 0, allowed, True, sweep):
+        if not is_off_object(full_width, m, sweep) and overlap_truly(
+            full_width.links, m, full_width.object, 0, allowed, True, sweep
+        ):
             return m, links
         for r in range(m):
             if full_width.checked[m, r] != 0 and boxes_meet(full_width.links.box, poses, m, r):
@@ -237,6 +240,17 @@ def find_link_overlap(
                 if overlap_truly(full_width.links, m, full_width.links, r, allowed, False, sweep):
                     return m, r
     return -1, -1
+
+
+@kernel
+def is_off_object(full_width: FullWidthArrays, m: int, sweep: SweepWork) -> bool:
+    """Say whether the object's grid tells that no surface of a link touches the object's; `sweep` has their poses."""
+    box, T = full_width.links.box[m], sweep.begun
+    if full_width.links.root[m] < 0:
+        return True
+    compose_inverse(sweep.resting, sweep.moving, T)
+    middle, half = (box[0], box[1], box[2]), (box[3], box[4], box[5])
+    return bool(is_box_off(full_width.object, middle, half, T, sweep.stack))
 
 
 @kernel

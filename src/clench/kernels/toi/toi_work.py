@@ -43,7 +43,8 @@ class SweepWork(NamedTuple):
             (8,).
         begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
             (J, 7) and for parallel ones (J + 1, 3).
-        hull: scratch space of `hull_sweep`, (29, 5). near: the element that the hull came near to last, or -1, (1,).
+        hull: scratch space of `hull_sweep`, (56, 6). round: that of `round_motion`, (12, 3). near: the element that the
+            hull came near to last, or -1, (1,).
         listed: resting elements that a short sweep can meet, (32,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
@@ -69,6 +70,7 @@ class SweepWork(NamedTuple):
     turned: Floats
     level: Floats
     hull: Floats
+    round: Floats
     near: Ints
     listed: Ints
     pair: Ints
@@ -116,7 +118,8 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((3, 4)),
         np.empty((joints, SPATIAL)),
         np.empty((joints + 1, 3)),
-        np.empty((29, 5)),
+        np.empty((56, 6)),
+        np.empty((12, 3)),
         np.zeros(1, dtype=np.int64),
         np.zeros(32, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
