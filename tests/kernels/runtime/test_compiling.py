@@ -19,7 +19,7 @@ KERNELS = Path(compiling.__file__).parents[1]
 
 
 def test_every_kernel_is_kept_by_the_sources_that_it_is_compiled_from():
-    for kernel in (*warming.HERE, *warming.THERE):
+    for kernel in warming.JOBS:
         module = Path(sys.modules[kernel.py_func.__module__].__file__)
         assert compiling.index_of(kernel)._source_stamp == compiling.source_stamp(module)
 
@@ -30,7 +30,7 @@ def copied(tmp_path, monkeypatch):
     runtime = tmp_path / "runtime"
     runtime.mkdir()
     copy = shutil.copy(compiling.__file__, runtime)
-    for name in ("by_reference", "kernel_cache", "symbols"):
+    for name in ("by_reference", "claims", "kernel_cache", "kernel_compiler", "symbols"):
         Path(runtime, f"{name}.py").write_text("HANDED = 1\n")
     spec = importlib.util.spec_from_file_location("clench.kernels.runtime.copied", copy)
     module = importlib.util.module_from_spec(spec)

@@ -36,8 +36,8 @@ def caller_of_caller(x):
 #: kinds of each there are now, and how many kernels are there by their symbol.
 CALL = """
 import sys
-from clench.kernels.runtime import kernel_cache, symbols
-kernel_cache.LARGE = 0 if "apart" in sys.argv else 10**9
+from clench.kernels.runtime import kernel_compiler, symbols
+kernel_compiler.LARGE = 0 if "apart" in sys.argv else 10**9
 import some_kernels as m
 x = m.caller_of_caller(3.0)
 kernels = (m.large, m.small, m.caller, m.caller_of_caller)

@@ -1,7 +1,9 @@
-"""Kernels are compiled ahead for the arguments of a solve, and nothing depends on the second process."""
+"""Kernels are compiled ahead for the arguments of a solve, and nothing depends on the other processes."""
 
+import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,10 +15,11 @@ from clench.kernels.closing import solve_poses
 from clench.kernels.geometry import link_frames as frames
 from clench.kernels.geometry import link_meshes
 from clench.kernels.runtime import warming
+from clench.kernels.runtime.claims import CLAIMS, Claims
 from clench.kernels.runtime.compiling import index_of
 
 
-@pytest.mark.parametrize("kernel", [*warming.HERE, *warming.THERE], ids=lambda kernel: kernel.__name__)
+@pytest.mark.parametrize("kernel", warming.JOBS, ids=lambda kernel: kernel.__name__)
 def test_every_parameter_has_a_sample(kernel):
     assert warming.argument_types(kernel, warming.sample_values())
 
@@ -31,7 +34,7 @@ def test_what_is_compiled_is_what_a_solve_calls():
     )
     for kernel in called:
         assert warming.argument_types(kernel, values) in kernel.signatures
-    inner = [kernel for kernel in (*warming.HERE, *warming.THERE) if kernel not in called]
+    inner = [kernel for kernel in warming.JOBS if kernel not in called]
     assert len(inner) > 6
     for kernel in inner:
         missed = sum(kernel.stats.cache_misses.values())
@@ -73,12 +76,47 @@ def test_compiled_kernels_start_no_process(monkeypatch):
 
 
 @pytest.mark.parametrize("program", ["no/such/program", sys.executable])
-def test_a_second_process_that_fails_is_let_go(monkeypatch, program, capfd):
+def test_other_processes_that_fail_are_let_go(monkeypatch, program, capfd):
     done = []
     monkeypatch.setattr(warming, "_is_cold", lambda: True)
-    monkeypatch.setattr(warming, "compile_ahead", done.append)
+    monkeypatch.setattr(warming, "JOBS", (link_frames_twin(done),))
+    monkeypatch.setattr(warming, "argument_types", lambda kernel, values: ())
     monkeypatch.setattr(warming, "_MODULE", "no_such_module")
     monkeypatch.setattr(sys, "executable", program)
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
     warming.warm_up()
-    assert len(done) == (program != "no/such/program")
-    assert capfd.readouterr() == ("", "")
+    assert done == [()]
+    assert capfd.readouterr().out == ""
+    assert CLAIMS.folder is None
+
+
+def link_frames_twin(done):
+    """Return a kernel that notes for which arguments it is compiled."""
+
+    def twin():
+        pass
+
+    return SimpleNamespace(py_func=twin, compile=done.append)
+
+
+def test_jobs_that_another_process_has_taken_are_left_to_it(monkeypatch, tmp_path):
+    done = []
+    kernels = [link_frames_twin(done), SimpleNamespace(py_func=done.append.__class__, compile=None)]
+    monkeypatch.setattr(warming, "JOBS", kernels)
+    monkeypatch.setattr(warming, "argument_types", lambda kernel, values: ())
+    monkeypatch.setattr(warming, "claim_of", lambda kernel, kinds: "free" if kernel is kernels[0] else "taken")
+    other = Claims()
+    other.share(tmp_path)
+    assert other.take_job("taken")
+    monkeypatch.setattr(warming, "CLAIMS", mine := Claims())
+    mine.share(tmp_path)
+    assert list(warming._jobs_done()) == [1, 1]
+    assert done == [()]
+
+
+def test_the_bar_is_on_standard_error(capsys):
+    with warming._bar() as show:
+        show(3)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err

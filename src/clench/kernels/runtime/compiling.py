@@ -18,7 +18,7 @@ from clench.core import tolerances
 
 from .by_reference import by_reference, type_of
 from .kernel_cache import index_of, keep_on_disk
-from .symbols import named
+from .kernel_compiler import compiled, compiler_of
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
@@ -127,6 +127,10 @@ class CachedKernel(CPUDispatcher):
             tuple(map(by_reference, args)), {name: by_reference(a) for name, a in kws.items()}
         )
 
+    def compile(self, sig: Any) -> Any:
+        """Compile for arguments, unless it is done or on disk; return what Python calls."""
+        return compiled(self, sig)
+
 
 class KernelForKernels(CachedKernel):
     """A kernel without an entry from Python; a call would end the process without a message."""
@@ -139,6 +143,10 @@ class KernelForKernels(CachedKernel):
         """
         raise TypeError(f"{self.py_func.__name__}: expected a call from a kernel; it has no entry from Python.")
 
+    def add_overload(self, cres: Any) -> None:
+        """Note a compiled kernel where other kernels find it."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
 
 def _compiled(function: Callable[..., Any], *, from_python: bool, allocates: bool) -> Any:
     """Return the kernel of a function, which is compiled or loaded on its first call."""
@@ -146,7 +154,7 @@ def _compiled(function: Callable[..., Any], *, from_python: bool, allocates: boo
     settings: Any = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": allocates}
     if not from_python:
         settings["no_cpython_wrapper"] = True
-    dispatcher: Any = njit(pipeline_class=named(stamp), **settings)(function)
+    dispatcher: Any = njit(pipeline_class=compiler_of(stamp), **settings)(function)
     if not hasattr(dispatcher, "get_call_template"):  # NUMBA_DISABLE_JIT leaves the function as it is.
         return dispatcher
     dispatcher.__class__ = CachedKernel if from_python else KernelForKernels

@@ -28,7 +28,7 @@ from numba.core.environment import Environment, lookup_environment
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 
-from .symbols import LARGE, Needed, bring, has_a_fixed_symbol, keep_apart, needed_by
+from .symbols import Needed, bring, keep_apart, needed_by
 
 #: Errors of reading a damaged file, or one that names modules or classes which this version does not have.
 _UNREADABLE = (ImportError, AttributeError, pickle.UnpicklingError, EOFError, TypeError, ValueError, IndexError)
@@ -57,6 +57,8 @@ class MachineCode(NamedTuple):
         """Put it into the engine that holds all machine code; return whether it is whole, with all that it calls."""
         if crc32(self.content) != self.checksum or not bring(self.needed):
             return False
+        if not self.content:
+            return True
         if not _POINTED_TO:
             _name_memory_functions()
         for initialize in self.initializers:
@@ -95,7 +97,8 @@ def keep_on_disk(dispatcher: Any, stamp: bytes) -> None:
     Args:
         dispatcher: of a function. stamp: digest that changes when the function has to be compiled again.
     """
-    dispatcher._cache = KernelCache(dispatcher.py_func, stamp)
+    from_python = not dispatcher.targetoptions.get("no_cpython_wrapper")
+    dispatcher._cache = KernelCache(dispatcher.py_func, stamp, from_python=from_python)
 
 
 def index_of(dispatcher: Any) -> Any:
@@ -107,10 +110,11 @@ class KernelCache(FunctionCache):
     """The files of one kernel; they are looked for when the kernel is first called.
 
     Args:
-        function: of the kernel. stamp: see `keep_on_disk`.
+        function: of the kernel. stamp: see `keep_on_disk`. from_python: whether Python calls it.
     """
 
-    def __init__(self, function: Any, stamp: bytes) -> None:
+    def __init__(self, function: Any, stamp: bytes, *, from_python: bool) -> None:
+        self._from_python = from_python
         self._name = repr(function)
         self._py_func = function
         self._stamp = stamp
@@ -147,7 +151,7 @@ class KernelCache(FunctionCache):
         except _UNREADABLE:
             return None
         there = bring((code,)) if isinstance(code, Needed) else code.run(target_context)
-        return _rebuilt(target_context, *described) if there else None
+        return _rebuilt(target_context, self._from_python, *described) if there else None
 
     def load_apart(self, needed: Needed) -> bool:
         """Load the machine code of this kernel that other kernels call by a symbol; return whether it is there."""
@@ -162,12 +166,15 @@ class KernelCache(FunctionCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled kernel on disk; from here on its callers refer to it if it is large."""
         library = data.library
-        apart = len(library._get_compiled_object()) >= LARGE and has_a_fixed_symbol(self._py_func)
-        if apart:
+        library._ensure_finalized()
+        if library.runs:
+            for environment in (data.environment, *data._find_referenced_environments()):
+                data.codegen.set_env(environment.env_name, environment)
+        if library.is_apart:
             # What is linked into callers is empty: they only declare the function.
             library._shared_module = binding.parse_assembly(str(data.codegen._create_empty_module(library.name)))
         with self._guard_against_spurious_io_errors():
-            self._save_parts(sig, data, apart)
+            self._save_parts(sig, data, library.is_apart)
 
     def _save_parts(self, sig: Any, data: Any, apart: bool) -> None:
         if not self._impl.check_cachable(data):
@@ -179,7 +186,8 @@ class KernelCache(FunctionCache):
             e.env_name: (e.env_name, e.globals.get("__name__", ""), list(e.consts)) for e in (environment, *referenced)
         }
         environments = tuple(pointed_to.values())
-        code = MachineCode(content, crc32(content), needed_by(data.library), environments, tuple(initializers or ()))
+        ready = tuple(initializers or ())
+        code = MachineCode(content, crc32(content), needed_by(data.library), environments, ready)
         parts = (name, bitcode, described, pointed_to[environment.env_name], *more)
         key = self._index_key(sig, data.codegen)
         if not apart:
@@ -239,6 +247,7 @@ class LoadedLibrary(JITCodeLibrary):
 
 def _rebuilt(
     context: Any,
+    from_python: bool,
     name: str,
     bitcode: bytes,
     described: Any,
@@ -256,7 +265,7 @@ def _rebuilt(
         typing_context=context.typing_context,
         library=library,
         environment=environment,
-        entry_point=context.get_executable(library, described, environment),
+        entry_point=context.get_executable(library, described, environment) if from_python else object(),
         fndesc=described,
         type_annotation=annotation,
         signature=signature,

@@ -15,12 +15,7 @@ from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any, Final, NamedTuple
 
-from numba.core.compiler import Compiler
-
 from .by_reference import ByReference
-
-#: Machine code from this size on stays apart [bytes]. A smaller one compiles less, and loads more files.
-LARGE: Final = 40_000
 
 
 class Needed(NamedTuple):
@@ -53,29 +48,18 @@ def described(kind: Any) -> str:
     return f"{made.__module__}.{made.__qualname__}{getattr(kind, 'fields', '')}({parts})"
 
 
-def named(stamp: bytes) -> type[Compiler]:
-    """Return a compiler that names symbols by the function and by its sources; Numba's counts the functions.
+def name_symbols(identity: Any, kinds: Iterable[Any], stamp: bytes) -> None:
+    """Name a function's symbols by the function and by its sources, equal in all processes; Numba's names count.
 
     Args:
+        identity: of the function, as Numba has it. kinds: types of its arguments.
         stamp: digest that changes when the function has to be compiled again.
     """
-
-    class NamingCompiler(Compiler):
-        """Numba's compiler, with names of symbols that are equal in all processes."""
-
-        def _compile_bytecode(self) -> Any:
-            identity = self.state.func_id
-            if has_a_fixed_symbol(identity.func):
-                kinds = ",".join(map(described, self.state.args))
-                source = identity.func.__code__
-                text = f"{identity.modname} {source.co_firstlineno} {kinds}".encode()
-                digest = hashlib.sha256(stamp + text + source.co_code).hexdigest()[:16]
-                identity.unique_id = digest
-                identity.unique_name = f"{identity.func_qualname}${digest}"
-            compiled: Any = super()._compile_bytecode()  # type: ignore[no-untyped-call]
-            return compiled
-
-    return NamingCompiler
+    source = identity.func.__code__
+    text = f"{identity.modname} {source.co_firstlineno} {','.join(map(described, kinds))}".encode()
+    digest = hashlib.sha256(stamp + text + source.co_code).hexdigest()[:16]
+    identity.unique_id = digest
+    identity.unique_name = f"{identity.func_qualname}${digest}"
 
 
 def needed_by(library: Any) -> tuple[Needed, ...]:

@@ -1,8 +1,7 @@
-"""Compile the kernels of a solve ahead of it, in two processes at once.
+"""Compile the kernels of a solve ahead of it, in as many processes as there are cores.
 
-A first solve compiles for about two minutes, one kernel after another. Half of it is the closing, so a second process
-compiles that into the cache on disk, from where this one loads it. Nothing depends on the second process: kernels that
-it does not deliver are compiled when they are called.
+The processes take the kernels below one after another, and share what these call (`claims.py`). Nothing depends on the
+other processes: kernels that they do not deliver are compiled when they are called.
 """
 
 from __future__ import annotations
@@ -11,8 +10,11 @@ import inspect
 import os
 import subprocess
 import sys
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -20,6 +22,7 @@ import numpy as np
 
 from clench.kernels.closing.close_candidate import close_candidate
 from clench.kernels.closing.contact_reading import PalmContactArrays, SurfaceArrays, read_contacts
+from clench.kernels.closing.in_turn import close_in_turn
 from clench.kernels.closing.layout import (
     CandidateArrays,
     ChainArrays,
@@ -41,12 +44,14 @@ from clench.kernels.closing.solve_layout import (
     Solved,
     Workspace,
 )
-from clench.kernels.closing.solve_poses import solve_poses
+from clench.kernels.closing.solve_poses import make_workspace, solve_poses
 from clench.kernels.closing.verdict import judge_pose
 from clench.kernels.geometry.link_frames import FrameArrays, place_links, relate_poses
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, measure_depths
 from clench.kernels.geometry.smallest_gap import smallest_gap
+from clench.kernels.meetings.at_once import close_at_once
 from clench.kernels.meetings.meeting_layout import FingerLinks, Meetings, MeetingWork
+from clench.kernels.meetings.meeting_search import look_at
 from clench.kernels.sections.advance import advance
 from clench.kernels.sections.plane_contact import describe_contact, settle_contact
 from clench.kernels.sections.plane_sections import cut_first_axis_groups
@@ -56,28 +61,39 @@ from clench.kernels.toi.toi_work import SweepWork
 from clench.kernels.trees.bvh import MeshTree, build_tree
 
 from .by_reference import by_reference, kept
+from .claims import CLAIMS
 from .compiling import is_kept
+from .kernel_compiler import claim_of
 
-#: The kernels that each process compiles, in this order: first the parts that both need.
-HERE: tuple[Any, ...] = (
+#: What the processes compile, in this order: long ones first, and what others need before these.
+JOBS: tuple[Any, ...] = (
     sweep_stage,
-    settle_pair,
-    settle_contact,
-    describe_contact,
+    cut_first_axis_groups,
+    advance,
     judge_pose,
-    relate_poses,
-    place_links,
+    look_at,
+    make_workspace,
+    settle_contact,
+    settle_pair,
+    close_candidate,
     measure_depths,
     read_contacts,
     smallest_gap,
+    describe_contact,
+    close_at_once,
+    relate_poses,
+    place_links,
+    close_in_turn,
+    solve_poses,
 )
-THERE: tuple[Any, ...] = (cut_first_axis_groups, advance, close_candidate, solve_poses)
 
 #: These have an entry from Python, but in a solve other kernels call them, or Python hands them pointers.
 _BY_POINTER: tuple[Any, ...] = (cut_first_axis_groups, close_candidate, place_links)
 
-#: The second process is given up after this long [s].
+#: Another process is given up after this long [s].
 PATIENCE = 300.0
+#: More processes than these wait for each other most of the time.
+MOST_PROCESSES = 4
 
 _MODULE = "clench.kernels.runtime.warming"
 _TYPES: dict[str, Any] = {"f": np.float64, "i": np.int64, "s": np.int32, "b": np.uint8}
@@ -85,22 +101,59 @@ _TYPES: dict[str, Any] = {"f": np.float64, "i": np.int64, "s": np.int32, "b": np
 
 def warm_up() -> None:
     """Compile what a solve calls where none of it has been compiled before; else do nothing."""
-    if (os.cpu_count() or 1) < 2 or not _is_cold():
+    if not _is_cold():
         return
+    with tempfile.TemporaryDirectory(prefix="clench-") as folder:
+        others = _others(min(os.cpu_count() or 1, MOST_PROCESSES) - 1, folder)
+        CLAIMS.share(Path(folder), lambda: all(other.poll() in (None, 0) for other in others))
+        try:
+            with _bar() as show:
+                for done in _jobs_done():
+                    show(done)
+            for other in others:
+                other.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            CLAIMS.share(None)
+            for other in others:
+                other.kill()
+                other.wait()
+
+
+def _others(count: int, folder: str) -> list[subprocess.Popen[bytes]]:
+    """Start processes that take jobs, too, and put their claims into a folder."""
     quiet = subprocess.DEVNULL
+    command = [sys.executable, "-m", _MODULE, folder]
     try:
-        other = subprocess.Popen([sys.executable, "-m", _MODULE], stdin=quiet, stdout=quiet, stderr=quiet)
+        return [subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) for _ in range(count)]
     except OSError:
-        return
-    try:
-        build_tree(np.zeros((1, 3)), np.zeros((1, 3)))
-        compile_ahead(HERE)
-        other.wait(PATIENCE)
-    except subprocess.TimeoutExpired:
-        pass
-    finally:
-        other.kill()
-        other.wait()
+        return []
+
+
+def _jobs_done() -> Iterator[int]:
+    """Compile the jobs that no other process has taken; give after each how many are done, by any process."""
+    values = sample_values()
+    build_tree(np.zeros((1, 3)), np.zeros((1, 3)))
+    for kernel in JOBS:
+        kinds = argument_types(kernel, values)
+        name = claim_of(kernel, kinds)
+        if CLAIMS.take_job(name):
+            kernel.compile(kinds)
+            CLAIMS.note_done(name)
+        yield CLAIMS.count_done()
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[int], None]]:
+    """Show a bar on standard error; the function that is given moves it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=2) as progress:
+        task = progress.add_task("Compiling", total=len(JOBS))
+        yield lambda done: progress.update(task, completed=done)
 
 
 def compile_ahead(kernels: Iterable[Any]) -> None:
@@ -136,7 +189,7 @@ def sample_values() -> dict[str, Any]:
         "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1 i1")),
         "full_width": planes_only(0, 0),
         "chain": chain,
-        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 i1 i1 i1 i1 i1")),
+        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 f2 i1 i1 i1 i1 i1")),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
     }
     values |= {"links": values["full_width"].links, "target": values["full_width"].object}
@@ -150,12 +203,14 @@ def sample_values() -> dict[str, Any]:
     values |= dict.fromkeys(("sections", "shared", "own"), sections)
     values["tree"] = tree
     values |= dict.fromkeys(("closed", "together"), True)
-    values |= dict.fromkeys(("axis_group", "start", "base", "times", "dof", "plane", "finger_posture", "i", "n"), 0)
+    values |= dict.fromkeys(
+        ("axis_group", "start", "base", "times", "dof", "plane", "finger_posture", "i", "n", "p"), 0
+    )
     values |= _solve_values(values)
     kinds = {
         "f1": ("turns", "rates", "point", "q"),
         "f2": ("T_palm_object", "first", "second", "out", "postures"),
-        "i1": ("overlaps", "contact", "which", "blocked"),
+        "i1": ("overlaps", "contact", "which", "blocked", "anew", "chosen"),
         "f3": ("poses", "placed", "two", "axis_groups"),
     }
     for kind, names in kinds.items():
@@ -165,14 +220,14 @@ def sample_values() -> dict[str, Any]:
     held = {name: kept(values[name]) for name in names}
     values["closing"] = Closing(T_palm_object=T, shared=sections, own=sections, **held)
     values["stage"] = Stage(held["full_width"], kept(chain), 0, poses, T, turns, turns, 0.0)
-    values["planes"] = (0, 0)
+    values |= dict.fromkeys(("planes", "finger_postures"), (0, 0))
     return {**values, "length": 0.0, "best": 0.0, "touch": 0.0}
 
 
 def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
     """Return values of the arguments of `solve_poses`, and of its scratch space."""
     target = ObjectArrays(values["tree"], values["rounds"], True, values["full_width"].object)
-    counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 i1 i1 f1 i1 i1"), 0.0, 0, *[True] * 6, 0, True]
+    counts: list[Any] = [*_arrays("f1 f3 i1 i1 i2 i2 i2 i1 i1 i1 f1 i1 i1"), 0.0, 0, *[True] * 5, 0, True]
     parts: list[Any] = [values[name] for name in ("hand", "full_width", "candidates")]
     parts += [target, target, *(values[name] for name in ("frames", "surface", "mesh", "meshes")), *_arrays("i2 i2")]
     answers = ClosingArrays(*_arrays("f3 f3 i2 i4 f4 f5 i2 i2 i2"))
@@ -209,7 +264,7 @@ def _arrays(kinds: str) -> list[Any]:
 def announce() -> None:
     """Say on standard error that what comes compiles, where it does; once per process."""
     if _is_cold():
-        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes about a minute.\n")
+        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
 
 
 def _is_cold() -> bool:
@@ -218,4 +273,6 @@ def _is_cold() -> bool:
 
 
 if __name__ == "__main__":
-    compile_ahead(THERE)
+    CLAIMS.share(Path(sys.argv[1]))
+    for _ in _jobs_done():
+        pass
