@@ -24,6 +24,7 @@ from .bench_options import (
     print_report,
     writable,
 )
+from .user_commands import commands, hands, planning
 
 _COMMON: Final = Common()
 _HANDS: Final = Hands()
@@ -334,6 +335,9 @@ def displacement(
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "solve": solve,
     "batch": batch,
+    "hands": hands,
+    "commands": commands,
+    "planning": planning,
     "packing": packing,
     "choose": choose,
     "steadiness": steadiness,

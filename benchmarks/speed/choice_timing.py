@@ -1,4 +1,4 @@
-"""The benchmark of the choice: five fingers with several alternatives each, without and with steadiness."""
+"""The benchmark of the choice: five fingers with several alternatives each, without and with epsilon."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from clench.models.command import GraspCommand
 from clench.scoring.calibration import Calibration
 from clench.scoring.choice import HandChoice, choose
 from clench.scoring.criterion_types import ScoringContext
-from clench.solver.alternatives import finger_sets
+from clench.solver.alternatives import finger_candidates
 from clench.solver.problem import make_context, make_problem
 
 from ..bench_options import Case, Runs
@@ -28,7 +28,7 @@ CHECKED_SETS = 3
 CHECKED_POSES = 5
 
 ADDITIVE = Calibration("additive", {"range_of_motion": 1.0, "touching_links": 1.0, "limit_distance": 0.2})
-STEADY = Calibration("steady", {"range_of_motion": 0.2, "steadiness": 1.0})
+STEADY = Calibration("steady", {"range_of_motion": 0.2, "epsilon": 1.0})
 
 Groups = Sequence[Sequence[FingerCandidate]]
 
@@ -46,7 +46,7 @@ def bench_choice(case: Case, runs: Runs, alternatives: int, seed: int) -> BenchR
         make_problem(hand, obj, GraspCommand(hand_pose=pose, preshape="open", planes=1, open_variants=variants))
         for pose in clench.approach_poses(hand, obj, runs.poses, seed)
     ]
-    cases = [([[c for c in g if c.plane is None] for g in finger_sets(p)], p) for p in problems]
+    cases = [([[c for c in g if c.plane is None] for g in finger_candidates(p)], p) for p in problems]
     report = BenchReport(values={"benchmark": "choose", **describe_place()})
     report.values |= {
         "hand": hand.name,

@@ -1,0 +1,1 @@
+"""Benchmarks of what users wait for: makers' hands, whole commands, planning; beside another version of the project."""
