@@ -12,7 +12,7 @@ hand, bottle = clench.Hand.load("robonaut2"), clench.GraspObject.load("bottle")
 with clench.Record(folder / "record.sqlite") as record:
     for pose in clench.approach_poses(hand, bottle, count=5, seed=7):
         # Measure the penetration of every candidate. Without a preshape, this would be for all preshapes.
-        command = clench.GraspCommand(hand_pose=pose, preshape="open", seed=7, check_sets=True)
+        command = clench.GraspCommand(hand_pose=pose, preshape="open", seed=7, check_candidates=True)
         solution = clench.solve(hand, bottle, command, record=record)
     print(f"{len(record)} solves recorded")
     for entry in record.find(limit=5):

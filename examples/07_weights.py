@@ -18,12 +18,12 @@ command = clench.GraspCommand(
     criteria={"range_of_motion": 1.0},
 )
 weights = [0.1, 0.3, 1.0, 2.0, 5.0, 10.0, 20.0]
-solutions = sweep_weight(hand, mug, command, "steadiness", weights)
-steadiness = [solution.choice["hand_scores"]["steadiness"] for solution in solutions]
-for weight, steady, solution in zip(weights, steadiness, solutions, strict=True):
+solutions = sweep_weight(hand, mug, command, "epsilon", weights)
+epsilons = [solution.choice["hand_scores"]["epsilon"] for solution in solutions]
+for weight, steady, solution in zip(weights, epsilons, solutions, strict=True):
     motion = sum(f.candidates[f.chosen].scores["range_of_motion"] for f in solution.fingers.values())
-    print(f"weight {weight:5g}: steadiness {steady:.4f} N/N, range of motion {motion:.3f} rad")
+    print(f"weight {weight:5g}: epsilon {steady:.4f} N/N, range of motion {motion:.3f} rad")
     print(f"    {solution.choice['text']}")
-assert steadiness == sorted(steadiness)
+assert epsilons == sorted(epsilons)
 
-print(draw_sweep(hand, mug, solutions, ("steadiness", "range_of_motion"), weights, folder / "weights.png"))
+print(draw_sweep(hand, mug, solutions, ("epsilon", "range_of_motion"), weights, folder / "weights.png"))

@@ -8,7 +8,7 @@ import pytest
 import clench
 from clench.closing.candidates import FingerCandidate
 from clench.closing.collision.packed_object import pack_object
-from clench.closing.feasibility import judge_sets
+from clench.closing.feasibility import judge_candidates
 from clench.closing.finger_plan import plan_finger
 from clench.core.pose import Pose
 from clench.core.tolerances import ALLOWED_PENETRATION
@@ -26,7 +26,7 @@ def at(travel, plane=None):
 
 
 def judge(candidates, *, measure, hand=HAND, obj=WALL):
-    judge_sets(hand, candidates, pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, measure)
+    judge_candidates(hand, candidates, pack_object(obj), obj.pose.matrix, CollisionSource.ENGINE, measure)
     return candidates
 
 
@@ -67,7 +67,7 @@ def test_the_path_is_that_of_the_order(together, feasible):
     candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
     bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose([0.087 * np.cos(1.2), 0.0, 0.087 * np.sin(1.2)]))
     packed, place = pack_object(bead), bead.pose.matrix
-    judge_sets(hand, [candidate], packed, place, CollisionSource.ENGINE, True, together)
+    judge_candidates(hand, [candidate], packed, place, CollisionSource.ENGINE, True, together)
     assert candidate.feasible is feasible
 
 
@@ -89,7 +89,7 @@ def test_joints_that_close_at_once_may_pass_through_something_on_the_way():
     candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
     place = 0.04 * np.array([np.cos(0.7), 0.0, np.sin(0.7)]) + 0.02 * np.array([np.cos(1.4), 0.0, np.sin(1.4)])
     bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose(place))
-    judge_sets(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
+    judge_candidates(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
     assert candidate.feasible is False
     assert candidate.penetration == pytest.approx(0.006, abs=1e-4)
 
@@ -104,11 +104,22 @@ def test_a_path_is_looked_at_at_the_speeds_of_its_joints():
     place = 0.04 * np.array([np.cos(first), 0.0, np.sin(first)])
     place += 0.03 * np.array([np.cos(second), 0.0, np.sin(second)])
     bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose(place))
-    judge_sets(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
+    judge_candidates(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
     assert candidate.penetration == pytest.approx(0.006, abs=1e-4)
 
 
-def test_a_set_that_was_swept_over_the_whole_width_needs_no_measuring():
+def test_a_joint_that_is_stopped_stays_while_the_others_close_on():
+    """The bead lies where the first link would be if it went on with the second one."""
+    hand = chain([CLOSING, CLOSING])
+    plan = plan_finger(hand, hand.fingers[0], np.zeros(2), 3, CollisionSource.ENGINE)
+    travel = np.array([0.3, 1.4])
+    candidate = FingerCandidate(plan, 0, None, travel, plan.angles(hand, travel), (), None)
+    bead = clench.GraspObject.load("sphere:r=0.002", pose=Pose([0.02 * np.cos(1.0), 0.0, 0.02 * np.sin(1.0)]))
+    judge_candidates(hand, [candidate], pack_object(bead), bead.pose.matrix, CollisionSource.ENGINE, True, True)
+    assert candidate.feasible is True
+
+
+def test_a_candidate_that_was_swept_over_the_whole_width_needs_no_measuring():
     (judged,) = judge([replace(at(1.9), swept=True)], measure=True)
     assert (judged.clear, judged.feasible, judged.penetration) == (True, True, 0.0)
 

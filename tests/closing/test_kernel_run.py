@@ -10,7 +10,7 @@ from clench.closing.collision.packed_object import pack_object
 from clench.closing.finger_plan import plan_finger
 from clench.closing.hand_plan import make_hand_plan
 from clench.closing.kernel_run import close_candidates, row_of
-from clench.closing.packed_problem import candidates_around, capacity_of, pack_problem, planes_tell
+from clench.closing.packed_problem import capacity_of, pack_problem
 from clench.core.pose import Pose
 from clench.core.threads import kernel_threads, share_out
 from clench.kernels.closing.start_overlap import CROSSED, FREE
@@ -31,10 +31,9 @@ def planned(hand, count=3, q=None, fingers=None, full_width=True):
 
 
 def close(plan, obj):
-    """Return the closed candidates of a plan, with planes for the full width, too."""
+    """Return the closed candidates of a plan."""
     problem = pack_problem(plan, pack_object(obj), (), False)
-    every = problem.arrays._replace(candidates=plan.candidates)
-    return row_of(close_candidates(replace(problem, arrays=every), obj.pose.matrix[:3]).free, 0)
+    return row_of(close_candidates(problem, obj.pose.matrix[:3]).free, 0)
 
 
 BALL = GraspObject.load("sphere:r=0.02", pose=Pose([0.04, 0.001, 0.04]))
@@ -45,7 +44,7 @@ def test_one_candidate_per_plane_and_one_for_the_full_width():
     plan = planned(hand)
     assert plan.candidates.finger_posture.tolist() == [0] * 4 + [1] * 4
     assert plan.is_full_width == (False, False, False, True) * 2
-    assert plan.candidates.high.tolist() == [1, 2, 3, 3] * 2
+    assert (plan.candidates.high - plan.candidates.low).tolist() == [1, 1, 1, 0] * 2
     assert not any(planned(hand, full_width=False).is_full_width)
 
 
@@ -93,20 +92,6 @@ def test_overlap_at_the_start_is_noted_on_planes_for_the_finger_it_concerns():
     inside = close_candidates(problem, Pose([0.02, 0.0, 0.02]).matrix[:3])
     assert inside.blocked.tolist() == [[CROSSED + 1, CROSSED + 2]]
     assert not inside.free.travel.any()
-
-
-@pytest.mark.parametrize("model", ["sphere:r=0.02", "box:x=0.02,y=0.02,z=0.02", "cylinder:r=0.02,h=0.02"])
-def test_the_full_width_has_planes_around_what_is_swept_as_a_polyhedron_alone(model):
-    hand = chain([CLOSING])
-    curved = model.startswith("cylinder")
-    packed = pack_object(GraspObject.load(model))
-    plan, alone = planned(hand), planned(hand, full_width=False)
-    candidates, single = candidates_around(plan, packed), candidates_around(alone, packed)
-    assert (candidates.high - candidates.low).tolist() == [1, 1, 1, 3 if curved else 0]
-    assert single.high.tolist() == [1, 2, 3]
-    assert planes_tell(plan, candidates) == curved
-    assert planes_tell(alone, single)
-    assert not planes_tell(plan.planes, candidates_around(plan.planes, packed))
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -181,11 +181,15 @@ def cache():
     clench.set_object_cache(OBJECT_CACHE)
 
 
+def cube(side):
+    return GraspObject.load(f"box:x={side:g},y={side:g},z={side:g}")
+
+
 def packed_once_solved(number):
-    """Solve with a few boxes in turn; return a function that tells which of them are still packed."""
+    """Solve with a few cubes in turn, equal in memory; return a function that tells which are still packed."""
     packed = []
     for k in range(number):
-        obj = GraspObject.load(f"box:x=0.0{k + 1},y=0.02,z=0.02")
+        obj = cube(0.01 * (k + 1))
         command = clench.GraspCommand(hand_pose=Pose([0, 0, -0.3]), full_width=False, planes=1, preshape="open")
         clench.solve(block_hand(), obj, command)
         packed.append(weakref.ref(pack_object(obj)))
@@ -199,7 +203,7 @@ def packed_once_solved(number):
 
 def test_objects_stay_packed_within_their_memory(cache):
     """A program that goes through many objects holds as many as fit: a million triangles take 0.2 GB."""
-    size = packed_size(pack_object(GraspObject.load("box:x=0.01,y=0.02,z=0.02")))
+    size = packed_size(pack_object(cube(0.01)))
     cache(0)
     cache(5 * size)
     there = packed_once_solved(12)
@@ -211,12 +215,12 @@ def test_objects_stay_packed_within_their_memory(cache):
 
 
 def test_what_is_used_again_stays_packed(cache):
-    first = GraspObject.load("box:x=0.05,y=0.02,z=0.02")
+    first = cube(0.055)
     cache(0)
     cache(3 * packed_size(pack_object(first)))
     kept = pack_object(first)
     for k in range(6):
-        pack_object(GraspObject.load(f"box:x=0.0{k + 1},y=0.03,z=0.03"))
+        pack_object(cube(0.01 * (k + 1)))
         assert pack_object(first) is kept
 
 

@@ -96,7 +96,7 @@ COMMAND: dict[str, Any] = {
     "full_width": True,
     "yaw_grid": [0.0],
     "open_variants": [0.0, 0.1],
-    "check_sets": False,
+    "check_candidates": False,
     "measure": True,
     "collision_source": "engine",
     "criteria": {"range_of_motion": 1.0},

@@ -1,4 +1,4 @@
-"""Steadiness within torque limits, and the fast bound: never above what is exact."""
+"""Epsilon within torque limits, and the fast bound: never above what is exact."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def test_a_full_file_is_read_and_written_back(tmp_path):
         "full_width": False,
         "yaw_grid": [0.0, -0.1],
         "open_variants": [0.0, 0.2],
-        "check_sets": True,
+        "check_candidates": True,
         "measure": False,
         "collision_source": "raw",
         "opposition_grid": [0.0, 0.2],

@@ -35,7 +35,7 @@ def test_the_best_score_wins_and_ties_go_to_the_full_width_then_to_the_first():
     assert chosen([moved(0.2, plane=0), moved(0.2, plane=1)]) == 0
 
 
-def test_a_set_known_to_be_infeasible_is_never_chosen_before_one_that_is_not():
+def test_a_candidate_known_to_be_infeasible_is_never_chosen_before_one_that_is_not():
     deep = moved(0.0, plane=0, feasible=False)
     assert chosen([deep, moved(1.0, touches=())]) == 1
     assert chosen([deep, moved(1.0, plane=1, feasible=None)]) == 1
@@ -70,7 +70,7 @@ def test_one_outside_a_limit_comes_after_those_inside():
     assert chosen([moved(0.6), moved(0.7)], limited) == 0
 
 
-def test_sets_that_a_criterion_says_nothing_about_come_after_those_it_does():
+def test_candidates_that_a_criterion_says_nothing_about_come_after_those_it_does():
     calibration = Calibration(weights={"pad_indentation": 1.0, "range_of_motion": 1.0})
     assert chosen([moved(0.0), moved(1.0, penetration=1e-4)], calibration) == 1
     choice = choose([[moved(0.0), moved(1.0)]], calibration, CONTEXT)

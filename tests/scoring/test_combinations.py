@@ -10,7 +10,7 @@ from clench.scoring.combinations import MOST_JUDGED, Ceilings, Combination, best
 
 
 class WorstDirection:
-    """Judge like steadiness: the least over directions of the best that any finger's set gives there, plus sums.
+    """Judge like epsilon: the least over directions of the best that any finger's candidate gives there, plus sums.
 
     Args:
         supports: by finger, set and direction. sums: by finger and set. options: sets of every finger.
@@ -71,7 +71,9 @@ def test_it_equals_exhaustive_search_and_says_so(seed):
     assert found.best.total == pytest.approx(exhaustive(judge).total, abs=2e-9)
     assert found.proved
     assert (found.second is None) == (fingers * sets == fingers)
-    assert found.second is None or (found.second.rank <= found.best.rank and found.second.sets != found.best.sets)
+    assert found.second is None or (
+        found.second.rank <= found.best.rank and found.second.candidates != found.best.candidates
+    )
 
 
 @pytest.mark.parametrize("seed", range(100))
@@ -128,12 +130,12 @@ class Plain(WorstDirection):
 
 def test_of_equal_combinations_the_first_wins():
     found = best_combination([[2, 0], [1, 3]], Plain(lambda sets: (True, 1.0)))
-    assert found.best.sets == (2, 1)
-    assert found.second.sets == (2, 3)
+    assert found.best.candidates == (2, 1)
+    assert found.second.candidates == (2, 3)
 
 
 def test_what_a_limit_forbids_comes_last():
-    assert best_combination([[0, 1]], Plain(lambda sets: (sets[0] == 1, 5.0 - sets[0]))).best.sets == (1,)
+    assert best_combination([[0, 1]], Plain(lambda sets: (sets[0] == 1, 5.0 - sets[0]))).best.candidates == (1,)
 
 
 def test_the_same_question_gives_the_same_answer():

@@ -14,7 +14,7 @@ from clench.scoring.criterion_registry import (
     criterion_names,
     find_criterion,
     register_criterion,
-    score_sets,
+    score_candidates,
 )
 from clench.scoring.criterion_types import ScoringContext
 
@@ -42,9 +42,9 @@ def test_a_users_criterion_is_scored_where_it_is_asked_for():
     register_criterion(Gentle())
     assert "gentle" in criterion_names()
     c = candidate((0.3, 0.4))
-    score_sets([c], [], CONTEXT)
+    score_candidates([c], [], CONTEXT)
     assert "gentle" not in c.scores
-    score_sets([c], ["gentle"], CONTEXT)
+    score_candidates([c], ["gentle"], CONTEXT)
     assert c.scores["gentle"] == 0.4
     assert c.scores["range_of_motion"] == pytest.approx(0.6)
 
@@ -90,7 +90,7 @@ def test_a_scale_must_be_above_zero(scale):
 def test_a_value_that_is_no_number_is_refused_with_the_criterions_name(value):
     register_criterion(type("Odd", (Gentle,), {"score": lambda self, candidate, context: value})())
     with pytest.raises(CommandError, match=r"'gentle'.*finite number"):
-        score_sets([candidate()], ["gentle"], CONTEXT)
+        score_candidates([candidate()], ["gentle"], CONTEXT)
 
 
 @pytest.mark.parametrize("weight", [-1.0, float("nan"), float("inf")])
@@ -132,4 +132,4 @@ def test_values_that_are_no_numbers_to_sum_are_refused(value, monkeypatch):
     monkeypatch.setattr(Gentle, "score", lambda *_: value)
     register_criterion(Gentle())
     with pytest.raises(CommandError, match=r"criterion 'gentle': gave .*; expected "):
-        score_sets([candidate((0.3, 0.4))], ["gentle"], CONTEXT)
+        score_candidates([candidate((0.3, 0.4))], ["gentle"], CONTEXT)

@@ -45,19 +45,19 @@ def test_the_sentence_names_what_decided_and_by_how_much():
         "The chosen candidates lead the next best (the full width for index) by 0.3; "
         "range_of_motion decided it: 0.3 against 0.5 rad, worth 0.2."
     )
-    assert document["runner_up"]["sets"] == {"index": 0}
+    assert document["runner_up"]["candidates"] == {"index": 0}
     assert document["criteria"]["limit_distance"]["weight"] == 0.5
     assert document["criteria"]["limit_distance"]["better"] == "more"
 
 
-def test_a_set_that_wins_by_what_it_fulfils_says_so():
+def test_a_candidate_that_wins_by_what_it_fulfils_says_so():
     finger = explained([[candidate((0.1, 0.0), feasible=False), candidate((0.5, 0.0), plane=0)]])["fingers"]["index"]
     assert finger["text"] == "plane 0 comes before the full width because it alone may be taken."
     finger = explained([[candidate((0.1, 0.0), touches=()), candidate((0.5, 0.0), plane=0)]])["fingers"]["index"]
     assert finger["text"].endswith("because it alone touches the object.")
 
 
-def test_one_set_and_equal_sets():
+def test_one_candidate_and_equal_candidates():
     """Two pairs of joint angles of the same length score the same."""
     assert explained([[candidate()]])["fingers"]["index"]["text"] == "the full width is the only candidate."
     assert "nothing to choose" in explained([[candidate()]])["text"]
@@ -75,7 +75,7 @@ def test_postures_are_named_where_there_are_several():
     assert text.startswith("the full width of posture 1 leads the full width of posture 0")
 
 
-def test_the_front_of_a_finger_is_among_sets_that_may_be_taken():
+def test_the_front_of_a_finger_is_among_candidates_that_may_be_taken():
     sets = [
         candidate((0.3, 1.2)),
         candidate((0.5, 0.0)),

@@ -23,7 +23,7 @@ from clench.scoring.calibration import Calibration
 from clench.scoring.choice import choose
 from clench.scoring.criterion_registry import find_criterion
 from clench.scoring.criterion_types import ScoringContext
-from clench.solver.alternatives import finger_sets
+from clench.solver.alternatives import finger_candidates
 from clench.solver.problem import make_context, make_problem
 
 MUG = clench.GraspObject.load("mug")
@@ -62,7 +62,7 @@ def score(name, sets, context):
     return find_criterion(name, "test").score_hand(sets, context)
 
 
-def test_steadiness_is_epsilon_of_all_contacts(chosen):
+def test_epsilon_is_that_of_all_contacts(chosen):
     hand = clench.Hand.load("robonaut2")
     sets, context, _ = chosen(hand, MUG, mug_command())
     touches = [t for c in sets for t in c.holding]
@@ -71,20 +71,20 @@ def test_steadiness_is_epsilon_of_all_contacts(chosen):
     mass = mass_properties(MUG)
     T = context.T_palm_object
     held = held_by_contacts(contacts, T[:3, :3] @ mass.center + T[:3, 3], mass.length)
-    found = score("steadiness", sets, context)
+    found = score("epsilon", sets, context)
     assert found == pytest.approx(epsilon(held).radius, rel=1e-9, abs=1e-12)
     assert found > epsilon_bound(held) > 0.0
-    assert score("steadiness", [], context) == 0.0
+    assert score("epsilon", [], context) == 0.0
 
 
 def test_what_is_prepared_at_once_is_what_is_found_one_by_one(chosen):
     sets, context, _ = chosen(clench.Hand.load("robonaut2"), MUG, mug_command())
-    alone = score("steadiness", sets, context)
+    alone = score("epsilon", sets, context)
     context.kept.clear()
-    find_criterion("steadiness", "test").prepare([replace(sets[0], touches=()), *sets], context)
+    find_criterion("epsilon", "test").prepare([replace(sets[0], touches=()), *sets], context)
     kept = {key for key in context.kept if "wrenches" in key}
     assert len(kept) == len(sets) + 1
-    assert score("steadiness", sets, context) == pytest.approx(alone, rel=1e-12)
+    assert score("epsilon", sets, context) == pytest.approx(alone, rel=1e-12)
     assert {key for key in context.kept if "wrenches" in key} == kept
 
 
@@ -95,15 +95,15 @@ def test_the_steadiest_of_all_combinations_is_chosen(seed):
     pose = clench.approach_poses(hand, MUG, seed + 1, 0)[seed]
     command = clench.GraspCommand(hand_pose=pose, planes=1, open_variants=(0.0, 0.1, 0.2), preshape="open")
     problem = make_problem(hand, MUG, command)
-    calibration = Calibration("steady", {"range_of_motion": 0.2, "steadiness": 1.0})
+    calibration = Calibration("steady", {"range_of_motion": 0.2, "epsilon": 1.0})
     context = make_context(problem, calibration)
-    groups = finger_sets(problem)
+    groups = finger_candidates(problem)
     choice = choose(groups, calibration, context)
     totals = {}
     for sets in itertools.product(*(finger.equals for finger in choice.fingers)):
-        steady = score("steadiness", [g[i] for g, i in zip(groups, sets, strict=True)], context)
+        steady = score("epsilon", [g[i] for g, i in zip(groups, sets, strict=True)], context)
         own = sum(f.totals[i] for f, i in zip(choice.fingers, sets, strict=True))
-        totals[sets] = own + calibration.worth("steadiness", steady)
+        totals[sets] = own + calibration.worth("epsilon", steady)
     assert choice.proved
     assert choice.total == pytest.approx(max(totals.values()), abs=1e-9)
     assert totals[tuple(choice.chosen)] == pytest.approx(choice.total, abs=1e-9)
@@ -260,7 +260,7 @@ def test_no_tendons_no_tension(chosen):
 
 def test_criteria_of_the_hand_say_nothing_without_an_object():
     context = ScoringContext(pincer(), np.zeros(2))
-    assert score("steadiness", [], context) is None
+    assert score("epsilon", [], context) is None
     assert score("actuation_force", [], context) is None
 
 
@@ -275,17 +275,17 @@ def test_presets_choose(preset):
     assert set(solution.choice["criteria"]) | set(solution.choice["unused"])
 
 
-def test_weight_on_steadiness_never_makes_the_grip_less_steady():
+def test_weight_on_epsilon_never_makes_the_grip_less_steady():
     hand = clench.Hand.load("robonaut2")
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
     bounds = []
     for weight in (0.0, 0.1, 1.0, 10.0):
-        criteria = {"range_of_motion": 1.0, "steadiness": weight} if weight else {"range_of_motion": 1.0}
+        criteria = {"range_of_motion": 1.0, "epsilon": weight} if weight else {"range_of_motion": 1.0}
         command = clench.GraspCommand(
             hand_pose=pose, criteria=criteria, yaw_grid=(0.0, 0.15, -0.15), planes=1, preshape="open"
         )
         scores = clench.solve(hand, MUG, command).choice["hand_scores"]
-        bounds.append(scores.get("steadiness", 0.0))
+        bounds.append(scores.get("epsilon", 0.0))
     assert bounds[1:] == sorted(bounds[1:])
 
 
@@ -294,7 +294,7 @@ def test_scores_of_the_hand_are_also_told_as_it_is_at_last():
     hand = clench.Hand.load("robonaut2")
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
     grids = {"yaw_grid": (0.0, 0.1, -0.1, 0.2, -0.2), "opposition_grid": (0.0, 0.2, -0.2), "planes": 1}
-    command = clench.GraspCommand(hand_pose=pose, criteria={"range_of_motion": 1.0, "steadiness": 10.0}, **grids)
+    command = clench.GraspCommand(hand_pose=pose, criteria={"range_of_motion": 1.0, "epsilon": 10.0}, **grids)
     choice = clench.solve(hand, MUG, command).choice
     again = [f["closed_again"] for f in choice["fingers"].values()]
     assert (choice["final_hand_scores"] != choice["hand_scores"]) == any(again)

@@ -55,7 +55,7 @@ def commands(hand: clench.Hand, obj: clench.GraspObject, **asked: Any) -> list[c
 
 @pytest.mark.parametrize("model", ASKED)
 @pytest.mark.parametrize("name", HANDS)
-def test_documents_are_those_of_a_choice_among_all_sets(name: str, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_documents_are_those_of_a_choice_among_all(name: str, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     hand, obj = HANDS[name], clench.GraspObject.load(model)
     asked = commands(hand, obj, **ASKED[model])
     late = documents(hand, obj, asked)
@@ -79,7 +79,7 @@ def test_fingers_that_the_others_made_close_again_are_said_to_be(monkeypatch: py
         ({}, "full width", ["planes"]),
         ({"criteria": "steady"}, "full width", ["planes"]),
         ({"full_width": False}, "all", []),
-        ({"check_sets": True}, "all", []),
+        ({"check_candidates": True}, "all", []),
         ({"open_variants": (0.0, 0.2)}, "all", []),
         ({"rounds": 2}, "full width", ["planes"]),
         ({"criteria": {"own": 1.0}}, "all", []),

@@ -44,12 +44,12 @@ def certificate_at(yaw: float, obj: clench.GraspObject) -> Certificate:
 
 
 @pytest.mark.parametrize(("yaw", "holds"), [(0.0, False), (YAW, True)])
-def test_a_bead_inside_a_link_counts_at_the_posture_of_the_chosen_set(yaw: float, holds: bool) -> None:
+def test_a_bead_inside_a_link_counts_at_the_posture_of_the_chosen_candidate(yaw: float, holds: bool) -> None:
     """The bead is inside the link where the hand starts; a set at another posture has nothing to do with it."""
     assert certificate_at(yaw, bead(0.0)).holds is holds
 
 
-def test_a_bead_inside_a_link_at_the_posture_of_the_chosen_set_is_told() -> None:
+def test_a_bead_inside_a_link_at_the_posture_of_the_chosen_candidate_is_told() -> None:
     assert certificate_at(0.0, bead(YAW)).holds
     found = certificate_at(YAW, bead(YAW))
     assert not found.holds

@@ -35,7 +35,7 @@ def ball(radius, center):
 def test_circle(up, make, distance, angle, radius):
     sign = 1.0 if up else -1.0
     obj = make(radius, [distance * np.cos(angle), 0.0, sign * distance * np.sin(angle)])
-    solution = clench.solve(one_link(THICK, LONG, up=up), obj, command())
+    solution = clench.solve(one_link(THICK, LONG, up=up), obj, command(full_width=make is ball))
     theta = angle - np.arcsin((radius + THICK) / distance)
     assert solution.joint_angles["index_0"] == pytest.approx(theta, abs=EXACT)
     (contact,) = solution.contacts
@@ -47,6 +47,21 @@ def test_circle(up, make, distance, angle, radius):
     np.testing.assert_allclose(contact.normal, -out, atol=1e-9)
     assert abs(contact.gap) <= 1e-10
     assert solution.is_valid()
+
+
+@pytest.mark.parametrize(("distance", "angle", "radius"), [(0.07, 0.9, 0.02), (0.05, 2.2, 0.03), (0.15, 1.4, 0.001)])
+def test_full_width_meets_a_cylinder_at_its_polyhedron(distance, angle, radius):
+    """The finger stops inside the true circle, by no more than the deviation that the certificate states."""
+    obj = upright(radius, [distance * np.cos(angle), 0.0, distance * np.sin(angle)])
+    solution = clench.solve(one_link(THICK, LONG), obj, command())
+    theta = angle - np.arcsin((radius + THICK) / distance)
+    deviation = solution.certificate["deviation"]
+    beyond = solution.joint_angles["index_0"] - theta
+    assert deviation == pytest.approx(2e-5 * max(radius, 0.05))
+    assert -EXACT <= beyond <= 1.01 * deviation / np.sqrt(distance**2 - (radius + THICK) ** 2)
+    (contact,) = solution.contacts
+    center = np.array(obj.pose.position)
+    assert np.hypot(*(contact.position - center)[[0, 2]]) == pytest.approx(radius, abs=deviation)
 
 
 def test_tip_meets_a_circle_beyond_the_links_side():

@@ -27,7 +27,7 @@ def yawed_hand(**options):
     return builder.hand(**options)
 
 
-def test_one_set_per_plane_and_the_full_width():
+def test_one_candidate_per_plane_and_the_full_width():
     solution = clench.solve(three_links(), BALL, command(planes=5))
     finger = solution.fingers["index"]
     planes = [c.plane for c in finger.candidates]
@@ -79,10 +79,11 @@ def test_scores_and_timing_are_in_the_result():
     assert solution.timing["total"] > 0.0
 
 
-def test_the_chosen_set_has_the_best_weighted_score_of_those_that_may_be_chosen():
+def test_the_chosen_candidate_has_the_best_weighted_score_of_those_that_may_be_chosen():
     centered = BALL.posed(Pose([0.045, 0.0, 0.035]))  # touched on the middle plane, so that some set is feasible
     for criteria in ({"range_of_motion": 1.0}, {"limit_distance": 1.0}):
-        finger = clench.solve(three_links(), centered, command(criteria=criteria, check_sets=True)).fingers["index"]
+        asked = command(criteria=criteria, check_candidates=True)
+        finger = clench.solve(three_links(), centered, asked).fingers["index"]
         may = [c for c in finger.candidates if c.feasible]
         assert may
         (name,) = criteria
@@ -91,8 +92,8 @@ def test_the_chosen_set_has_the_best_weighted_score_of_those_that_may_be_chosen(
         assert sign * finger.candidates[finger.chosen].scores[name] == best
 
 
-def test_checked_sets_are_feasible_as_far_as_their_penetration_says():
-    finger = clench.solve(three_links(), BALL, command(check_sets=True)).fingers["index"]
+def test_checked_candidates_are_feasible_as_far_as_their_penetration_says():
+    finger = clench.solve(three_links(), BALL, command(check_candidates=True)).fingers["index"]
     assert all(c.feasible is not None for c in finger.candidates)
     deep = [c for c in finger.candidates if c.penetration is not None and c.penetration > 1e-6]
     assert deep
@@ -108,7 +109,7 @@ def test_yaw_grid_and_open_values_give_alternatives():
     assert all(c.joint_angles["index_1"] >= 0.2 - 1e-12 for c in candidates if c.posture % 2)
 
 
-def test_a_preshape_sets_posture_and_open_values():
+def test_a_preshape_candidates_posture_and_open_values():
     solution = clench.solve(yawed_hand(), BALL, command(preshape={"index_0": 0.1, "index_1": 0.05}))
     assert solution.joint_angles["index_0"] == 0.1
     assert solution.open_angles["index_1"] == 0.05
@@ -205,7 +206,7 @@ def test_touches_of_an_object_with_more_elements_than_triangles():
         assert abs(away[1]) <= 0.0005 + 1e-9
 
 
-def test_the_pose_sensitivity_of_a_set_is_that_of_the_solution():
+def test_the_pose_sensitivity_of_a_candidate_is_that_of_the_solution():
     solution = clench.solve(three_links(), BALL, command(criteria={"pose_sensitivity": 1.0}))
     index = solution.fingers["index"]
     linear = clench.sensitivity(solution, three_links(), BALL)

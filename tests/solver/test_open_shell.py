@@ -22,7 +22,7 @@ def test_an_open_shell_blocks_what_stands_in_it_whatever_is_far_away(beside):
     assert solution.status == "blocked"
     assert solution.fingers["index"].status == "blocked"
     checked = clench.solve(
-        hand, shell, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True, preshape="open")
+        hand, shell, clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_candidates=True, preshape="open")
     )
     assert checked.fingers["index"].status == "blocked"
     assert clench.solve_batch(hand, shell, [Pose.identity()], command).status[0] == "blocked"

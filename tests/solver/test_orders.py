@@ -9,7 +9,7 @@ from clench.core.pose import Pose
 from clench.execution.trajectory import plan_trajectory
 from clench.models.hand.hand import JointRole
 from clench.models.shapes import Shape, ShapeKind
-from clench.solver.alternatives import finger_sets
+from clench.solver.alternatives import finger_candidates
 from clench.solver.orders import best_order
 from clench.solver.problem import make_problem
 from handmade import make_solution
@@ -24,9 +24,9 @@ def solve(hand, obj, **changes):
 
 
 def bar(x, z, r=0.004):
-    """Return a rod across the finger, along y."""
+    """Return a rod across the finger, along y: a capsule, which is swept as it is."""
     half = np.sqrt(0.5)
-    return clench.GraspObject.load(f"cylinder:r={r},h=0.1", pose=Pose([x, 0, z], wxyz=[half, half, 0, 0]))
+    return clench.GraspObject.load(f"capsule:r={r},h=0.1", pose=Pose([x, 0, z], wxyz=[half, half, 0, 0]))
 
 
 def angle_to_bar(x, z, r=0.004):
@@ -366,16 +366,16 @@ def test_the_change_with_the_pose_is_not_guessed_for_paths_that_cannot_be_found_
     assert all("break away" in found.reasons[name] for name in hand.joint_names)
 
 
-def test_sets_with_joints_that_break_away_are_judged_where_these_were_held():
+def test_candidates_with_joints_that_break_away_are_judged_where_these_were_held():
     """The actuator goes to its limit on every plane; where the first joint was held tells the sets apart."""
     ball = clench.GraspObject.load("sphere:r=0.004", pose=Pose([0.03, 0.005, 0.02]))
-    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_sets=True, preshape="open")
-    (sets,) = finger_sets(make_problem(breaking(True), ball, command))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), planes=3, check_candidates=True, preshape="open")
+    (sets,) = finger_candidates(make_problem(breaking(True), ball, command))
     full = next(c for c in sets if c.plane is None)
     free = [c for c in sets if c.q[0] > full.q[0] + 1e-3]
     assert free
     assert not any(c.clear for c in free)
-    across = solve(breaking(True), bar(0.03, 0.02), check_sets=True).fingers["index"].candidates
+    across = solve(breaking(True), bar(0.03, 0.02), check_candidates=True).fingers["index"].candidates
     # The middle of a round link touches first; its own plane's set is the full width's.
     assert [c.feasible for c in across if c.plane in (1, None)] == [True, True]
 

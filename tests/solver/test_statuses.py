@@ -208,7 +208,7 @@ def two_axis_groups():
     return HandBuilder().finger("index", shapes, [0.05, 0.05], axes=axes, upper=0.4).hand()
 
 
-def test_a_plane_on_which_other_joints_bring_a_link_into_the_object_has_no_set():
+def test_a_plane_on_which_other_joints_bring_a_link_into_the_object_has_no_candidate():
     """On the outermost planes the first joint meets nothing: the tip is on none of them, but on those of its own."""
     hand, obj = two_axis_groups(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
     index = clench.solve(hand, obj, command(planes=3, full_width=False)).fingers["index"]
@@ -259,7 +259,7 @@ def test_what_a_link_would_be_brought_into_may_be_an_obstacle():
     assert "overlaps sphere:r=0.005 or an obstacle on this plane" in index.reason
 
 
-def test_a_finger_without_a_set_on_any_plane_does_not_move():
+def test_a_finger_without_a_candidate_on_any_plane_does_not_move():
     hand, obj = two_axis_groups(), clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.08, 0.0, 0.03]))
     asked = command(planes=2, full_width=False)
     solution = clench.solve(hand, obj, asked)

@@ -29,14 +29,14 @@ def test_a_full_width_solve_cuts_no_link(cuts):
     assert not cuts
 
 
-@pytest.mark.parametrize("options", [{"full_width": False}, {"planes": 3, "check_sets": True}])
+@pytest.mark.parametrize("options", [{"full_width": False}, {"planes": 3, "check_candidates": True}])
 def test_a_solve_on_planes_cuts_the_links(cuts, options):
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE, preshape="open", **options))
     assert cuts
 
 
-def test_the_reason_for_the_posture_is_known_before_those_for_the_sets(cuts):
+def test_the_reason_for_the_posture_is_known_before_those_for_the_candidates(cuts):
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     choice = clench.solve(hand, mug, clench.GraspCommand(hand_pose=MUG_POSE)).choice
     assert choice["preshapes"]["chosen"] in choice["preshapes"]["compared"]

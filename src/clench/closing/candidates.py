@@ -64,7 +64,7 @@ class LinkContact(NamedTuple):
 
 @dataclass(eq=False)
 class FingerCandidate:
-    """One alternative set of a finger; the judgement is filled in after the closing.
+    """One candidate of a finger; the judgement is filled in after the closing.
 
     Args:
         plan: the finger at its posture. posture: index of the posture alternative.
@@ -125,7 +125,7 @@ class FingerCandidate:
 
 
 def combined_posture(hand: Hand, start: FloatArray, chosen: Sequence[FingerCandidate]) -> FloatArray:
-    """Return the posture of the whole hand with every finger at its chosen set, shape (J,) [rad]."""
+    """Return the posture of the whole hand with every finger at its chosen candidate, shape (J,) [rad]."""
     q = start.copy()
     for candidate in chosen:
         own = candidate.plan.finger.own

@@ -15,13 +15,13 @@ from clench.models.shapes import CollisionSource
 
 from .candidates import FingerCandidate
 
-#: Angles closer than this are the same set [rad].
+#: Angles closer than this are the same candidate [rad].
 _SAME = 1e-12
-#: Postures at which the path of a set is looked at, besides its end.
+#: Postures at which the path of a candidate is looked at, besides its end.
 _LOOKS = 8
 
 
-def judge_sets(
+def judge_candidates(
     hand: Hand,
     candidates: Sequence[FingerCandidate],
     packed: PackedObject,
@@ -32,13 +32,13 @@ def judge_sets(
 ) -> None:
     """Fill `clear` of the candidates, and on request `feasible` and `penetration`.
 
-    A set that was swept over the full width passes through nothing. Without that, the full-width set passes through
-    nothing on any plane; a plane's own set that equals it is the same set. Any other plane's set passes through the
-    contacts of other planes. The overlap between the planes is measured.
+    A candidate that was swept over the full width passes through nothing. Without a sweep, the full-width candidate
+    passes through nothing on any plane. A plane's candidate with the same angles is the same candidate. Any other
+    plane's candidate passes through the contacts of other planes. The overlap between the planes is measured.
 
     Args:
         hand: the hand. candidates: of all fingers. packed, T_palm_object: the object, shape (4, 4).
-        source: geometry of the hand. measure: measure every set, along its path. together: all joints close
+        source: geometry of the hand. measure: measure every candidate, along its path. together: all joints close
             simultaneously.
     """
     whole = {id(c.plan): c for c in candidates if c.plane is None}
@@ -63,7 +63,7 @@ def _deepest(
     source: CollisionSource,
     together: bool,
 ) -> tuple[float, float]:
-    """Return the largest depth beyond its link's allowance along a set's path, and that allowance [m]."""
+    """Return the largest depth beyond its link's allowance along a candidate's path, and that allowance [m]."""
     deepest, allowance = 0.0, ALLOWED_PENETRATION
     for travel in _path_at_once(candidate) if together else _path(candidate.travel):
         q = candidate.on_the_way(hand, travel)
@@ -84,8 +84,11 @@ def _path(travel: FloatArray) -> list[FloatArray]:
 
 
 def _path_at_once(candidate: FingerCandidate) -> list[FloatArray]:
-    """Return travels along a closing path on which all degrees of freedom move simultaneously, the end last."""
+    """Return travels along a closing path on which all degrees of freedom move simultaneously, the end last.
+
+    A degree of freedom that was held travels on here; `FingerCandidate.on_the_way` holds its joints.
+    """
     speeds = np.array(candidate.plan.speeds)
     last = float((candidate.travel / speeds).max(initial=0.0))
     parts = np.linspace(0.0, last, _LOOKS * len(speeds), endpoint=False)[1:]
-    return [*(np.minimum(speeds * at, candidate.travel) for at in parts), candidate.travel]
+    return [*(speeds * at for at in parts), candidate.travel]

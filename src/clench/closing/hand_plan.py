@@ -37,8 +37,8 @@ class HandPlan:
             of the posture alternative of each finger posture. idle: fingers asked for that no joint closes.
         packing: the plans packed. full_width_arrays: the links packed, and which candidates sweep them; the object is
             left out.
-        candidates: of each finger posture its planes, one by one, then the full width, if requested. A finger posture
-            that does not lie in planes has the full width alone, without planes.
+        candidates: of each finger posture its planes, one by one, then the full width, if requested, without planes. A
+            finger posture that does not lie in planes has the full width alone.
         is_full_width: whether each candidate is the full width.
         full: the command asks for the full width. together: all joints of the hand move simultaneously. times: number
             of passes through the degrees of freedom.
@@ -151,7 +151,7 @@ def make_hand_plan(
         planar = plan.lies_in_planes(together or times != 1)
         rows += [(e, k, k + 1, 0) for k in range(count) if planar]
         if full_width:
-            rows.append((e, 0, count if planar else 0, 1))
+            rows.append((e, 0, 0, 1))
     table = np.array(rows, dtype=np.int64).reshape(-1, 4)
     is_full_width, packing = tuple(map(bool, table[:, 3])), PackedPlans(plans)
     finger_posture, low, high = (np.ascontiguousarray(table[:, k]) for k in range(3))

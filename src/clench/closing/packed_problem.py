@@ -24,7 +24,6 @@ from .hand_plan import HandPlan
 from .start_blocking import link_masks
 
 if TYPE_CHECKING:
-    from clench.kernels.closing.layout import CandidateArrays
     from clench.kernels.closing.solve_layout import Arena, CommandArrays, ObjectArrays, ProblemArrays
 
 #: Segments per plane that an arena holds before it has to grow.
@@ -146,7 +145,7 @@ def pack_problem(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: b
 def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) -> ProblemArrays:
     from clench.kernels.closing.solve_layout import ProblemArrays
 
-    target, bodies, candidates = object_arrays(packed), plan.bodies, candidates_around(plan, packed)
+    target, bodies, candidates = object_arrays(packed), plan.bodies, plan.candidates
     return ProblemArrays(
         hand=plan.arrays(planar=bool((candidates.low < candidates.high).any())),
         full_width=plan.full_width_arrays._replace(object=target.bodies),
@@ -159,12 +158,12 @@ def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) ->
         meshes=link_mesh_arrays(plan.hand, plan.source),
         across=bodies.across,
         apart=np.asarray(bodies.across - bodies.within),
-        command=_pack_command(plan, terms, tip_only, planes_tell(plan, candidates)),
+        command=_pack_command(plan, terms, tip_only),
         fingers=pack_finger_links(plan),
     )
 
 
-def _pack_command(plan: HandPlan, terms: Terms, tip_only: bool, crossing: bool) -> CommandArrays:
+def _pack_command(plan: HandPlan, terms: Terms, tip_only: bool) -> CommandArrays:
     from clench.kernels.closing.solve_layout import CommandArrays
 
     hand, source, start = plan.hand, plan.source, plan.start
@@ -189,7 +188,6 @@ def _pack_command(plan: HandPlan, terms: Terms, tip_only: bool, crossing: bool) 
         together=plan.together,
         full_width=plan.full,
         chosen=plan.candidate_finger == list(range(len(fingers))),
-        crossing=crossing,
         several=plan.several,
         nested=link_within_link(hand, start, source, plan.bodies.across) is not None,
         idle=len(plan.idle),
@@ -202,28 +200,6 @@ def _own_joints(fingers: Sequence[Finger]) -> np.ndarray:
     for row, finger in zip(joints, fingers, strict=True):
         row[: len(finger.joints)] = finger.joints
     return joints
-
-
-def candidates_around(plan: HandPlan, packed: PackedObject) -> CandidateArrays:
-    """Return the candidates of a plan as they close around an object.
-
-    The full width needs no planes around exactly swept shapes: the sweep alone is faster. Cylinders and ellipsoids are
-    swept as polyhedra, so a plane can show an earlier contact with the true shape.
-    """
-    if packed.is_curved:
-        return plan.candidates
-    return plan.candidates._replace(high=np.where(plan.is_full_width, plan.candidates.low, plan.candidates.high))
-
-
-def planes_tell(plan: HandPlan, candidates: CandidateArrays) -> bool:
-    """Say whether planes tell, too, which fingers overlap the object at the start; of the full width the links do.
-
-    Args:
-        plan: of the hand. candidates: see `candidates_around`.
-    """
-    planar = candidates.low < candidates.high
-    full_width = np.array(plan.is_full_width, dtype=bool)
-    return bool(planar[full_width].any() if full_width.any() else planar.any() and not plan.full)
 
 
 def object_arrays(packed: PackedObject) -> ObjectArrays:

@@ -13,6 +13,7 @@ _MADE_BY: Final = {
     "GraspCommand": "clench.GraspCommand(hand_pose=clench.Pose([x, y, z], wxyz=[w, x, y, z]))",
     "GraspSolution": "clench.solve(hand, obj, command)",
     "Pose": "clench.Pose([x, y, z], wxyz=[w, x, y, z])",
+    "Body": "clench.obstacle(shape, pose)",
 }
 
 

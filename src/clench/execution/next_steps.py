@@ -160,6 +160,6 @@ def moved_joints(hand: Hand, step: Mapping[str, float]) -> tuple[int, ...]:
 def _phase(name: str, timed: TimedPath, end: FloatArray, step: int | None = None, least: float = 0.0) -> Phase:
     duration = max(timed.duration, least)
     times = distinct(timed.samples(duration))
-    positions = np.array([timed.stretched_at(t, duration) for t in times])
+    positions = timed.stretched_at(times, duration)
     positions[-1] = end
     return Phase(name, times, positions, step)

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray
@@ -46,15 +47,15 @@ class Profile:
             return cls(velocity, ramp, 1.0 / velocity + ramp)
         return cls(acceleration * half, half, 2.0 * half)
 
-    def at(self, time: float) -> float:
-        """Return how far the motion is at a time [s], from 0 to 1."""
+    def at(self, times: ArrayLike) -> FloatArray:
+        """Return how far the motion is at times [s], from 0 to 1, with their shape."""
+        time = np.asarray(times, dtype=np.float64)
         left = self.duration - time
-        if time <= 0.0 or left <= 0.0:
-            return float(left <= 0.0)
-        if min(time, left) >= self.ramp:
-            return self.speed * (time - 0.5 * self.ramp)
-        part = 0.5 * self.speed / self.ramp * min(time, left) ** 2
-        return part if time < left else 1.0 - part
+        nearest = np.minimum(time, left)
+        part = 0.5 * self.speed / self.ramp * (nearest * nearest)
+        way = np.where(time < left, part, 1.0 - part)
+        way = np.where(nearest >= self.ramp, self.speed * (time - 0.5 * self.ramp), way)
+        return np.where(left <= 0.0, 1.0, np.where(time <= 0.0, 0.0, way))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +78,15 @@ class TimedPath:
         """Time from the first corner to the last [s]."""
         return float(self.times[-1])
 
-    def at(self, time: float) -> FloatArray:
-        """Return the angles at a time [s], shape (J,); before the start the first, after the end the last."""
-        k = int(np.searchsorted(self.times, time, side="right")) - 1
-        if k < 0 or k >= len(self.profiles):
-            return np.array(self.corners[0 if k < 0 else -1])
-        part = self.profiles[k].at(time - self.times[k])
-        line: FloatArray = self.corners[k] + part * (self.corners[k + 1] - self.corners[k])
-        return line
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return the angles at times [s], shape (N, J); before the start the first, after the end the last."""
+        line = np.searchsorted(self.times, times, side="right") - 1
+        angles = self.corners[np.where(line < 0, 0, -1)]
+        for k, profile in enumerate(self.profiles):
+            on = line == k
+            part = profile.at(times[on] - self.times[k])[:, None]
+            angles[on] = self.corners[k] + part * (self.corners[k + 1] - self.corners[k])
+        return angles
 
     def samples(self, duration: float) -> FloatArray:
         """Return times [s] at which the path, stretched to a duration [s], is looked at; corners among them."""
@@ -93,9 +95,9 @@ class TimedPath:
         count = max(1, int(np.ceil(duration / SAMPLE)))
         return np.concatenate([self.times * (duration / self.duration), np.linspace(0.0, duration, count + 1)])
 
-    def stretched_at(self, time: float, duration: float) -> FloatArray:
-        """Return the angles at a time [s] of the path slowed down evenly to a duration [s], shape (J,)."""
-        return self.at(time * (self.duration / duration) if duration > 0.0 else 0.0)
+    def stretched_at(self, times: FloatArray, duration: float) -> FloatArray:
+        """Return the angles at times [s] of the path slowed down evenly to a duration [s], shape (N, J)."""
+        return self.at(times * (self.duration / duration) if duration > 0.0 else np.zeros(len(times)))
 
 
 def time_path(stages: Sequence[FloatArray], velocity: FloatArray, acceleration: FloatArray) -> TimedPath:

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from clench.closing.collision.path_check import PathOverlap, find_path_overlap
+from clench.closing.collision.path_check import PathOverlap, find_path_overlap, is_path_free
 from clench.core.exceptions import MotionError
 from clench.core.pose import FloatArray
 from clench.models.command import ClosingOrder
@@ -25,7 +26,7 @@ from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .closing_path import STILL, closing_path, distinct
-from .landing import LANDING_SPEED, plan_landing
+from .landing import LANDING_SPEED, Landing
 from .step_check import placed_object
 from .timing import TimedPath, time_path
 
@@ -135,18 +136,26 @@ class WayFinder:
 
     def _pregrasp(self, clearance: float) -> FloatArray | None:
         """Return a posture from which the straight line to the touch is free; a joint rests where that helps."""
-        choices: list[tuple[int, ...]] = [()]
-        for resting in choices:
-            goal = plan_landing(self.solution, self.hand, clearance, resting)
-            if goal is None:
-                continue
-            # From the touch on, which is free: links that overlap where a path begins would be let apart.
-            overlap = self.overlap(np.vstack(self._line(range(len(goal)), goal, self.end))[::-1])
-            if overlap is None:
+        goal = self._landings.start(clearance)
+        if goal is None:
+            return None
+        overlap = self.overlap(self._lifted(goal))
+        if overlap is None:
+            return goal
+        suspects = [overlap]
+        for j in (j for f in self._fingers_of(overlap) for j in self.hand.fingers[f].joints):
+            goal = self._landings.start(clearance, (j,))
+            if goal is not None and is_path_free(self.hand, self._lifted(goal), self.source, self.around, suspects):
                 return goal
-            if not resting:
-                choices += [(j,) for f in self._fingers_of(overlap) for j in self.hand.fingers[f].joints]
         return None
+
+    def _lifted(self, goal: FloatArray) -> FloatArray:
+        """Return the straight line from the touch, which is free: links that overlap where a path begins may part."""
+        return np.vstack(self._line(range(len(goal)), goal, self.end))[::-1]
+
+    @cached_property
+    def _landings(self) -> Landing:
+        return Landing(self.solution, self.hand)
 
     def begun_at(self, start: FloatArray) -> WayFinder:
         """Return the same search from another posture."""
@@ -349,7 +358,7 @@ def _joined(paths: list[TimedPath], end: FloatArray, joints: Sequence[Sequence[i
     for own, path in zip(joints, paths, strict=True):
         moved = [j for j in own if np.ptp(path.corners[:, j]) > 0.0]
         if moved:
-            positions[:, moved] = np.array([path.stretched_at(t, duration) for t in grid])[:, moved]
+            positions[:, moved] = path.stretched_at(grid, duration)[:, moved]
     positions[-1] = end
     return grid, positions
 

@@ -30,7 +30,7 @@ _WHITE: Final = 0.3
 
 
 class SolidKind(StrEnum):
-    """Name what a solid is of."""
+    """Name the kind of a solid."""
 
     HAND = "hand"
     """the palm, or a link that the palm carries"""

@@ -44,11 +44,11 @@ class GraspCommand:
         orders: alternatives, used instead of `order`: each is solved by itself, and the best solution is kept.
         speeds: relative closing speeds for simultaneous closing, by name of a free joint; 1 if not named.
         planes: number of curl planes per finger; the edges of narrower links are added to them.
-        full_width: also compute the set that closes over all planes together.
+        full_width: also compute the candidate that closes over all planes together.
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
-        check_sets: measure the penetration of every alternative set, which costs more than the solve.
-        measure: measure the penetration of the chosen set over the full width, which costs as much as the solve.
+        check_candidates: measure the penetration of every candidate, which costs more than the solve.
+        measure: measure the penetration of the chosen candidate over the full width, which costs as much as the solve.
         collision_source: geometry of the hand; None is the hand's default.
         opposition_grid: offsets [rad] added to the thumb's first posture joint as alternatives.
         criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.
@@ -76,7 +76,7 @@ class GraspCommand:
     yaw_grid: tuple[float, ...] = (0.0,)
     open_variants: tuple[float, ...] = (0.0,)
     opposition_grid: tuple[float, ...] = (0.0,)
-    check_sets: bool = False
+    check_candidates: bool = False
     measure: bool = True
     collision_source: CollisionSource | None = None
     criteria: Mapping[str, float] | Path | str | None = None

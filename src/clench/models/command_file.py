@@ -16,7 +16,7 @@ from typing import Any, Final, TypeVar
 
 from clench.core.exceptions import CommandError, FileError
 from clench.core.files.file_bytes import expanded, read_file
-from clench.core.files.file_limits import COMMAND_ITEMS, COMMAND_SETS, JSON_BYTES
+from clench.core.files.file_limits import COMMAND_CANDIDATES, COMMAND_ITEMS, JSON_BYTES
 from clench.core.files.json_files import not_json
 from clench.core.files.nesting import TOO_DEEP, is_too_deep
 from clench.core.numbers import is_finite_number
@@ -33,7 +33,7 @@ LIMIT_TOLERANCE: Final = 1e-9
 
 KEYS: Final = (
     *("hand_pose", "root_link", "object_pose", "preshape", "fingers", "order", "orders", "rounds", "speeds", "planes"),
-    *("full_width", "yaw_grid", "open_variants", "opposition_grid", "check_sets", "measure", "collision_source"),
+    *("full_width", "yaw_grid", "open_variants", "opposition_grid", "check_candidates", "measure", "collision_source"),
     *("criteria", "next_steps", "task_wrenches", "seed"),
 )
 
@@ -122,16 +122,17 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
     _check_speeds(hand, command)
     _count(command.planes, "planes")
     grids = ("yaw_grid", "open_variants", "opposition_grid")
-    sets = math.prod(len(_numbers(getattr(command, key), key, "offsets in rad")) for key in grids)
-    if sets > COMMAND_SETS:
-        raise CommandError(f"{', '.join(grids)}: they make {sets} candidates together; expected up to {COMMAND_SETS}.")
+    count = math.prod(len(_numbers(getattr(command, key), key, "offsets in rad")) for key in grids)
+    if count > COMMAND_CANDIDATES:
+        keys = ", ".join(grids)
+        raise CommandError(f"{keys}: they make {count} candidates together; expected up to {COMMAND_CANDIDATES}.")
     if command.next_steps != ():
         check_steps(hand, command.next_steps)
     if command.task_wrenches:
         _wrenches(command.task_wrenches, "task_wrenches")
     if command.collision_source is not None:
         _choice(command.collision_source, CollisionSource, "collision_source")
-    for key in ("full_width", "check_sets", "measure"):
+    for key in ("full_width", "check_candidates", "measure"):
         _flag(getattr(command, key), key)
     if command.seed is not None:
         _whole(command.seed, "seed")
@@ -207,7 +208,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "yaw_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
         "open_variants": lambda v, key: _numbers(v, key, "offsets in rad"),
         "opposition_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
-        "check_sets": _flag,
+        "check_candidates": _flag,
         "measure": _flag,
         "collision_source": lambda v, key: _choice(v, CollisionSource, key),
         "criteria": lambda v, key: _criteria(v, key, folder),

@@ -1,4 +1,4 @@
-"""Remember hand and object of recent solutions, so that a solution can be drawn without being told of them again."""
+"""Remember hand and object of recent solutions, so that a caller can draw a solution without giving them again."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Scoring: criteria, their calibration, and the choice among sets."""
+"""Scoring: criteria, their calibration, and the choice among candidates."""

@@ -1,4 +1,4 @@
-"""Choose the best set of every finger, and of all of them together (docs/method.md section 6)."""
+"""Choose the best candidate of every finger, and of all of them together (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .criterion_registry import (
     is_of_finger,
     is_of_hand,
     prepare_hand,
+    score_candidates,
     score_hand,
-    score_sets,
 )
 from .criterion_types import ScoringContext
 
-#: Tiers that rank one set before another regardless of the scores, strongest first; as `tier` lists them.
+#: Tiers that rank one candidate before another regardless of the scores, strongest first; as `tier` lists them.
 TIERS = (
     "may be taken",
     "passes through nothing on any plane",
@@ -35,19 +35,19 @@ TIERS = (
     "has a value for every criterion",
 )
 
-#: Sets whose angles differ by less are the same for the choice [rad]; the same number applies to sums [-].
+#: Candidates whose angles differ by less are the same for the choice [rad]; the same number applies to sums [-].
 SAME_ANGLE = 1e-9
 _SAME_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
 class FingerChoice:
-    """The comparison of the sets of one finger.
+    """The comparison of the candidates of one finger.
 
     Args:
-        tiers: per set, its values of `TIERS`. totals: per set, the weighted sum of its scores [-].
-        order: indices of the sets, best first. equals: sets with the best tier and different joint angles, best first:
-            the scores decide among them. chosen: index.
+        tiers: per candidate, its values of `TIERS`. totals: per candidate, the weighted sum of its scores [-].
+        order: indices of the candidates, best first. equals: candidates with the best tier and different joint angles,
+            best first: the scores decide among them. chosen: index.
     """
 
     tiers: tuple[tuple[bool, ...], ...]
@@ -63,10 +63,11 @@ class HandChoice:
 
     Args:
         fingers: one per finger. calibration: weights and limits. used, unused: names of its criteria with and without a
-            value for some set. hand_scores: values of the hand's criteria for the chosen sets.
+            value for some candidate. hand_scores: values of the hand's criteria for the chosen candidates.
         runner_up: the second best combination, as indices, with its total and hand scores; None when there is none.
-        total: weighted sum over the chosen sets [-]. tried: number of compared combinations; 0 if no criterion is about
-            the whole hand and every finger has its own best. proved: no other combination is better.
+        total: weighted sum over the chosen candidates [-]. proved: no other combination is better.
+        tried: number of compared combinations; 0 if no criterion is about the whole hand, so that every finger has its
+            own best.
     """
 
     fingers: tuple[FingerChoice, ...]
@@ -81,26 +82,26 @@ class HandChoice:
 
     @property
     def chosen(self) -> list[int]:
-        """Index of the chosen set of every finger."""
+        """Index of the chosen candidate of every finger."""
         return [finger.chosen for finger in self.fingers]
 
 
 def choose(
     groups: Sequence[Sequence[FingerCandidate]], calibration: Calibration, context: ScoringContext
 ) -> HandChoice:
-    """Return the best set of every finger; the sets' scores are filled on the way.
+    """Return the best candidate of every finger; the candidates' scores are filled on the way.
 
-    A set that is known to be infeasible never goes before one that is not, and so on down `TIERS`. The weighted scores
-    decide among the rest; ties go to the full width, then to the first. Without a criterion of the whole hand, the best
-    sets of the fingers are the best of all; else see `best_combination`.
+    `TIERS` decide first: a candidate that is known to be infeasible never goes before another one, and so on. The
+    weighted scores decide among the rest; ties go to the full width, then to the first. Without a criterion of the
+    whole hand, the best candidates of the fingers are the best of all; else see `best_combination`.
 
     Args:
-        groups: sets of every finger. calibration: weights and limits. context: context of the judgement.
+        groups: candidates of every finger. calibration: weights and limits. context: context of the judgement.
     """
     criteria = {name: find_criterion(name, calibration.name) for name in calibration.criteria}
     of_finger = [name for name, c in criteria.items() if is_of_finger(c)]
     for group in groups:
-        score_sets(group, of_finger, context)
+        score_candidates(group, of_finger, context)
     fingers = [_compare(group, of_finger, calibration, context.tip_only) for group in groups]
     of_hand = [name for name, c in criteria.items() if is_of_hand(c)]
     judge = _HandJudge(groups, fingers, of_hand, calibration, context)
@@ -109,7 +110,7 @@ def choose(
         search = best_combination([finger.equals for finger in fingers], judge)
         best, second, tried, proved = search.best, search.second, search.tried, search.proved
         known |= set(best.scores)
-        fingers = [replace(finger, chosen=i) for finger, i in zip(fingers, best.sets, strict=True)]
+        fingers = [replace(finger, chosen=i) for finger, i in zip(fingers, best.candidates, strict=True)]
     else:
         best, second = judge(tuple(finger.chosen for finger in fingers)), _next_best(fingers, judge)
         tried, proved = 0, True
@@ -129,13 +130,13 @@ def choose(
 def _compare(
     group: Sequence[FingerCandidate], names: Sequence[str], calibration: Calibration, tip_only: bool
 ) -> FingerChoice:
-    """Rank the sets of one finger by their tiers, then by their weighted scores."""
+    """Rank the candidates of one finger by their tiers, then by their weighted scores."""
     said = [name for name in names if any(name in c.scores for c in group)]
     tiers = tuple(_tier(c, said, calibration, tip_only) for c in group)
     worth = {name: calibration.worth(name, 1.0) for name in said}
     totals = tuple(sum(w * c.scores[n] for n, w in worth.items() if n in c.scores) for c in group)
     same = _same_as_whole(group)
-    # Rounded, so that sets that are equal but for rounding come in the order of the alternatives.
+    # Rounded, so that candidates that are equal but for rounding come in the order of the alternatives.
     steps = [math.floor(total / SAME_ANGLE + 0.5) for total in totals]
     rank = [(tiers[same[i]], steps[same[i]], c.plane is None, -i) for i, c in enumerate(group)]
     order = sorted(range(len(group)), key=rank.__getitem__, reverse=True)
@@ -145,7 +146,7 @@ def _compare(
 
 
 def _same_as_whole(group: Sequence[FingerCandidate]) -> list[int]:
-    """Return each set for the judgement: a plane's set with the angles of the full width is the same set.
+    """Return whose tier counts for each candidate: its own, or the full width's for a plane with the same angles.
 
     Otherwise, if corners touch on several planes simultaneously, a plane with a weaker guarantee could go first.
     """
@@ -159,7 +160,7 @@ def _same_as_whole(group: Sequence[FingerCandidate]) -> list[int]:
 
 
 def _tier(c: FingerCandidate, said: Sequence[str], calibration: Calibration, tip_only: bool) -> tuple[bool, ...]:
-    """Return the tier of a set, see `TIERS`."""
+    """Return the tier of a candidate, see `TIERS`."""
     return (
         c.feasible is not False,
         c.clear,
@@ -179,7 +180,7 @@ def _next_best(fingers: Sequence[FingerChoice], judge: _HandJudge) -> Combinatio
 
 
 class _HandJudge:
-    """Judge combinations of sets: the sums of their fingers, and the criteria that are about the whole hand."""
+    """Judge combinations of candidates: the sums of their fingers, and the criteria that are about the whole hand."""
 
     def __init__(
         self,
@@ -204,14 +205,14 @@ class _HandJudge:
         """Number of criteria of the whole hand that may have a value."""
         return len(self._criteria)
 
-    def __call__(self, sets: tuple[int, ...]) -> Combination:
+    def __call__(self, candidates: tuple[int, ...]) -> Combination:
         """Return a combination with its scores and total."""
-        chosen = [group[i] for group, i in zip(self._groups, sets, strict=True)]
+        chosen = [group[i] for group, i in zip(self._groups, candidates, strict=True)]
         scores = score_hand(chosen, self._criteria, self._context)
-        total = sum(f.totals[i] for f, i in zip(self._fingers, sets, strict=True))
+        total = sum(f.totals[i] for f, i in zip(self._fingers, candidates, strict=True))
         total += sum(self._worth[name] * value for name, value in scores.items())
         allowed = all(self._calibration.allows(name, scores.get(name)) for name in self._criteria)
-        return Combination(sets, scores, allowed, total)
+        return Combination(candidates, scores, allowed, total)
 
     def ceilings(self, places: tuple[int, ...]) -> Ceilings | None:
         """Return upper bounds of all combinations; None if a criterion of the whole hand gives no bound."""

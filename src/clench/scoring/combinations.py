@@ -1,10 +1,10 @@
-"""Search the combinations of one set per finger for the best (docs/method.md section 6).
+"""Search the combinations of one candidate per finger for the best (docs/method.md section 6).
 
 Criteria of the whole hand do not add up over the fingers, so the best of every finger need not be the best of all. The
 search goes best first. Every combination has a ceiling that its sum does not exceed. The search judges the combination
 with the highest ceiling. It ends with a proof when no ceiling is above the best judged sum. Criteria may lower the
 ceilings on the way (`HandCriterion`). If there are too many combinations, or a proof would take too long, each finger
-in turn takes its best set given the sets of the others. Then nothing is proved.
+in turn takes its best candidate given the candidates of the others. Then nothing is proved.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ Places = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Combination:
-    """One set per finger and its judgement.
+    """One candidate per finger and its judgement.
 
     Args:
-        sets: index of the set of every finger. scores: values of those criteria of the whole hand that have one.
-        allowed: these are inside the limits. total: weighted sum over fingers and hand [-].
+        candidates: index of the candidate of every finger. total: weighted sum over fingers and hand [-].
+        scores: values of the criteria of the whole hand that have a value. allowed: these values are inside the limits.
     """
 
-    sets: tuple[int, ...]
+    candidates: tuple[int, ...]
     scores: Mapping[str, float]
     allowed: bool
     total: float
@@ -72,7 +72,7 @@ class Judge(Protocol):
         """Number of criteria of the whole hand that may have a value."""
         ...
 
-    def __call__(self, sets: tuple[int, ...]) -> Combination:
+    def __call__(self, candidates: tuple[int, ...]) -> Combination:
         """Return how a combination is judged."""
         ...
 
@@ -102,7 +102,7 @@ def best_combination(options: Sequence[Sequence[int]], judge: Judge) -> SearchRe
     Among equal combinations, the first in the order of the options wins.
 
     Args:
-        options: sets of every finger, best first. judge: gives the value of a combination, and ceilings.
+        options: candidates of every finger, best first. judge: gives the value of a combination, and ceilings.
     """
     counts = tuple(len(o) for o in options)
     tried: dict[Places, Combination] = {}
@@ -172,7 +172,7 @@ def _highest(
 
 
 def _ascend(places: Places, counts: Sequence[int], value: Callable[[Places], Combination]) -> None:
-    """Improve a combination one finger at a time until no finger has a better set."""
+    """Improve a combination one finger at a time until no finger has a better candidate."""
     best, unchanged, k = value(places), 0, 0
     while unchanged < len(counts):
         unchanged += 1

@@ -30,13 +30,13 @@ from .hand_criteria import (
     ActuationForceAnyWay,
     ActuationForceSixPulls,
     ActuationForceTask,
-    Steadiness,
+    EpsilonQuality,
     TendonTension,
 )
 
 #: Installed packages name their criteria under this group of entry points: `name = "module:Class"`.
 ENTRY_POINTS: Final = "clench.criteria"
-#: Criteria that every set gets, whatever the weights: they cost next to nothing, and readers of a solution expect them.
+#: Every candidate has the scores of these criteria, whatever the weights. They cost little, and readers expect them.
 ALWAYS: Final = ("range_of_motion", "touching_links", "limit_distance")
 
 _KINDS: Final = {"name": str, "unit": str, "source": str, "scale": Real, "larger_is_better": bool}
@@ -52,7 +52,7 @@ _BUILT_IN: Final[Mapping[str, Criterion | HandCriterion]] = {
         PadIndentation(),
         Clearance(),
         PoseSensitivity(),
-        Steadiness(),
+        EpsilonQuality(),
         ActuationForce(),
         ActuationForceAnyWay(),
         ActuationForceSixPulls(),
@@ -138,12 +138,12 @@ def is_of_hand(criterion: Criterion | HandCriterion) -> TypeGuard[HandCriterion]
 
 
 def is_of_finger(criterion: Criterion | HandCriterion) -> TypeGuard[Criterion]:
-    """Say whether a criterion judges the sets of one finger."""
+    """Say whether a criterion judges the candidates of one finger."""
     return not is_of_hand(criterion)
 
 
-def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> None:
-    """Fill the scores of sets for the always-scored and the named criteria; a criterion may give no score.
+def score_candidates(candidates: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> None:
+    """Fill the scores of candidates for the always-scored and the named criteria; a criterion may give no score.
 
     Raises:
         CommandError: a criterion gave a value that is not a finite number.
@@ -158,7 +158,7 @@ def score_sets(candidates: Sequence[FingerCandidate], names: Iterable[str], cont
 
 
 def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> None:
-    """Give all sets to the named criteria that prepare for judging combinations."""
+    """Give all candidates to the named criteria that prepare for judging combinations."""
     for name in names:
         prepare = getattr(_registry[name], "prepare", None)
         if prepare is not None:
@@ -166,7 +166,7 @@ def prepare_hand(candidates: Sequence[FingerCandidate], names: Iterable[str], co
 
 
 def ideal_value(name: str) -> float | None:
-    """Return the value that no sets of the whole hand can beat, where a criterion says one."""
+    """Return the value that no candidates of the whole hand can beat, where a criterion says one."""
     ideal = getattr(_registry[name], "ideal", None)
     return None if ideal is None else float(ideal)
 
@@ -181,7 +181,7 @@ def bound_hand(
 
 
 def score_hand(chosen: Sequence[FingerCandidate], names: Iterable[str], context: ScoringContext) -> dict[str, float]:
-    """Return the values of the named whole-hand criteria for one set per finger.
+    """Return the values of the named whole-hand criteria for one candidate per finger.
 
     Raises:
         CommandError: a criterion gave a value that is not a finite number.

@@ -1,4 +1,4 @@
-"""Define a criterion: a number for a set, with a unit, a direction and a source (docs/method.md section 6)."""
+"""Define a criterion: a number for a candidate, with a unit, a direction and a source (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ScoringContext:
-    """The context in which criteria score sets; J joints.
+    """The context in which criteria score candidates; J joints.
 
     Args:
         hand: the hand. start: posture it closes from, shape (J,) [rad].
@@ -35,7 +35,7 @@ class ScoringContext:
         in_stages: fingers close proximal first, in one round, so that the contact that stopped a joint can be
             recomputed.
         tip_only: only the first touch of a fingertip counts.
-        kept: a criterion's cache between sets; emptied with every solve.
+        kept: a criterion's cache between candidates; emptied with every solve.
     """
 
     hand: Hand
@@ -57,7 +57,7 @@ class ScoringContext:
 
 @runtime_checkable
 class Criterion(Protocol):
-    """Judge the set of one finger; write a class with these members and `register_criterion` it to add your own.
+    """Judge the candidate of one finger; write a class with these members and `register_criterion` it to add your own.
 
     Attributes:
         name: as weights name it. unit: of the value. source: publication or section of the method.
@@ -71,19 +71,20 @@ class Criterion(Protocol):
     larger_is_better: ClassVar[bool]
 
     def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
-        """Return the value of a set, or None when the criterion says nothing about it."""
+        """Return the value of a candidate, or None when the criterion says nothing about it."""
         ...
 
 
 @runtime_checkable
 class HandCriterion(Protocol):
-    """Judge the sets of all fingers together; otherwise like `Criterion`.
+    """Judge the candidates of all fingers together; otherwise like `Criterion`.
 
     Optional members speed up the search for the best combination and let it end with a proof:
 
-    - `prepare(candidates, context)` is given all sets before any combination is judged; - `ideal`: a value that no
-    combination beats; - `bound(groups, places, context)` returns bounds, one axis per finger, near the value of the
-    combination that takes set `places[k]` of `groups[k]`; None: no bound.
+    - `prepare(candidates, context)` gets all candidates before any combination is judged.
+    - `ideal` is a value that no combination beats.
+    - `bound(groups, places, context)` returns bounds, one axis per finger, near the value of the combination that takes
+      candidate `places[k]` of `groups[k]`; None: no bound.
     """
 
     name: ClassVar[str]
@@ -93,7 +94,7 @@ class HandCriterion(Protocol):
     larger_is_better: ClassVar[bool]
 
     def score_hand(self, chosen: Sequence[FingerCandidate], context: ScoringContext) -> float | None:
-        """Return the value of one set per finger, or None when the criterion says nothing about them."""
+        """Return the value of one candidate per finger, or None when the criterion says nothing about them."""
         ...
 
 

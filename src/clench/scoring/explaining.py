@@ -1,4 +1,4 @@
-"""Say why the chosen sets won: which criterion decided, against which runner-up, by how much."""
+"""Say why the chosen candidates won: which criterion decided, against which runner-up, by how much."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def explain_choice(choice: HandChoice, groups: Groups) -> dict[str, Any]:
     """Return the choice as plain values: criteria, totals, runners-up, Pareto fronts, and sentences.
 
     Args:
-        choice: result of `choose`. groups: the sets of every finger, as given to `choose`.
+        choice: result of `choose`. groups: the candidates of every finger, as given to `choose`.
     """
     calibration = choice.calibration
     names = [group[0].plan.finger.name for group in groups]
@@ -41,7 +41,7 @@ def explain_choice(choice: HandChoice, groups: Groups) -> dict[str, Any]:
         "runner_up": None
         if second is None
         else {
-            "sets": dict(zip(names, second.sets, strict=True)),
+            "candidates": dict(zip(names, second.candidates, strict=True)),
             "total": second.total,
             "hand_scores": dict(second.scores),
         },
@@ -56,7 +56,7 @@ def pareto_front(values: FloatArray) -> list[int]:
     """Return the rows that no other row equals or beats in every column, and beats in one; more is better.
 
     Args:
-        values: one row per set, shape (N, M).
+        values: one row per candidate, shape (N, M).
     """
     rows = np.asarray(values, dtype=np.float64)
     as_good = (rows[:, None] >= rows[None]).all(axis=2)
@@ -64,8 +64,8 @@ def pareto_front(values: FloatArray) -> list[int]:
     return np.flatnonzero(~better.any(axis=0)).tolist()
 
 
-def set_name(c: FingerCandidate, group: Sequence[FingerCandidate]) -> str:
-    """Return the display name of a set among the sets of its finger."""
+def candidate_name(c: FingerCandidate, group: Sequence[FingerCandidate]) -> str:
+    """Return the display name of a candidate among the candidates of its finger."""
     name = "the full width" if c.plane is None else f"plane {c.plane}"
     return f"{name} of posture {c.posture}" if any(other.posture for other in group) else name
 
@@ -95,7 +95,7 @@ def _finger(finger: FingerChoice, group: Sequence[FingerCandidate], choice: Hand
 
 
 def _runner_up(finger: FingerChoice, group: Sequence[FingerCandidate]) -> int | None:
-    """Return the best set besides the chosen one: of the same tier, else with different angles."""
+    """Return the best candidate besides the chosen one: of the same tier, else with different angles."""
     q = group[finger.chosen].q
     for i in (*finger.equals, *finger.order):
         if i != finger.chosen and np.abs(group[i].q - q).max(initial=0.0) > SAME_ANGLE:
@@ -104,7 +104,7 @@ def _runner_up(finger: FingerChoice, group: Sequence[FingerCandidate]) -> int | 
 
 
 def _finger_front(finger: FingerChoice, group: Sequence[FingerCandidate], choice: HandChoice) -> list[int]:
-    """Return the Pareto-optimal sets among those that the scores decide between."""
+    """Return the Pareto-optimal candidates among those that the scores decide between."""
     equals = sorted(finger.equals)
     names = [name for name in choice.used if name in group[equals[0]].scores]
     if not names:
@@ -118,10 +118,10 @@ def _finger_front(finger: FingerChoice, group: Sequence[FingerCandidate], choice
 
 def _finger_text(finger: FingerChoice, group: Sequence[FingerCandidate], choice: HandChoice, second: int | None) -> str:
     best = group[finger.chosen]
-    name = set_name(best, group)
+    name = candidate_name(best, group)
     if second is None:
         return f"{name} is the only candidate{', all others have its angles' if len(group) > 1 else ''}."
-    other = set_name(group[second], group)
+    other = candidate_name(group[second], group)
     for what, has, lacks in zip(TIERS, finger.tiers[finger.chosen], finger.tiers[second], strict=True):
         if has and not lacks:
             return f"{name} comes before {other} because it alone {what}."
@@ -140,9 +140,11 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     second = choice.runner_up
     if second is None:
         return "There was nothing to choose: no finger has two candidates that the scores could decide between."
-    changed = [k for k, (i, j) in enumerate(zip(choice.chosen, second.sets, strict=True)) if i != j]
-    sets = [(groups[k][choice.chosen[k]], groups[k][second.sets[k]]) for k in changed]
-    swapped = ", ".join(f"{set_name(b, groups[k])} for {names[k]}" for k, (_, b) in zip(changed, sets, strict=True))
+    changed = [k for k, (i, j) in enumerate(zip(choice.chosen, second.candidates, strict=True)) if i != j]
+    both = [(groups[k][choice.chosen[k]], groups[k][second.candidates[k]]) for k in changed]
+    swapped = ", ".join(
+        f"{candidate_name(b, groups[k])} for {names[k]}" for k, (_, b) in zip(changed, both, strict=True)
+    )
     lead = choice.total - second.total
     unknown = [name for name in choice.hand_scores if name not in second.scores]
     if unknown:
@@ -151,7 +153,7 @@ def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
         return f"The next best ({swapped}) is outside a limit of the calibration."
     if lead <= 0.0:
         return f"The next best ({swapped}) scores the same; the first goes before it."
-    pairs = [(a.scores, b.scores) for a, b in sets] + [(choice.hand_scores, second.scores)]
+    pairs = [(a.scores, b.scores) for a, b in both] + [(choice.hand_scores, second.scores)]
     gains = _gains(pairs, choice)
     ours = {n: sum(a.get(n, 0.0) for a, _ in pairs) for n in gains}
     theirs = {n: sum(b.get(n, 0.0) for _, b in pairs) for n in gains}

@@ -1,4 +1,4 @@
-"""The criteria of one finger's set (docs/method.md section 6)."""
+"""The criteria of one finger's candidate (docs/method.md section 6)."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _ranges(hand: Hand, plan: FingerPlan) -> list[tuple[int, float, float]]:
 
 
 class NextStepTime:
-    """Time from the set to the next steps of the work at the joints' velocity limits: the finger's slowest joint."""
+    """Time of the finger's slowest joint from the candidate to the next steps of the work, at its velocity limit."""
 
     name: ClassVar[str] = "next_step_time"
     unit: ClassVar[str] = "s"
@@ -92,7 +92,7 @@ class NextStepTime:
 
 
 class NextStepDistance:
-    """Motion from the set to the next steps of the work, over the finger's own joints."""
+    """Motion from the candidate to the next steps of the work, over the finger's own joints."""
 
     name: ClassVar[str] = "next_step_distance"
     unit: ClassVar[str] = "rad"
@@ -121,7 +121,7 @@ def _moves(candidate: FingerCandidate, context: ScoringContext) -> np.ndarray | 
 
 
 class Clearance:
-    """Smallest gap between the finger's links and the obstacles at the set; farther than 5 cm is no better."""
+    """Smallest gap between the finger's links and the obstacles at the candidate; farther than 5 cm is no better."""
 
     name: ClassVar[str] = "clearance"
     unit: ClassVar[str] = "m"
@@ -176,5 +176,5 @@ class PadIndentation:
     larger_is_better: ClassVar[bool] = False
 
     def score(self, candidate: FingerCandidate, context: ScoringContext) -> float | None:
-        """Return the depth along path and at the end [m]; None when not measured (`check_sets`)."""
+        """Return the depth along path and at the end [m]; None when not measured (`check_candidates`)."""
         return candidate.penetration

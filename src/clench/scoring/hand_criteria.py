@@ -1,7 +1,7 @@
 """The criteria of the whole hand: loads that the contacts resist, and the effort they need (docs/method.md section 6).
 
-Contacts are those contacts of the chosen sets that still touch, as points with friction. Forces are per newton of load:
-they need no mass and ignore torque limits. Forces of a task are in newtons and respect the limits.
+The contacts are the contacts of the chosen candidates that still touch, as points with friction. Forces are per newton
+of load: they need no mass and ignore torque limits. Forces of a task are in newtons and respect the limits.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from clench.models.objects.mass import mass_properties
 
 from .criterion_types import ScoringContext
 
-#: Key of the directions in which judged sets were weakest.
+#: Key of the directions in which judged candidates were weakest.
 _WEAKEST: Final = "weakest"
 #: Mass whose weight is 1 N [kg].
 _NEWTON: Final = 1.0 / GRAVITY
 
 
-class Steadiness:
+class EpsilonQuality:
     """The Ferrari-Canny epsilon (normal forces sum to 1 N): the worst pull or twist that is resisted."""
 
-    name: ClassVar[str] = "steadiness"
+    name: ClassVar[str] = "epsilon"
     unit: ClassVar[str] = "N/N"
     source: ClassVar[str] = "Ferrari and Canny, ICRA 1992"
     scale: ClassVar[float] = 0.1
@@ -50,7 +50,7 @@ class Steadiness:
         return ball.radius
 
     def prepare(self, candidates: Sequence[FingerCandidate], context: ScoringContext) -> None:
-        """Compute the wrenches of all sets in one call, which takes a tenth of the time of single calls."""
+        """Compute the wrenches of all candidates in one call, which takes a tenth of the time of single calls."""
         if context.obj is not None:
             _keep_wrenches(candidates, context)
 
@@ -166,7 +166,7 @@ def _worst(held: HeldObject, loads: Iterable[FloatArray]) -> float | None:
 
 
 def _held(chosen: Sequence[FingerCandidate], context: ScoringContext) -> HeldObject | None:
-    """Return the object as the sets hold it; None when the context has none, or nothing touches."""
+    """Return the object as the candidates hold it; None when the context has none, or nothing touches."""
     if context.obj is None or not any(c.holding for c in chosen):
         return None
     contacts = _contacts(chosen, context)
@@ -174,7 +174,7 @@ def _held(chosen: Sequence[FingerCandidate], context: ScoringContext) -> HeldObj
 
 
 def _wrenches(candidate: FingerCandidate, context: ScoringContext) -> FloatArray:
-    """Return the wrenches of the edges of a set's friction cones, shape (N, 6); found once per set."""
+    """Return the wrenches of the edges of a candidate's friction cones, shape (N, 6); found once per candidate."""
     key = ("wrenches", id(candidate))
     if key not in context.kept:
         _keep_wrenches([candidate], context)
@@ -183,7 +183,8 @@ def _wrenches(candidate: FingerCandidate, context: ScoringContext) -> FloatArray
 
 
 def _keep_wrenches(candidates: Sequence[FingerCandidate], context: ScoringContext) -> None:
-    """Compute the wrenches of several sets in one call; sets are kept with them, so that identities stay unique."""
+    """Compute the wrenches of several candidates in one call, and keep them."""
+    # Each candidate is kept too: a freed one would give its identity to another one.
     for c in candidates:
         context.kept["wrenches", id(c)] = (c, np.empty((0, 6)))
     holding = [c for c in candidates if c.holding]
@@ -195,7 +196,7 @@ def _keep_wrenches(candidates: Sequence[FingerCandidate], context: ScoringContex
 
 
 def _contacts(chosen: Sequence[FingerCandidate], context: ScoringContext) -> ContactSet:
-    """Return the contacts of sets in the palm frame."""
+    """Return the contacts of candidates in the palm frame."""
     assert context.obj is not None
     touches = [t for c in chosen for t in c.holding]
     return make_contacts(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from clench.closing.candidates import FingerCandidate, read_candidates
 from clench.closing.collision.containment import link_within_link
-from clench.closing.feasibility import judge_sets
+from clench.closing.feasibility import judge_candidates
 from clench.closing.hand_plan import HandPlan
 from clench.closing.kernel_run import close_candidates, row_of
 from clench.closing.packed_problem import PackedProblem, Terms, pack_problem
@@ -36,11 +36,11 @@ _MOST_JOINTS: Final = 7
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Say which sets are closed, and who chooses among them.
+    """Say which candidates are closed, and who chooses among them.
 
     Args:
-        problem: packed for the kernels. by_kernel: the kernels choose; else `Alternatives` do, from the sets that are
-            read.
+        problem: packed for the kernels. by_kernel: the kernels choose; else `Alternatives` choose from the
+            candidates that are read.
     """
 
     problem: PackedProblem
@@ -48,21 +48,21 @@ class Candidates:
 
     @property
     def plan(self) -> HandPlan:
-        """The plan of the sets that are closed."""
+        """The plan of the candidates that are closed."""
         return self.problem.plan
 
 
 def candidates_of(problem: Problem, calibration: Calibration) -> Candidates:
-    """Return which sets a solve closes.
+    """Return which candidates a solve closes.
 
     The full width goes before every plane: it alone passes through nothing, or a plane has its angles. If every finger
     has one full width, the planes are not closed and there is nothing to choose. Among planes alone the kernels choose
-    by sums of the criteria that are always scored. Custom criteria score every set before the choice, so the solve
-    raises what they raise. Sets that all need a measurement are closed in one batch, too.
+    by sums of the criteria that are always scored. Custom criteria score every candidate before the choice, so the
+    solve raises what they raise. If all candidates need a measurement, one batch closes them, too.
     """
     plan, command = plan_hand(problem), problem.command
     tip_only = command.order == ClosingOrder.FINGERTIP
-    if command.check_sets or not is_built_in(calibration.criteria):
+    if command.check_candidates or not is_built_in(calibration.criteria):
         return Candidates(pack_problem(plan, problem.packed, (), tip_only), False)
     if plan.full_width is not None:
         return Candidates(pack_problem(plan.full_width, problem.packed, (), tip_only), True)
@@ -84,12 +84,12 @@ def _terms(calibration: Calibration) -> Terms:
     return tuple((ALWAYS.index(name), calibration.worth(name, 1.0)) for name in terms)
 
 
-def finger_sets(problem: Problem) -> Groups:
-    """Return all sets of every finger."""
+def finger_candidates(problem: Problem) -> Groups:
+    """Return all candidates of every finger."""
     plan = plan_hand(problem)
     packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
     closed = close_candidates(packed, problem.T_palm_object[:3])
-    return group_by_finger(plan, read_sets(problem, plan, closed))
+    return group_by_finger(plan, read_judged(problem, plan, closed))
 
 
 def overlaps_of(problem: Problem, plan: HandPlan, closed: Closed) -> list[LinkDepth | None]:
@@ -97,16 +97,16 @@ def overlaps_of(problem: Problem, plan: HandPlan, closed: Closed) -> list[LinkDe
     return start_overlaps(plan, closed.blocked[0], problem.packed, problem.T_palm_object)
 
 
-def read_sets(problem: Problem, plan: HandPlan, closed: Closed) -> list[FingerCandidate]:
-    """Return the sets that were closed at the problem's pose, judged; `closed` is for this pose alone."""
+def read_judged(problem: Problem, plan: HandPlan, closed: Closed) -> list[FingerCandidate]:
+    """Return the candidates that were closed at the problem's pose, judged; `closed` is for this pose alone."""
     overlaps = overlaps_of(problem, plan, closed)
-    sets = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
-    _judge(problem, sets)
-    return sets
+    candidates = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
+    _judge(problem, candidates)
+    return candidates
 
 
 def with_planes(problem: Problem, overlaps: Sequence[LinkDepth | None], whole: Sequence[FingerCandidate]) -> Groups:
-    """Return the sets of every finger: planes are closed now, the full widths are given.
+    """Return the candidates of every finger: planes are closed now, the full widths are given.
 
     Args:
         problem: the three inputs. overlaps: per finger posture. whole: the full width of every finger.
@@ -114,23 +114,23 @@ def with_planes(problem: Problem, overlaps: Sequence[LinkDepth | None], whole: S
     plan = plan_hand(problem).planes
     packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
     closed = close_candidates(packed, problem.T_palm_object[:3])
-    sets = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
-    _judge(problem, [*sets, *whole])
-    groups = group_by_finger(plan, sets)
+    candidates = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
+    _judge(problem, [*candidates, *whole])
+    groups = group_by_finger(plan, candidates)
     return [[*group, full] for group, full in zip(groups, whole, strict=True)]
 
 
-def group_by_finger(plan: HandPlan, sets: Sequence[FingerCandidate]) -> Groups:
-    """Return the sets of each finger that closes, in the command's order."""
+def group_by_finger(plan: HandPlan, candidates: Sequence[FingerCandidate]) -> Groups:
+    """Return the candidates of each finger that closes, in the command's order."""
     groups: Groups = [[] for _ in plan.fingers]
-    for finger, candidate in zip(plan.candidate_finger, sets, strict=True):
+    for finger, candidate in zip(plan.candidate_finger, candidates, strict=True):
         groups[finger].append(candidate)
     return groups
 
 
-def _judge(problem: Problem, sets: Sequence[FingerCandidate]) -> None:
+def _judge(problem: Problem, candidates: Sequence[FingerCandidate]) -> None:
     p = problem
-    judge_sets(p.hand, sets, p.packed, p.T_palm_object, p.source, p.command.check_sets, p.together)
+    judge_candidates(p.hand, candidates, p.packed, p.T_palm_object, p.source, p.command.check_candidates, p.together)
 
 
 @dataclass(eq=False)
@@ -138,7 +138,7 @@ class Alternatives:
     """The candidates of every finger, and the choice among them. Both are computed when first read.
 
     Args:
-        problem, calibration, context: the basis of the choice. close: returns the sets.
+        problem, calibration, context: the basis of the choice. close: returns the candidates.
     """
 
     problem: Problem
@@ -159,11 +159,11 @@ class Alternatives:
 
     @property
     def choice(self) -> HandChoice:
-        """The choice among the sets."""
+        """The choice among the candidates."""
         return self._scored()[1]
 
     def of_finger(self, k: int) -> Sequence[FingerCandidate]:
-        """Return the sets of a finger, as closed without the other fingers, with their scores."""
+        """Return the candidates of a finger, as closed without the other fingers, with their scores."""
         return self._scored()[0][k]
 
     def chosen_candidates(self) -> tuple[list[int], bool]:
@@ -182,7 +182,7 @@ class Alternatives:
         """Return the choice as plain values; see `explain_choice`.
 
         Args:
-            best: the chosen sets. changed: numbers of those fingers that the others made close again.
+            best: the chosen candidates. changed: numbers of those fingers that the others made close again.
         """
         groups, choice = self._scored()
         explained = explain_choice(choice, groups)

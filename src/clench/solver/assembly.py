@@ -1,4 +1,4 @@
-"""Assemble the solution: the computed sets, the choice and the judgement, in names and world coordinates."""
+"""Assemble the solution: the computed candidates, the choice and the judgement, in names and world coordinates."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ class Answer:
     """Everything computed and chosen that a solution is built from.
 
     Args:
-        sets: returns the candidates of a finger that closes, by number, as closed without the other fingers.
+        candidates: returns the candidates of a finger that closes, by number, as closed without the other fingers.
         chosen: index of the chosen one of each. best: the chosen ones. final: posture of the hand, shape (J,) [rad].
         at_start: depths of the links that no finger moves, before closing. at_end: of all links, at the end; None when
-            not measured. certificate: the guarantee. choice: why these sets, see `explain_choice`.
+            not measured. certificate: the guarantee. choice: why these candidates, see `explain_choice`.
     """
 
-    sets: Callable[[int], Sequence[FingerCandidate]]
+    candidates: Callable[[int], Sequence[FingerCandidate]]
     chosen: Sequence[int]
     best: Sequence[FingerCandidate]
     final: FloatArray
@@ -131,7 +131,7 @@ def plain_steps(command: GraspCommand) -> tuple[dict[str, float], ...]:
 
 
 def _opened(answer: Answer, problem: Problem) -> FloatArray:
-    """Return the posture from which the chosen sets close, shape (J,) [rad]."""
+    """Return the posture from which the chosen candidates close, shape (J,) [rad]."""
     q = problem.start.copy()
     for c in answer.best:
         own = c.plan.finger.own
@@ -139,9 +139,9 @@ def _opened(answer: Answer, problem: Problem) -> FloatArray:
     return q
 
 
-def _placed(sets: Sequence[FingerCandidate], T_world_palm: Pose) -> _Places:
-    """Return position and normal of every touch of some sets in the world, by the touch's identity."""
-    touches = [t for c in sets for t in c.touches]
+def _placed(candidates: Sequence[FingerCandidate], T_world_palm: Pose) -> _Places:
+    """Return position and normal of every touch of some candidates in the world, by the touch's identity."""
+    touches = [t for c in candidates for t in c.touches]
     # A single row would be rounded differently from many rows.
     rows = touches * 2 if len(touches) == 1 else touches
     positions = T_world_palm.apply(np.array([t.position for t in rows]).reshape(-1, 3))
@@ -155,7 +155,7 @@ def _finger(answer: Answer, k: int, problem: Problem, placed: _Places) -> tuple[
     best = _candidate(c, problem, placed)
 
     def candidates() -> tuple[Candidate, ...]:
-        group = answer.sets(k)
+        group = answer.candidates(k)
         places = _placed(group, problem.T_world_palm)
         return tuple(best if i == chosen else _candidate(other, problem, places) for i, other in enumerate(group))
 

@@ -51,10 +51,10 @@ class CauseCode(StrEnum):
 
 
 def finger_cause(c: FingerCandidate, status: FingerStatus, problem: Problem) -> dict[str, Any]:
-    """Return why a finger's chosen set does not touch the object, as plain values.
+    """Return why a finger's chosen candidate does not touch the object, as plain values.
 
     Args:
-        c: the set. status: how it ended. problem: the solved problem.
+        c: the candidate. status: how it ended. problem: the solved problem.
     """
     if status is FingerStatus.BLOCKED:
         return _blocked(c, problem)

@@ -31,7 +31,7 @@ class CertificateCode(StrEnum):
     BLOCKED_AT_START = "blocked_at_start"
     """a link overlaps the object or an obstacle before anything moves"""
     ONE_PLANE = "one_plane"
-    """a set was computed on one plane, and nothing is known beside it"""
+    """a candidate was computed on one plane, and nothing is known beside it"""
     SELF_COLLISION_AT_START = "self_collision_at_start"
     """links of the hand overlap, or one lies inside another, before anything moves"""
     OVERLAP_AT_END = "overlap_at_end"
@@ -75,7 +75,7 @@ def judge(
     """Measure the overlaps at the start and at the end over the full width, and state the guarantee.
 
     Args:
-        problem: the three inputs. best: one set per finger. final: posture at the end, shape (J,) [rad].
+        problem: the three inputs. best: one candidate per finger. final: posture at the end, shape (J,) [rad].
         full_width: the hand as it was swept. promise: the guarantee, if known.
 
     Returns:
@@ -99,10 +99,10 @@ def certify(
     final: FloatArray,
     full_width: FullWidthArrays,
 ) -> Certificate:
-    """Judge the chosen sets: swept over their full width, from a start that is free; and the whole hand at the end.
+    """Say what is certified: chosen candidates swept over their full width from a free start, and the hand at the end.
 
     Args:
-        problem: the three inputs. best: one set per finger. at_start: depths of the links that rest.
+        problem: the three inputs. best: one candidate per finger. at_start: depths of the links that rest.
         final: posture at the end, shape (J,) [rad]. full_width: the hand as it was swept.
     """
     hand = problem.hand

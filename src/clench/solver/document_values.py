@@ -35,7 +35,7 @@ def read_limits(value: Any, source: str, key: str) -> tuple[float, float]:
 
 
 def check_said(value: dict[str, Any] | None, keys: tuple[str, ...], source: str, where: str) -> None:
-    """Refuse a free-form value that lacks the text by which people are told of it."""
+    """Refuse a free-form value that lacks one of some texts, which messages and tables print."""
     for key in () if value is None else keys:
         if value is not None and not isinstance(value.get(key), str):
             raise FileError(source, f"{where}.{key}: {'expected text' if key in value else 'missing'}.")

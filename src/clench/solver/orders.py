@@ -122,7 +122,7 @@ def _inside_limit(name: str, criterion: Mapping[str, Any], solution: GraspSoluti
     """Say whether all values of a criterion are inside its limit; an unknown value is not."""
     if is_of_hand(find_criterion(name, "orders")):
         values = [(solution.choice or {}).get("final_hand_scores", {}).get(name)]
-    else:  # a finger of whose sets it says nothing is left aside, as among sets
+    else:  # a finger of whose candidates it says nothing is left aside, as among candidates
         fingers = [f for f in solution.fingers.values() if any(name in c.scores for c in f.candidates)]
         values = [f.candidates[f.chosen].scores.get(name) for f in fingers]
     limit, more = criterion["limit"], criterion["better"] == "more"

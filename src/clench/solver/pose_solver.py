@@ -14,10 +14,19 @@ from clench.models.command_file import check_command
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.scoring.calibration import Calibration, calibration_of
-from clench.scoring.criterion_registry import score_sets
+from clench.scoring.criterion_registry import score_candidates
 from clench.solver.batch.grasp_batch import STATUSES
 
-from .alternatives import Alternatives, Candidates, candidates_of, group_by_finger, overlaps_of, read_sets, with_planes
+from .alternatives import (
+    Alternatives,
+    Candidates,
+    Groups,
+    candidates_of,
+    group_by_finger,
+    overlaps_of,
+    read_judged,
+    with_planes,
+)
 from .assembly import Answer, assemble, joint_limits, plain_steps
 from .certificate import judge, promised
 from .clock import Clock
@@ -54,7 +63,7 @@ class PoseSolver:
     """A solver for one problem at its pose.
 
     Args:
-        problem: the three inputs. calibration: basis of the choice. candidates: the sets to close.
+        problem: the three inputs. calibration: basis of the choice. candidates: the candidates to close.
     """
 
     def __init__(self, problem: Problem, calibration: Calibration, candidates: Candidates) -> None:
@@ -69,9 +78,9 @@ class PoseSolver:
         return solve_packed(self._candidates.problem, T, choose=choose)
 
     def choose(self, answers: Answers) -> tuple[list[int], bool]:
-        """Choose among the sets that are closed at the pose; see `Alternatives.chosen_candidates`."""
+        """Choose among the candidates that are closed at the pose; see `Alternatives.chosen_candidates`."""
         plan = self._candidates.plan
-        read = partial(read_sets, self._problem, plan, answers.closed)
+        read = partial(read_judged, self._problem, plan, answers.closed)
         self._alternatives = self._alternatives_of(lambda: group_by_finger(plan, read()))
         return self._alternatives.chosen_candidates()
 
@@ -100,12 +109,12 @@ class PoseSolver:
         )
 
     def _answer(self, answers: Answers) -> Answer:
-        """Read the answer: sets, contacts, scores, overlaps, and the reasons for these sets."""
+        """Read the answer: candidates, contacts, scores, overlaps, and the reasons for these candidates."""
         problem, plan = self._problem, self._candidates.plan
         alternatives, free = self._alternatives, None
         if alternatives is None:
-            free = read_sets(problem, plan, answers.closed)
-            alternatives = self._alternatives_of(self._late_sets(answers, free))
+            free = read_judged(problem, plan, answers.closed)
+            alternatives = self._alternatives_of(self._late_candidates(answers, free))
         candidates = answers.solved.chosen[0].tolist()
         if free is None:
             chosen, names = alternatives.choice.chosen, alternatives.choice.used
@@ -115,32 +124,33 @@ class PoseSolver:
             chosen = (
                 plan_hand(problem).plane_counts if any(plan.is_full_width) else plan.candidates.low[candidates].tolist()
             )
-            score_sets(best, names, self._context())
+            score_candidates(best, names, self._context())
         changed = self._closed_again(answers, best)
-        score_sets([best[k] for k in changed], names, self._context())
+        score_candidates([best[k] for k in changed], names, self._context())
         final = answers.solved.angles[0]
         certificate = promised(problem) if answers.solved.certified[0] else None
         at_start, at_end, certificate = judge(problem, best, final, plan.full_width_arrays, certificate)
         explained = DeferredMapping(partial(alternatives.explained, best, changed))
         return Answer(alternatives.of_finger, chosen, best, final, at_start, at_end, certificate, explained)
 
-    def _late_sets(self, answers: Answers, free: list[FingerCandidate]) -> Callable[[], list[list[FingerCandidate]]]:
-        """Return a function that gives all sets of every finger, from which the kernels chose."""
+    def _late_candidates(self, answers: Answers, free: list[FingerCandidate]) -> Callable[[], Groups]:
+        """Return a function that gives all candidates of every finger, from which the kernels chose."""
         problem, plan = self._problem, self._candidates.plan
         if any(plan.is_full_width):
             return lambda: with_planes(problem, overlaps_of(problem, plan, answers.closed), free)
         return lambda: group_by_finger(plan, free)
 
     def _closed_again(self, answers: Answers, best: list[FingerCandidate]) -> list[int]:
-        """Put the sets that the other fingers changed in the place of the chosen ones; return their fingers."""
+        """Put the candidates that the other fingers changed in the place of the chosen ones; return their fingers."""
         problem, closed = self._problem, answers.closed
         picked = self._candidates.plan.only(answers.solved.chosen[0].tolist())
         anew, overlapping = closed.anew[0] != 0, closed.overlapping[0] != 0
         if anew.any():
             nowhere = [None] * len(picked.plans)
-            sets = read_candidates(picked, problem.packed, row_of(closed.final, 0), problem.T_palm_object, nowhere)
+            final = row_of(closed.final, 0)
+            candidates = read_candidates(picked, problem.packed, final, problem.T_palm_object, nowhere)
             for k in anew.nonzero()[0].tolist():
-                best[k] = replace(sets[k], index=best[k].index, clear=best[k].clear)
+                best[k] = replace(candidates[k], index=best[k].index, clear=best[k].clear)
         held = held_touches(picked, row_of(closed.met, 0))
         for k in sorted({*held, *overlapping.nonzero()[0].tolist()}):
             touches = (*best[k].touches, *held.get(k, ()))

@@ -96,7 +96,7 @@ def check_calibration(hand: Hand, calibration: Calibration) -> None:
 
 
 def make_context(problem: Problem, calibration: Calibration) -> ScoringContext:
-    """Return the context in which the criteria score sets; see `check_calibration`."""
+    """Return the context in which the criteria score candidates; see `check_calibration`."""
     hand = problem.hand
     weights = np.ones(len(hand.joints)) if calibration.joints else None
     for name, weight in calibration.joints.items():

@@ -106,7 +106,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One alternative set of a finger: contacts and joint angles on one plane, or over the full width.
+    """One candidate of a finger: contacts and joint angles on one plane, or over the full width.
 
     Args:
         plane: index of the curl plane, None for the full width; offset: its place [m].
@@ -191,7 +191,7 @@ class GraspSolution(Displayed, LateFields):
         joint_angles: every joint of the hand [rad]. open_angles: the posture before closing [rad].
         certified, certificate: whether the certificate of docs/method.md section 5 holds. ``"text"`` states the
             guarantee or why there is none; ``"deviation"`` is that of shapes swept as polyhedra [m].
-        choice: why these sets: criteria, totals, runners-up, and sentences (docs/calibration.md).
+        choice: why these candidates: criteria, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the full width and all links [m], None when not computed.
         speeds: relative closing speeds of free joints in an order where all move simultaneously; 1 if not named.
         rounds: number of passes through the joints, 0 for until rest.
@@ -313,7 +313,7 @@ class GraspSolution(Displayed, LateFields):
 
 
 def solve_scores(solution: GraspSolution) -> dict[str, float]:
-    """Return the scores of a whole solution: sums over the fingers' chosen sets, and the scores of the whole hand."""
+    """Return the scores of a solution: sums over the chosen candidates, and the scores of the whole hand."""
     chosen = [f.best.scores for f in solution.fingers.values() if f.best is not None]
     names = dict.fromkeys(name for scores in chosen for name in scores)
     sums = {n: float(sum(s[n] for s in chosen)) for n in names if all(n in s for s in chosen)}
@@ -323,7 +323,7 @@ def solve_scores(solution: GraspSolution) -> dict[str, float]:
 def posture_reason(solution: GraspSolution) -> Mapping[str, Any] | None:
     """Return why clench chose the posture of a solution, or None if the command named the posture.
 
-    It leaves the reasons for the sets of the fingers unread: for them, clench would close all sets on planes.
+    It leaves the reasons for the candidates unread: for them, clench would close all candidates on planes.
     """
     choice = solution.choice
     unread = isinstance(choice, DeferredMapping) and not choice.is_made

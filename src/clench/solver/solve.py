@@ -1,4 +1,4 @@
-"""The controller: three inputs in, one solution out."""
+"""Solve: from hand, object and command to one solution."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def solve(hand: Hand, obj: GraspObject, command: GraspCommand | Pose, *, record: Record | None = None) -> GraspSolution:
-    """Close a hand around an object and return the best set of contacts and joint angles (docs/method.md).
+    """Close a hand around an object and return contacts and joint angles (docs/method.md).
 
     If the command leaves the posture to clench, it closes and compares the preshapes of the hand first. The solution's
     `choice` then names the chosen one and the reason (docs/preshapes.md). Otherwise there is one closing.

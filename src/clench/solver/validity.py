@@ -13,7 +13,7 @@ from clench.core.tolerances import ALLOWED_PENETRATION, CONTACT_OVERLAP, PASSED_
 
 from .solution import Contact, FingerResult, FingerStatus, GraspSolution
 
-#: If a set is not certified over its width, links may overlap this far between two curl planes [m].
+#: If a candidate is not certified over its width, links may overlap this far between two curl planes [m].
 SAMPLED_PENETRATION = 1e-3
 #: Angles may exceed a limit by rounding only [rad].
 LIMIT_SLACK = 1e-9

@@ -52,7 +52,7 @@ def shown() -> list[Table]:
     batch = clench.solve_batch(hand, mug, [pose])
     document = {"hand": "h", "object": "o", "poses": 1, "seconds": 1.0, "status": batch.counts()}
     printing.print_batch({**document, "certified": 1})
-    printing.print_weights({"steadiness": 0.5}, "Fitted.")
+    printing.print_weights({"epsilon": 0.5}, "Fitted.")
     patch.undo()
     return found
 

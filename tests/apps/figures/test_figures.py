@@ -11,10 +11,10 @@ import pytest
 
 import clench
 from clench.apps.figures import draw_solution
+from clench.apps.figures.planes.candidate_grid import MOST_CANDIDATES, _selected, _short, _verdict
 from clench.apps.figures.planes.curl_plane import plane_title
 from clench.apps.figures.planes.finger_scenes import FingerScenes
 from clench.apps.figures.planes.plane_scene import PlaneScene, bounds
-from clench.apps.figures.planes.set_grid import MOST_SETS, _selected, _short, _verdict
 from clench.core.exceptions import FileError
 from clench.models.command import GraspCommand
 from clench.models.objects.obstacles import table
@@ -90,7 +90,7 @@ def test_a_solve_gives_two_pictures_per_finger_and_one_of_the_hand(
     hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
 ) -> None:
     files = draw_solution(hand, ball, *answer, tmp_path)
-    names = ["index_plane.png", "index_sets.png", "thumb_plane.png", "thumb_sets.png", "grasp.png"]
+    names = ["index_plane.png", "index_candidates.png", "thumb_plane.png", "thumb_candidates.png", "grasp.png"]
     assert [f.name for f in files] == names
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(names)
     for file in files:
@@ -245,7 +245,7 @@ def test_answers_without_contact_are_drawn(hand: clench.Hand, ball: clench.Grasp
     solution = clench.solve(hand, ball, far)
     assert not solution.contacts
     files = draw_solution(hand, ball, far, solution, tmp_path)
-    assert [f.name for f in files] == ["ring_plane.png", "ring_sets.png", "grasp.png"]
+    assert [f.name for f in files] == ["ring_plane.png", "ring_candidates.png", "grasp.png"]
     assert all(size_of(f)[0] <= 1600 for f in files)
 
 
@@ -259,7 +259,7 @@ def test_a_finger_that_overlaps_at_the_start_is_drawn(
     assert all(size_of(f)[0] <= 1600 for f in draw_solution(hand, ball, inside, solution, tmp_path))
 
 
-def test_what_is_said_of_a_set_that_is_blocked() -> None:
+def test_what_is_said_of_a_candidate_that_is_blocked() -> None:
     blocked = make_candidate(status=FingerStatus.BLOCKED, contacts=(), penetration=None)
     assert _verdict(blocked)[-1] == "blocked: it does not move"
     assert _verdict(make_candidate(status=FingerStatus.LIMIT, contacts=(), penetration=None))[-1] == "no contact"
@@ -278,7 +278,7 @@ def test_obstacles_are_told_from_the_object(hand: clench.Hand, tmp_path: Path) -
     draw_solution(hand, scene, command, solution, tmp_path)
 
 
-def test_a_finger_without_sets_has_no_picture(
+def test_a_finger_without_candidates_has_no_picture(
     hand: clench.Hand, ball: clench.GraspObject, answer: tuple[GraspCommand, GraspSolution], tmp_path: Path
 ) -> None:
     command, solution = answer
@@ -310,11 +310,11 @@ def test_drawing_leaves_global_state_alone(
     assert (mpl.rcParams.copy(), mpl.get_backend(auto_select=False)) == before
 
 
-def test_many_sets_are_thinned_evenly_and_keep_the_chosen_one() -> None:
+def test_many_candidates_are_thinned_evenly_and_keep_the_chosen_one() -> None:
     alike = [make_candidate(plane=k, offset=0.001 * k) for k in range(30)] + [make_candidate()]
     for chosen in (alike[0], alike[17], alike[-1]):
         shown = _selected(alike, chosen)
-        assert len(shown) == MOST_SETS
+        assert len(shown) == MOST_CANDIDATES
         assert chosen in shown
         assert alike[-1] in shown
         offsets = [c.offset for c in shown if c.offset is not None]

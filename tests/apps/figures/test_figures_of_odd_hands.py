@@ -29,5 +29,5 @@ def test_names_of_fingers_that_are_no_names_of_files_are_changed(tmp_path: Path)
     ball = clench.GraspObject.load("sphere:r=0.02", pose=Pose([0.05, 0.01, 0.05]))
     command = clench.GraspCommand(hand_pose=Pose.identity(), planes=1, preshape="open")
     files = draw_solution(hand, ball, command, clench.solve(hand, ball, command), tmp_path / "new")
-    assert [f.name for f in files] == ["r2_index_tip_plane.png", "r2_index_tip_sets.png", "grasp.png"]
+    assert [f.name for f in files] == ["r2_index_tip_plane.png", "r2_index_tip_candidates.png", "grasp.png"]
     assert sorted(tmp_path.rglob("*.png")) == sorted(files)

@@ -45,7 +45,7 @@ def test_an_open_mesh_is_named_so_and_its_hull_counts() -> None:
     obj = clench.GraspObject.from_meshes([(BOX_CORNERS * 0.02, BOX_TRIANGLES[:-2], Pose(), "graspable", "crate")])
     report = describe_object(obj)
     assert not report.watertight
-    assert dict(report.summary_rows())["volume"] == "64 cm³ (the convex hull stands in for what is not watertight)"
+    assert dict(report.summary_rows())["volume"] == "64 cm³ (of the convex hull: the mesh is not watertight)"
     assert dict(report.summary_rows())["graspable"] == "crate: mesh, 10 triangles in all"
     assert report.warnings == obj.warnings != ()
 

@@ -34,7 +34,7 @@ def scores(motion: float, links: float = 1.0) -> dict[str, Any]:
 def record(tmp_path: Path) -> Path:
     path = tmp_path / "r.sqlite"
     with Record(path) as made:
-        made.append(make_solution(choice={"final_hand_scores": {"steadiness": 0.2}}))
+        made.append(make_solution(choice={"final_hand_scores": {"epsilon": 0.2}}))
         made.append(make_solution())
     return path
 
@@ -51,10 +51,10 @@ def test_scores_become_signed_and_scaled_numbers(tmp_path: Path) -> None:
 
 
 def test_solves_of_a_record(tmp_path: Path, record: Path) -> None:
-    index = {"solve": 1, "finger": "index", "set": 2}
+    index = {"solve": 1, "finger": "index", "candidate": 2}
     found = read_examples(write(tmp_path, record="r.sqlite", pairs=[{"better": {"solve": 1}, "worse": index}]))
     ((better, worse),) = found.pairs
-    assert better == {"range_of_motion": 0.3, "touching_links": 1.0, "steadiness": 0.2}
+    assert better == {"range_of_motion": 0.3, "touching_links": 1.0, "epsilon": 0.2}
     assert worse == {"range_of_motion": 0.3, "touching_links": 1.0}
 
 
@@ -106,14 +106,14 @@ def test_a_record_of_the_first_version_is_carried_over(tmp_path: Path) -> None:
         ({"outcomes": [{"of": scores(1.0), "held": "yes"}]}, r"outcomes\[0\]\.held: expected bool, got str"),
         ({"record": "none.sqlite"}, "none.sqlite: no such record"),
         (
-            {"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "finger": "ring", "set": 0}, "held": True}]},
+            {"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "finger": "ring", "candidate": 0}, "held": True}]},
             "solve 1 has no finger 'ring'; it has index, thumb",
         ),
         (
-            {"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "finger": "index", "set": 3}, "held": True}]},
-            r"outcomes\[0\]\.of: set: expected 0 to 2, got 3",
+            {"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "finger": "index", "candidate": 3}, "held": True}]},
+            r"outcomes\[0\]\.of: candidate: expected 0 to 2, got 3",
         ),
-        ({"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "set": 0}, "held": True}]}, "expected 'scores'"),
+        ({"record": "r.sqlite", "outcomes": [{"of": {"solve": 1, "candidate": 0}, "held": True}]}, "expected 'scores'"),
         (
             {"outcomes": [{"of": {"scores": {"rang": 1.0}}, "held": True}]},
             r"outcomes\[0\]\.of: Criterion 'rang' is not in scores\.",

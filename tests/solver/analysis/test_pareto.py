@@ -48,14 +48,14 @@ def test_it_is_that_of_all_combinations(seed: int) -> None:
     }
     expected = {sets for sets, row in rows.items() if not any(beats(other, row) for other in rows.values())}
     found = hand_front(solution(tables))
-    assert {tuple(entry.sets.values()) for entry in found} == expected
+    assert {tuple(entry.candidates.values()) for entry in found} == expected
     totals = [entry.total for entry in found]
     assert totals == sorted(totals, reverse=True)
     best = max(-row[0] + 0.5 * row[1] for row in rows.values())
     assert totals[0] == pytest.approx(best)
 
 
-def test_the_chosen_sets_lead_the_front_of_a_solve() -> None:
+def test_the_chosen_candidates_lead_the_front_of_a_solve() -> None:
     hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
     pose = Pose([-0.05, -0.1, 0.06], wxyz=[0.5, 0.5, 0.5, 0.5])
     command = clench.GraspCommand(

@@ -254,7 +254,7 @@ def test_another_hand_or_object_is_refused():
         clench.sensitivity(solution, hand, GraspObject.load("sphere:r=0.03"))
 
 
-def test_a_set_of_one_plane_says_so():
+def test_a_candidate_of_one_plane_says_so():
     case = make_case(3)
     command = clench.GraspCommand(
         hand_pose=Pose.identity(), object_pose=case.place, planes=2, full_width=False, preshape="open"

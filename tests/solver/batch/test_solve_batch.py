@@ -130,7 +130,7 @@ def test_objects_preshapes_and_root_links_of_their_own() -> None:
         {"rounds": 2},
         {"open_variants": (0.0, 0.1)},
         {"criteria": {"clearance": 1.0}, "full_width": False},
-        {"check_sets": True},
+        {"check_candidates": True},
         {"orders": ("proximal-first", "together")},
     ],
     ids=lambda asked: next(iter(asked)),

@@ -183,10 +183,10 @@ def test_fingers_that_rest_stay_open() -> None:
         {"full_width": False},
         {"order": clench.ClosingOrder.TOGETHER, "fingers": ("thumb", "index")},
         {"orders": (clench.ClosingOrder.PROXIMAL_FIRST, clench.ClosingOrder.TOGETHER), "fingers": ("thumb", "index")},
-        {"criteria": {"range_of_motion": 1.0, "steadiness": 30.0}},
+        {"criteria": {"range_of_motion": 1.0, "epsilon": 30.0}},
         {"preshape": {"ring_proximal": 0.3}},
     ],
-    ids=["usual", "planes", "together", "orders", "steadiness", "closing joint"],
+    ids=["usual", "planes", "together", "orders", "epsilon", "closing joint"],
 )
 def test_batches_and_streams_have_the_bits_of_solves(asked: dict[str, Any], tmp_path) -> None:
     poses = [HELD, *POSES[:2]] if asked else [HELD, *POSES]
@@ -248,7 +248,7 @@ def test_postures_by_pose_win_over_open() -> None:
         assert list(chosen.solution(i).joint_angles.values()) == chosen.joint_angles[i].tolist()
 
 
-def test_settling_a_named_posture_leaves_the_reasons_for_the_sets_unread() -> None:
+def test_settling_a_named_posture_leaves_the_reasons_for_the_candidates_unread() -> None:
     """For these reasons, clench would close all sets on planes."""
     asked = command(preshape="open")
     solution = clench.solve(HAND, MUG, asked)

@@ -1,4 +1,4 @@
-"""Check arguments against the signature of a command, and say in one sentence what is wrong.
+"""Check arguments against the signature of a command, and name a mistake in one sentence.
 
 The option parser converts the arguments afterwards. Its own messages are boxes of text in the words of Python.
 """
@@ -49,14 +49,14 @@ class Option:
 
     @property
     def expected(self) -> str:
-        """What one value is, for a message."""
+        """The kind of one value, for a message."""
         return f"one of {', '.join(self.choices)}" if self.choices else _EXPECTED.get(self.kind, "a value")
 
     def check(self, value: str) -> None:
         """Refuse a value of another kind.
 
         Raises:
-            CommandError: with the option, the value and what was expected.
+            CommandError: it names the option, the value, and the expected value.
         """
         if self.choices and value not in self.choices:
             raise CommandError(f"{self.name}: expected {self.expected}, got '{value}'.{_guess(value, self.choices)}")
@@ -144,7 +144,7 @@ def _take_values(option: Option, values: list[str], waiting: deque[str]) -> None
 
 
 def _options(command: Callable[..., int]) -> Iterator[Option]:
-    """Yield what a command takes; the fields of a data class are options of their own."""
+    """Yield the options of a command; the fields of a data class are options of their own."""
     hints = typing.get_type_hints(command)
     for name, parameter in inspect.signature(command).parameters.items():
         default = parameter.default

@@ -1,4 +1,4 @@
-"""Being told to end is being told to stop the hand."""
+"""A signal that ends the program also stops the hand."""
 
 from __future__ import annotations
 

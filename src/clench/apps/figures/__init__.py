@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clench.core.argument_types import check_type
 from clench.core.files.file_bytes import make_folder
 
 if TYPE_CHECKING:
+    from clench.core.pose import Pose
     from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
@@ -20,29 +22,37 @@ __all__ = ["draw_plan", "draw_solution"]
 
 
 def draw_solution(
-    hand: Hand, obj: GraspObject, command: GraspCommand, solution: GraspSolution, directory: str | Path
+    hand: Hand, obj: GraspObject, command: GraspCommand | Pose, solution: GraspSolution, directory: str | Path
 ) -> list[Path]:
     """Draw every finger in its curl planes, its candidates, and the hand from two sides.
 
     Args:
-        hand, obj, command: the solved problem. solution: the answer.
-        directory: a folder, created if missing; `<finger>_plane.png`, `<finger>_sets.png` and `grasp.png` are written
-            to it.
+        hand, obj, command: the solved problem, as given to `clench.solve`. solution: the answer.
+        directory: the folder of the pictures `<finger>_plane.png`, `<finger>_candidates.png` and `grasp.png`. It is
+            created if missing.
 
     Returns:
-        the written files; a finger without sets (nothing to close) has no picture of its own.
+        the written files. A finger that closes no joint has no candidates, and no picture of its own.
 
     Raises:
-        FileError: the folder cannot be made, or a file cannot be written.
+        FileError: the folder cannot be made, or a file cannot be written. CommandError: an argument of another type.
     """
+    from clench.models.command import as_command
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
     from clench.solver.orders import settled
+    from clench.solver.solution import GraspSolution
 
+    from .planes.candidate_grid import draw_candidates
     from .planes.curl_plane import draw_finger
     from .planes.finger_scenes import FingerScenes
-    from .planes.set_grid import draw_sets
     from .sheets.hand_view import draw_hand
 
-    folder, command = make_folder(directory), settled(command, solution)
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
+    check_type(solution, GraspSolution, "solution")
+    command = settled(as_command(command), solution)
+    folder = make_folder(directory)
     files = []
     for name, result in solution.fingers.items():
         if not 0 <= result.chosen < len(result.candidates):
@@ -50,7 +60,7 @@ def draw_solution(
         stem = re.sub(r"[^\w.-]+", "_", name)
         scenes = FingerScenes(hand, obj, command, solution, name, result.candidates[result.chosen])
         files.append(draw_finger(scenes, result, hand.name, obj.name, folder / f"{stem}_plane.png"))
-        files.append(draw_sets(scenes, result, hand.name, obj.name, folder / f"{stem}_sets.png"))
+        files.append(draw_candidates(scenes, result, hand.name, obj.name, folder / f"{stem}_candidates.png"))
     files.append(draw_hand(hand, obj, solution, folder / "grasp.png"))
     return files
 

@@ -48,7 +48,7 @@ def draw_still(
     """Write one picture of a closed hand with its contacts, without any text.
 
     Args:
-        hand, obj, solution: what is drawn. path: the file, in a format by its ending. size: of the picture [px].
+        hand, obj, solution: the grasp to draw. path: the file, in a format by its ending. size: of the picture [px].
 
     Raises:
         FileError: the file cannot be written, or no figure has its ending.
@@ -76,7 +76,7 @@ def draw_film(
     """Write a film of a hand that closes, and of a look around the grasp: WebP or GIF, about five seconds.
 
     Args:
-        hand, obj, solution: what is filmed. path: the file, .webp or .gif. size: of the pictures [px].
+        hand, obj, solution: the grasp to film. path: the file, .webp or .gif. size: of the pictures [px].
         trajectory: the way to the touch; without one the joints go straight from the open hand to the touch.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Draw the effect of one weight: the criteria of the chosen sets, and the grasp at either end."""
+"""Draw the effect of one weight: the criteria of the chosen candidates, and the grasp at either end."""
 
 from __future__ import annotations
 
@@ -101,14 +101,14 @@ def draw_sweep(
 
 
 def _letters(solutions: Sequence[GraspSolution]) -> list[str]:
-    """Return a letter for every solution, the same for the same sets, in the order in which they come."""
-    sets = [tuple(f.chosen for f in s.fingers.values()) for s in solutions]
-    known = list(dict.fromkeys(sets))
-    return [f"grasp {ascii_uppercase[known.index(chosen) % 26]}" for chosen in sets]
+    """Return a letter for every solution, the same for the same candidates, in the order in which they come."""
+    candidates = [tuple(f.chosen for f in s.fingers.values()) for s in solutions]
+    known = list(dict.fromkeys(candidates))
+    return [f"grasp {ascii_uppercase[known.index(chosen) % 26]}" for chosen in candidates]
 
 
 def _changed(solutions: Sequence[GraspSolution]) -> str:
-    """Return which fingers take another set at the last weight than at the first."""
+    """Return which fingers take another candidate at the last weight than at the first."""
     first, last = solutions[0].fingers, solutions[-1].fingers
     names = [name for name in last if last[name].chosen != first[name].chosen]
     return f": {' and '.join(names)} elsewhere" if names else ": the same"

@@ -1,4 +1,4 @@
-"""Write what a page says in words and numbers: HTML in which every text that came from files is escaped."""
+"""Write the words and numbers of a page: HTML in which every text from files is escaped."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def solution_facts(solution: GraspSolution, motion: str, planned: PlannedGrasp |
     """Return status, reason, numbers, certificate and tables of a solution.
 
     Args:
-        solution: what is shown. motion: what the animation shows, a sentence. planned: what a plan knows of it.
+        solution: the shown solution. motion: a sentence about the animation. planned: the planned grasp, or None.
     """
     parts = [
         f"<h1>{text(solution.hand)} on {text(solution.object)}</h1>",

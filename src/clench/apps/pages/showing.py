@@ -200,7 +200,7 @@ def _pictures(
 
     Args:
         solids: of all scenes. poses, points: of the solids and of the contacts of every scene. size: in pixels.
-        sides: from where they are seen, the best first, and what is up; None: from where contacts are seen best.
+        sides: viewpoints, the best first, and upward directions; None: those that show the contacts best.
     """
     found = []
     with warnings.catch_warnings():

@@ -46,7 +46,7 @@ def new_token() -> str:
 
 
 def read_head(data: bytes) -> Head | None:
-    """Return what a request asks for, None where it is none."""
+    """Return the target of a request, or None if it is no request."""
     lines = data.decode("latin-1").split("\r\n")
     words = lines[0].split(" ")
     if len(words) != 3 or words[0] != "GET" or not words[2].startswith("HTTP/1."):
@@ -161,7 +161,7 @@ class Gate:
         writer.close()
 
     def _answer(self, data: bytes) -> bytes | None:
-        """Return what the door itself answers; None: the server behind it does."""
+        """Return the door's own answer, or None if the server behind it answers."""
         head = read_head(data)
         if head is None:
             return _response("400 Bad Request", "expected a request of a web page.")

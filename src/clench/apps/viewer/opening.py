@@ -1,4 +1,4 @@
-"""From the arguments of the command line to a session: what is on the shelf, and the first state."""
+"""Open a session from the arguments of the command line: load the models, and make the first state."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ _AWAY: Final = (0.0, 0.0, 0.3)
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What the user gave.
+    """The inputs that the user gave.
 
     Args:
         hand, object: the models. command: where to begin; None: at a planned grasp.
-        asked: what is set in planned commands, e.g. the order.
+        asked: values for planned commands, such as the order.
         friction: of all contacts [-]; None: that of hand and object. mass: of the object [kg].
         planning: options of `clench.plan_grasps`.
         hand_model, object_model: what loads them again. hand_code: Python that loads the hand; object_code: lines that
@@ -60,7 +60,7 @@ class Given:
 
 
 def open_session(given: Given) -> LiveSession:
-    """Return a session that begins with what was given; the built-in models can be chosen, too.
+    """Return a session that begins with the given inputs; the user can also choose the built-in models.
 
     Raises:
         ClenchError: the command does not fit hand and object.

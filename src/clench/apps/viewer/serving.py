@@ -30,7 +30,7 @@ class OpenPage:
     """A page that is being served.
 
     Args:
-        url: what to open. server: of viser. page: what it shows.
+        url: address to open. server: viser's server. page: the page that it shows.
     """
 
     url: str
@@ -57,8 +57,8 @@ def serve(
     """Serve a session until the block ends.
 
     Args:
-        session: what is shown. host, port: where to listen; anything but this machine itself requires a token, which is
-            in the address. grasps: to look through. dark: whether the page is dark at first.
+        session: the session to show. host, port: where to listen; for any host but this machine itself, the address
+            has a token. grasps: a list to look through. dark: start dark.
 
     Raises:
         ClenchError: viser is not installed. CommandError: nothing can listen there.

@@ -50,7 +50,7 @@ class ViewerPage:
     """Show a session in all tabs, and turn what happens there into changes of the session.
 
     Args:
-        server: of viser. session: what is shown. grasps: to look through. dark: whether the page is dark at first.
+        server: viser's server. session: the session that is shown. grasps: a list to look through. dark: start dark.
     """
 
     def __init__(
@@ -129,10 +129,10 @@ class ViewerPage:
     def _show_handles(self, which: str) -> None:
         self.nodes.show_gizmos(hand=which in (_WRIST, _BOTH), object=which in (_OBJECT, _BOTH))
 
-    # What the session tells.
+    # The session calls these methods.
 
     def adopted(self, state: ViewState) -> None:
-        """Show a state in the panels, and move what it moves."""
+        """Show a state in the panels, and move hand, object and handles to it."""
         self._grasp_panel.show(state)
         self._posture_panel.show(state)
         self._weights_panel.show(state)
@@ -164,7 +164,7 @@ class ViewerPage:
         self._plane_panel.rested(answer)
 
     def noted(self, sentence: str) -> None:
-        """Say what there is to know about the answer."""
+        """Show a note about the answer."""
         settled = self._session.settled
         if settled is not None:
             self._card.content = answer_card(settled.quick, settled, sentence)
@@ -231,7 +231,7 @@ class ViewerPage:
                 client.camera.position, client.camera.look_at = place, target
                 client.camera.fov = FIELD_OF_VIEW
 
-    # What the user does.
+    # The user's actions.
 
     def _move_by_gizmo(self, event: Any, key: str) -> None:
         pose = Pose(event.target.position, event.target.wxyz)

@@ -57,6 +57,8 @@ class RoundShapes(NamedTuple):
 class PackedObject(Keeper):
     """The object data that the kernels read, in the object's own frame. It never moves and never changes.
 
+    Kernels fill in the grid of distances of `bodies`, whose values depend on nothing but the object.
+
     Args:
         tree: triangles of meshes and boxes.
         rounds: spheres, capsules, cylinders and ellipsoids.
@@ -88,11 +90,6 @@ class PackedObject(Keeper):
     size: float
     points: FloatArray
     geometry_hash: str
-
-    @property
-    def is_curved(self) -> bool:
-        """Whether it has shapes that are swept as polyhedra, and are themselves on planes alone."""
-        return any(kind in ROUND_POLYHEDRA for kind, _ in self.round_sizes)
 
     @property
     def round_sizes(self) -> list[tuple[ShapeKind, tuple[float, ...]]]:
@@ -138,10 +135,10 @@ def role_body(obj: GraspObject, role: BodyRole) -> BodyArrays:
 
 
 def _pack_role(bodies: tuple[Body, ...], source: CollisionSource, role: BodyRole) -> BodyArrays:
-    from clench.kernels.geometry.bodies import join_elements, pack_bodies
+    from clench.kernels.geometry.bodies import join_elements, pack_bodies, with_grid
 
     shapes = [shape for body in bodies if body.role is role for shape in body.shapes]
-    return pack_bodies([join_elements([shape_elements(shape, source) for shape in shapes])])
+    return with_grid(pack_bodies([join_elements([shape_elements(shape, source) for shape in shapes])]))
 
 
 def shape_elements(shape: Shape, source: CollisionSource) -> Elements:
@@ -202,7 +199,7 @@ _packed: Final[KeptBySize[Any]] = KeptBySize(OBJECT_CACHE, packed_size)
 
 
 def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
-    from clench.kernels.geometry.bodies import pack_triangles
+    from clench.kernels.geometry.bodies import pack_triangles, with_grid
     from clench.kernels.trees.bvh import feature_owners
 
     placed = [(number, shape) for number, body in enumerate(bodies) for shape in body.shapes]
@@ -228,7 +225,7 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
         full_tree=full_tree,
         full_owners=made["owners"],
-        bodies=made["bodies"][0],
+        bodies=with_grid(made["bodies"][0]),
         element_body=made["bodies"][1],
         closed=all(closed),
         body_closed=closed,

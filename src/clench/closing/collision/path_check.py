@@ -114,6 +114,38 @@ def find_path_overlap(
     return min((overlap for overlap in found if overlap is not None), key=lambda o: o.place, default=None)
 
 
+def is_path_free(
+    hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None, suspects: list[PathOverlap]
+) -> bool:
+    """Say whether `find_path_overlap` finds nothing on a path.
+
+    Pairs that overlapped on similar paths are checked first, because they probably overlap again.
+
+    Args:
+        hand, path, source, around: see there. suspects: overlaps of such pairs; another one that is found is added.
+    """
+    from clench.kernels.toi.path_overlap import first_overlap
+
+    points = _corners(np.ascontiguousarray(path, dtype=np.float64))[0]
+    for number in range(len(around.bodies)) if around is not None else (None,):
+        problem = _problem(hand, points, source, number, around)
+        name = None if around is None or number is None else next(iter(around.bodies[number].body_names), "object")
+        asked = np.zeros(len(problem.pairs), dtype=np.bool_)
+        for met in suspects:
+            if not met.with_object:
+                one, other = hand.link_index(met.link), hand.link_index(met.other)
+                asked |= (problem.pairs == [one, other]).all(axis=1)
+            elif met.other == name:
+                asked |= (problem.pairs == [hand.link_index(met.link), -1]).all(axis=1)
+        some = problem._replace(pairs=problem.pairs[asked], allowed=problem.allowed[asked])
+        if asked.any() and first_overlap(some, np.empty(2)) >= 0:
+            return False
+    found = find_path_overlap(hand, path, source, around)
+    if found is not None:
+        suspects.append(found)
+    return found is None
+
+
 class _Lines(NamedTuple):
     """A path as straight lines: its way-points, the ends of the lines, and the numbers of the ends."""
 

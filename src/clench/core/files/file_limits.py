@@ -54,7 +54,7 @@ MESH_TRIANGLES: Final = 10_000_000
 #: Planes and rounds of a command, and items of each of its lists.
 COMMAND_ITEMS: Final = 1_000
 #: Sets that the grids of a command make together.
-COMMAND_SETS: Final = 10_000
+COMMAND_CANDIDATES: Final = 10_000
 
 #: Rows of one group of a Parquet file of grasps.
 DATASET_GROUP_ROWS: Final = 65_536

@@ -51,7 +51,7 @@ def read_json(path: str | Path, kind: str = "a document") -> Any:
     """Read a JSON file.
 
     Args:
-        path: the file. kind: what it should hold, for messages about files of another kind.
+        path: the file. kind: the expected content, for messages about files of another kind.
 
     Raises:
         FileError: missing, unreadable, too large, or not JSON.
@@ -80,10 +80,10 @@ def parse_json(data: bytes, source: str | Path, kind: str = "a document") -> Any
 
 
 def not_json(data: bytes, kind: str, why: str) -> str:
-    """Return what is wrong with a file that is not JSON: another kind of file, or the place of the mistake.
+    """Return the mistake of a file that is not JSON: another kind of file, or the place of the mistake.
 
     Args:
-        data: its content. kind: what was expected. why: the parser's reason.
+        data: its content. kind: the expected content. why: the parser's reason.
     """
     start = data.lstrip()[:1]
     if start in (b"{", b"["):

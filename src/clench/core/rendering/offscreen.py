@@ -1,4 +1,4 @@
-"""Draw a MuJoCo model off screen: colours, distances and what is seen, pixel by pixel."""
+"""Draw a MuJoCo model off screen: colour, distance and geom of each pixel."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Offscreen:
             self._size = width, height
 
     def draw(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Return colours, shape (H, W, 3), and how near what is seen is, shape (H, W).
+        """Return colours, shape (H, W, 3), and the nearness of the visible surface, shape (H, W).
 
         Nearness is 1 at the near plane of the camera and 0 at its far plane; without perspective it is linear.
         """
@@ -93,7 +93,7 @@ class Offscreen:
         return geoms[code], nearness
 
     def close(self) -> None:
-        """Free what the graphics library holds."""
+        """Free the memory of the graphics library."""
         if self._context is not None:
             self._gl.make_current()
             self._context.free()

@@ -106,7 +106,7 @@ def _candidates(mujoco: Any) -> list[Any]:
     asked = os.environ.get(_VARIABLE, "").lower().strip()
     if asked in _WITHOUT_SCREEN:
         return [asked]
-    # What is left draws on a screen, and ends the program where there is none.
+    # The remaining library draws on a screen. Without a screen, it ends the program.
     screen = [mujoco.GLContext] if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") else []
     return screen if asked else [*_WITHOUT_SCREEN, *screen]
 

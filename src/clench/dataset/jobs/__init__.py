@@ -1,1 +1,1 @@
-"""What is generated: the job, its units of work, shards of them, hands and objects."""
+"""The work of a dataset: the job, its units, shards of units, hands and objects."""

@@ -1,4 +1,4 @@
-"""Shards: which of several independent runs does which units."""
+"""Shards: share the units of a job among independent runs."""
 
 from __future__ import annotations
 

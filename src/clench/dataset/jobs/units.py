@@ -10,7 +10,7 @@ from clench.core.caching.fingerprint import fingerprint
 
 @dataclass(frozen=True)
 class Unit:
-    """A piece of work whose result depends on nothing but itself and the options of the job.
+    """A piece of work. Its result depends only on the unit and on the options of the job.
 
     Args:
         job_seed: seed of the job. hand, object: models. scale: of the object [-].

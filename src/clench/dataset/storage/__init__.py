@@ -1,1 +1,1 @@
-"""What is written: columns, rows, parts, folder, merged file, card."""
+"""The files of a dataset: columns, rows, parts, folder, merged file, card."""

@@ -36,7 +36,7 @@ _ADVICE: Final = "give --out another folder, or remove this one."
 
 
 class DatasetFolder:
-    """A folder that holds the dataset of a job, or is to hold it.
+    """The folder of a job's dataset, which may still be empty.
 
     Args:
         path: the folder. job: its content.

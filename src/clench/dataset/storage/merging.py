@@ -1,4 +1,7 @@
-"""Merge the parts of a dataset into one file, with a manifest and a card; the same bytes whoever made the parts."""
+"""Merge the parts of a dataset into one file, with a manifest and a card.
+
+The bytes of the file do not depend on who made the parts.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steadiness of a held object: epsilon and volume, within torque limits, and a fast lower bound of each epsilon.
+"""Epsilon quality of a held object: epsilon and volume, within torque limits, and a fast lower bound of each epsilon.
 
 Polyhedra inside the friction cones replace the cones, so every number is a lower bound. With N edges, the friction is
 too small by at most a factor cos(pi / N).

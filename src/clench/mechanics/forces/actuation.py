@@ -184,17 +184,26 @@ class HoldingProgram:
         for sign in (1.0, -1.0):
             self.cone.at_most(sign * self.torques / self.arm - worst, np.zeros(len(self.torques)))
 
-    def demand_forces(self, extra: FloatArray | None = None, change: FloatArray | None = None) -> None:
-        """Demand cones and torque limits for the forces.
+    def demand_forces(
+        self, extra: FloatArray | None = None, change: FloatArray | None = None, by: FloatArray | None = None
+    ) -> None:
+        """Demand cones and torque limits for the forces in M cases; without arguments, for the forces alone.
 
         Args:
-            extra: constant forces that are added, shape (C * width,).
-            change: rows that add forces by the unknowns, shape (C * width, size).
+            extra: constant forces that are added, shape (M, C * width).
+            change: forces that are added for every unit of an unknown, shape (M, C * width).
+            by: the row that gives this unknown, shape (size,).
         """
-        forces = self.forces if change is None else self.forces + change
-        demand_cones(self.cone, self.held.contacts, forces, extra)
-        scale, J = self.unit * self.arm, self.held.jacobian.T / self.arm
-        demand_limits(self.cone, J @ forces, self.held.dofs.limits / scale, None if extra is None else J @ extra)
+        held = self.held
+        constant = np.zeros((1, len(self.forces))) if extra is None else extra
+        forces, torques = self.forces[None], (self.torques / self.arm)[None]
+        J = held.jacobian / self.arm
+        if change is not None and by is not None:
+            forces = forces + change[:, :, None] * by
+            torques = torques + (change @ J)[:, :, None] * by
+        demand_cones(self.cone, held.contacts, forces, constant)
+        limits = held.dofs.limits / (self.unit * self.arm)
+        demand_limits(self.cone, np.broadcast_to(torques, (len(constant), *torques.shape[1:])), limits, constant @ J)
 
     def solve(self) -> tuple[HoldingForces, FloatArray] | None:
         """Return the forces, balanced to rounding, and all unknowns; None when nothing satisfies the demands."""

@@ -87,34 +87,38 @@ class ConeProgram:
         return None
 
 
-def demand_cones(
-    program: ConeProgram, contacts: ContactSet, forces: FloatArray, extra: FloatArray | None = None
-) -> None:
-    """Demand that contact forces lie inside their friction cones.
+def demand_cones(program: ConeProgram, contacts: ContactSet, forces: FloatArray, extra: FloatArray) -> None:
+    """Demand that contact forces lie inside their friction cones, in M cases.
 
     Args:
         program: to add to. contacts: C of them.
-        forces: rows that give all force components from the unknowns, shape (C * width, size).
-        extra: added to them, shape (C * width,).
+        forces: rows that give all force components from the unknowns, shape (1 or M, C * width, size).
+        extra: added to them, shape (M, C * width).
     """
-    width = contacts.width
+    width, cases = contacts.width, (len(extra), len(contacts), contacts.width)
     scale = np.ones((len(contacts), width))
     scale[:, :2] = 1.0 / contacts.reach[:, :2]
     scale[:, 3:] = 1.0 / contacts.reach[:, 2:]
     scale[:, 2] = 1.0 - _INSIDE
     order = [2, 0, 1, 3][:width]
-    constant = np.zeros(len(contacts) * width) if extra is None else extra
-    rows = (forces.reshape(len(contacts), width, -1) * scale[:, :, None])[:, order]
-    values = (constant.reshape(len(contacts), width) * scale)[:, order]
-    program.inside_cones(rows.reshape(-1, forces.shape[1]), values.reshape(-1), width)
+    rows = (forces.reshape(len(forces), *cases[1:], -1) * scale[:, :, None])[:, :, order]
+    values = (extra.reshape(cases) * scale)[:, :, order]
+    rows = np.broadcast_to(rows, (*cases, rows.shape[-1]))
+    program.inside_cones(rows.reshape(-1, program.size), values.reshape(-1), width)
 
 
-def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, extra: FloatArray | None = None) -> None:
-    """Demand `|rows x + extra| <= limits`, a little inside."""
-    constant = np.zeros(len(rows)) if extra is None else extra
-    inner = limits * (1.0 - _INSIDE)
-    program.at_most(rows, inner - constant)
-    program.at_most(-rows, inner + constant)
+def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, extra: FloatArray) -> None:
+    """Demand `|rows x + extra| <= limits`, a little inside, in M cases.
+
+    Args:
+        program: to add to. rows: shape (M, D, size). limits: shape (D,). extra: shape (M, D).
+    """
+    # Contacts do not load the other joints.
+    loaded = (rows != 0.0).any(axis=(0, 2)) | (extra != 0.0).any(axis=0)
+    inner = np.broadcast_to(limits[loaded] * (1.0 - _INSIDE), (len(rows), int(loaded.sum()))).reshape(-1)
+    used, constant = rows[:, loaded].reshape(-1, program.size), extra[:, loaded].reshape(-1)
+    program.at_most(used, inner - constant)
+    program.at_most(-used, inner + constant)
 
 
 def demand_tensions(program: ConeProgram, torques: FloatArray, drive: TendonDrive, first: int) -> FloatArray:

@@ -213,10 +213,10 @@ def _least_torque(task: SqueezeTask, margin: float) -> tuple[HoldingForces, floa
 
 def _demand(program: HoldingProgram, task: SqueezeTask, spread: FloatArray) -> None:
     program.cone.at_most(program.normals.sum(axis=0)[None], np.array([task.most_force / task.unit]))
-    for end in task.ends / task.unit:
-        program.demand_forces(end)
-        for change in task.changes / task.unit:
-            program.demand_forces(end, np.outer(change, spread))
+    nothing = np.zeros((1, task.changes.shape[1]))
+    changes = np.tile(np.vstack([nothing, task.changes / task.unit]), (len(task.ends), 1))
+    ends = np.repeat(task.ends / task.unit, 1 + len(task.changes), axis=0)
+    program.demand_forces(ends, changes, spread)
 
 
 def _answers(held: HeldObject) -> FloatArray:

@@ -82,20 +82,20 @@ class TendonDrive:
 
     def _least(self, wanted: FloatArray) -> FloatArray | None:
         """Minimise the largest tension and, with a small weight, the sum, so that no tendon is pulled without need."""
-        from scipy.optimize import linprog
+        from clench.kernels.mechanics.least_cost import least_cost
 
-        count = self.arms.shape[1]
-        answer = linprog(
-            np.append(np.full(count, 1e-6), 1.0),
-            A_ub=np.hstack([np.eye(count), -np.ones((count, 1))]),
-            b_ub=np.zeros(count),
-            A_eq=np.hstack([self.arms, np.zeros((len(wanted), 1))]) / self._unit,
-            b_eq=wanted / self._unit,
-            bounds=[*zip(self.t_min.tolist(), self.t_max.tolist(), strict=True), (-np.inf, np.inf)],
-            method="highs-ds",
-            options={"primal_feasibility_tolerance": 1e-10},
-        )
-        return np.asarray(answer.x)[:count] if answer.status == 0 else None
+        count, eye, arms = self.arms.shape[1], np.eye(self.arms.shape[1]), self.arms / self._unit
+        left = wanted / self._unit - arms @ self.t_min
+        # Unknowns: tensions above the least ones, and the largest tension above the largest of the least ones.
+        lowest = float(self.t_min.max(initial=0.0))
+        rows = np.vstack([np.hstack([block, np.zeros((len(block), 1))]) for block in (arms, -arms, eye, eye)])
+        rows[-count:, -1] = -1.0
+        most = np.concatenate([left, -left, self.t_max - self.t_min, lowest - self.t_min])
+        bound = np.isfinite(most)
+        x = np.empty(count + 1)
+        if not least_cost(rows[bound], most[bound], np.append(np.full(count, 1e-6), 1.0), x):
+            return None
+        return self.t_min + x[:count]
 
     def _nearest(self, wanted: FloatArray) -> FloatArray:
         """Return the tensions whose torques are nearest (bounded least squares)."""

@@ -186,7 +186,12 @@ class GraspObject:
         return replace(self, bodies=tuple(replace(body, friction=float(friction)) for body in self.bodies))
 
     def with_body(self, body: Body) -> GraspObject:
-        """Return the object with one body more, e.g. an obstacle; see `table` for one."""
+        """Return the object with one more body, such as an obstacle; see `table` for one.
+
+        Raises:
+            CommandError: no `Body`.
+        """
+        check_type(body, Body, "body")
         return replace(self, bodies=(*self.bodies, body))
 
     def with_object(
@@ -200,10 +205,11 @@ class GraspObject:
             role: role of its bodies for the hand; None keeps their own.
 
         Raises:
-            UnknownNameError: no such role.
+            UnknownNameError: no such role. CommandError: no `GraspObject`.
         """
         from .object_loading import role_named
 
+        check_type(other, GraspObject, "other")
         placed = (body.moved(pose) if pose else body for body in other.bodies)
         added = tuple(replace(body, role=role_named(role)) if role else body for body in placed)
         return replace(self, bodies=(*self.bodies, *added), warnings=(*self.warnings, *other.warnings))

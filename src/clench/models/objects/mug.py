@@ -1,4 +1,4 @@
-"""A mug with a handle: one closed surface, and the convex pieces it is made of.
+"""A mug with a handle: one closed surface, and its convex pieces.
 
 The wall is a body of revolution. Two rectangles of its grid, above one another, are left out. The handle is a tube
 whose first and last ring are the borders of these rectangles. Thus wall and handle are one surface without inner faces.

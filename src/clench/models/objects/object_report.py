@@ -79,7 +79,7 @@ class ObjectReport:
         """Return label and text: size, volume, centre of mass, shapes."""
         sides = " x ".join(f"{side * 1e3:.4g}" for side in self.size)
         box = f"{sides} mm, from {_vector(self.lower)} to {_vector(self.upper)} m"
-        hull = "" if self.watertight else " (the convex hull stands in for what is not watertight)"
+        hull = "" if self.watertight else " (of the convex hull: the mesh is not watertight)"
         return [
             ("object", self.name if self.path is None else f"{self.name} ({self.path})"),
             ("size", box),

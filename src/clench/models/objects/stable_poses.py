@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clench.core.argument_types import check_type
 from clench.core.exceptions import ObjectError
 from clench.core.numbers import is_finite_number
 from clench.core.pose import FloatArray, Pose, checked_vector
@@ -114,8 +115,9 @@ def stable_poses(
 
     Raises:
         ObjectError: a flat object; a centre of mass that is not inside of the convex hull; a number out of range.
-        CommandError: `center_of_mass` is not three finite numbers.
+        CommandError: `center_of_mass` is not three finite numbers, or `obj` is no `GraspObject`.
     """
+    check_type(obj, GraspObject, "obj")
     if not is_finite_number(table_height):
         raise ObjectError(f"table_height: expected a finite number [m], got {table_height!r}.")
     if not (is_finite_number(merge_angle) and 0.0 <= merge_angle <= math.pi):

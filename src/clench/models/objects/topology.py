@@ -78,7 +78,7 @@ def parted(faces: IntArray, vertices: int) -> IntArray:
 
 
 def components(faces: IntArray, vertices: int) -> IntArray:
-    """Return the number of the part each triangle belongs to, shape (T,); a part hangs together by its vertices."""
+    """Return the number of each triangle's part, shape (T,); the triangles of a part share vertices."""
     number = _connected(faces, vertices)[faces[:, 0]]
     named = np.zeros(vertices, dtype=bool)
     named[number] = True

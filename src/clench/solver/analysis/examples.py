@@ -2,7 +2,7 @@
 
 {"schema": "clench.examples/1", "record": "record.sqlite",
 "pairs": [{"better": {"solve": 3}, "worse": {"solve": 5}},
-{"better": {"solve": 3, "finger": "index", "set": 4}, "worse": {"solve": 3, "finger": "index", "set": 0}},
+{"better": {"solve": 3, "finger": "index", "candidate": 4}, "worse": {"solve": 3, "finger": "index", "candidate": 0}},
 {"better": {"scores": {"range_of_motion": 1.2}}, "worse": {"scores": {"range_of_motion": 2.0}}}],
 "outcomes": [{"of": {"solve": 3}, "held": true}]}
 """
@@ -35,7 +35,7 @@ class _Side(msgspec.Struct, forbid_unknown_fields=True):
     scores: dict[str, float] | None = None
     solve: int | None = None
     finger: str | None = None
-    set: int | None = None
+    candidate: int | None = None
 
 
 class _Pair(msgspec.Struct, forbid_unknown_fields=True):
@@ -100,7 +100,8 @@ def read_examples(path: str | Path) -> ScoredExamples:
     """Read an examples file, with the solves of its record.
 
     Raises:
-        FileError: missing, malformed, or with a solve, finger or set that is not there; the message names the key.
+        FileError: the file is missing or malformed, or names a solve, a finger or a candidate that is not there. The
+            message names the key.
     """
     data = read_json(path, "an examples file")
     bad = non_finite_path(data)
@@ -152,8 +153,8 @@ def _scores(side: _Side, solves: Mapping[int, GraspSolution], where: str, record
     Raises:
         FileError: it names nothing, or something that is not there.
     """
-    if (side.scores is None) == (side.solve is None) or (side.finger is None) != (side.set is None):
-        expected = "'scores' by criterion, or a 'solve' of the record, of which 'finger' and 'set' may be told"
+    if (side.scores is None) == (side.solve is None) or (side.finger is None) != (side.candidate is None):
+        expected = "'scores' by criterion, or a 'solve' of the record, of which 'finger' and 'candidate' may be told"
         raise FileError(where, f"expected {expected}.")
     if side.scores is not None:
         try:
@@ -171,6 +172,6 @@ def _scores(side: _Side, solves: Mapping[int, GraspSolution], where: str, record
         raise FileError(
             where, f"solve {side.solve} has no finger '{side.finger}'; it has {', '.join(solution.fingers)}."
         )
-    if side.set is None or not 0 <= side.set < len(finger.candidates):
-        raise FileError(where, f"set: expected 0 to {len(finger.candidates) - 1}, got {side.set}.")
-    return finger.candidates[side.set].scores
+    if side.candidate is None or not 0 <= side.candidate < len(finger.candidates):
+        raise FileError(where, f"candidate: expected 0 to {len(finger.candidates) - 1}, got {side.candidate}.")
+    return finger.candidates[side.candidate].scores

@@ -17,48 +17,50 @@ MOST: Final = 400
 
 @dataclass(frozen=True)
 class HandSets:
-    """One set per finger, with the scores of this combination.
+    """One candidate per finger, with the scores of this combination.
 
     Args:
-        sets: index of the set by finger. scores: sums over the fingers by criterion. total: weighted sum [-].
-        chosen: whether these are the chosen sets.
+        candidates: index of the candidate by finger. scores: sums over the fingers by criterion.
+        total: weighted sum [-]. chosen: whether these are the chosen candidates.
     """
 
-    sets: Mapping[str, int]
+    candidates: Mapping[str, int]
     scores: Mapping[str, float]
     total: float
     chosen: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
-        return {"sets": dict(self.sets), "scores": dict(self.scores), "total": self.total, "chosen": self.chosen}
+        candidates, scores = dict(self.candidates), dict(self.scores)
+        return {"candidates": candidates, "scores": scores, "total": self.total, "chosen": self.chosen}
 
 
 def hand_front(solution: GraspSolution) -> list[HandSets]:
     """Return the Pareto front over all fingers, best weighted sum first; empty where the solution says no choice.
 
-    The criteria are those that add up over the fingers and for which every set in question has a score. A part that
-    another set of the same finger dominates cannot be in the best sum. Thus the fingers' own fronts are enough.
+    The criteria are those that add up over the fingers and for which every candidate in question has a score. If
+    another candidate of the same finger dominates a candidate, the latter cannot be in the best sum. So the fronts of
+    the fingers are enough.
     """
     choice = solution.choice
     if choice is None or not choice["fingers"]:
         return []
     options = {name: list(said["pareto"]) for name, said in choice["fingers"].items()}
     scores = {n: [c.scores for c in solution.fingers[n].candidates] for n in options}
-    names = [n for n in choice["criteria"] if all(n in scores[f][i] for f, sets in options.items() for i in sets)]
+    names = [n for n in choice["criteria"] if all(n in scores[f][i] for f, own in options.items() for i in own)]
     if not names:
         return []
     signs = np.array([1.0 if choice["criteria"][n]["better"] == "more" else -1.0 for n in names])
     worth = signs * [choice["criteria"][n]["weight"] / choice["criteria"][n]["scale"] for n in names]
-    sets: list[tuple[int, ...]] = [()]
+    candidates: list[tuple[int, ...]] = [()]
     sums = np.zeros((1, len(names)))
     for finger, own in options.items():
         rows = np.array([[scores[finger][i][n] for n in names] for i in own])
         sums = (sums[:, None] + rows[None]).reshape(-1, len(names))
-        sets = [(*before, i) for before in sets for i in own]
+        candidates = [(*before, i) for before in candidates for i in own]
         kept = pareto_front(sums * signs)
         kept.sort(key=lambda k: -float(sums[k] @ worth))
-        sums, sets = sums[kept[:MOST]], [sets[k] for k in kept[:MOST]]
+        sums, candidates = sums[kept[:MOST]], [candidates[k] for k in kept[:MOST]]
     chosen = tuple(solution.fingers[name].chosen for name in options)
     return [
         HandSets(
@@ -67,5 +69,5 @@ def hand_front(solution: GraspSolution) -> list[HandSets]:
             float(row @ worth),
             found == chosen,
         )
-        for found, row in zip(sets, sums, strict=True)
+        for found, row in zip(candidates, sums, strict=True)
     ]

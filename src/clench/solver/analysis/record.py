@@ -1,4 +1,4 @@
-"""The record: every solve, all its sets and its choice, in one SQLite file."""
+"""The record: every solve, all its candidates and its choice, in one SQLite file."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class BatchSolver:
         self._idle = [finger for finger in asked if finger not in self.moving]
         self._calibration = calibration_of(command.criteria)
         check_calibration(hand, self._calibration)
-        #: The sets that are closed; None for a command with several orders, which is solved pose by pose.
+        #: The candidates that are closed; None for a command with several orders, which is solved pose by pose.
         self.candidates = None if command.orders else candidates_of(self._start, self._calibration)
 
     @property

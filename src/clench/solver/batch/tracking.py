@@ -29,8 +29,8 @@ class Tracker:
 
     Every answer is computed anew and guarantees the same as `clench.solve`. Without the full width, the tracker keeps
     one thing from the last cycle: the plane of each finger. A finger keeps its plane unless another plane's weighted
-    sum is better by `margin`, or the finger touches only on another plane. With the full width there is one set per
-    finger and nothing to choose. The answer then has the bits of `clench.solve`.
+    sum is better by `margin`, or the finger touches only on another plane. With the full width there is one candidate
+    per finger and nothing to choose. The answer then has the bits of `clench.solve`.
 
     Args:
         hand, obj: as for `clench.solve`.
@@ -53,7 +53,7 @@ class Tracker:
         if candidates is None or not candidates.by_kernel:
             raise CommandError(
                 "Tracker: expected a command with one closing order and one open posture per finger, and without "
-                "check_sets; without full_width also criteria that are range_of_motion, touching_links and "
+                "check_candidates; without full_width also criteria that are range_of_motion, touching_links and "
                 "limit_distance alone. Use clench.solve for this one."
             )
         self._margin = margin

@@ -68,7 +68,7 @@ def with_posture(solution: GraspSolution, said: Mapping[str, Any], seconds: floa
     """Return a solution whose `choice` gives the reason for the posture, and the time of its choice [s]."""
     choice, timing = solution.choice, dict(solution.timing)
     timing["total"] = timing.get("total", 0.0) + seconds
-    # Two mappings: a reader of the reason for the posture does not wait for the reasons for the sets of the fingers.
+    # Two mappings: a reader of the reason for the posture does not wait for the reasons for the candidates.
     parts: list[Any] = [{"preshapes": said}, {} if choice is None else choice]
     return solution.with_known(
         choice=ChainMap(*parts),

@@ -47,23 +47,24 @@ def batch(
     Args:
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        poses: NumPy file (.npy) of rows [w, x, y, z, X, Y, Z] or of matrices 4 x 4; without it, approach poses.
-        count: how many approach poses.
-        seed: of the approach poses.
-        command: command file (JSON) with everything else; its own hand_pose plays no part.
+        poses: NumPy file (.npy) of rows [w, x, y, z, X, Y, Z] or of matrices 4 x 4; without it, clench draws approach
+            poses.
+        count: number of approach poses.
+        seed: seed of the approach poses.
+        command: command file (JSON) with everything but the poses; its hand_pose does not count.
         hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
         table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
-        obstacle: mesh or shape fixed in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be given
-            several times.
-        planes: curl planes per finger.
-        planes_only: close on the planes alone; the space between them is not checked, and nothing is certified.
-        threads: how many are used; all cores by default.
+        obstacle: obstacle in the world, as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz [m]; may be given
+            several times (docs/surroundings.md).
+        planes: number of curl planes per finger.
+        planes_only: close on the planes only; clench does not check the space between them, and certifies nothing.
+        threads: number of threads; all cores by default.
         device: device that closes the fingers, cpu or cuda (an NVIDIA GPU; docs/batch.md).
-        chunk: poses at a time; a GPU wants some ten thousand.
-        out: NumPy file (.npz) to write. Every chunk is written when it is solved, to a folder beside it; the same call
-            goes on where an ended one stopped.
+        chunk: number of poses that are solved together; a GPU needs some ten thousand.
+        out: NumPy file (.npz) for the answers. clench writes each solved chunk to a folder beside the file; the same
+            call continues an interrupted run.
         strict: exit with 1 unless a pose gives a grasp.
         json: print one JSON document on standard output.
     """
@@ -95,7 +96,7 @@ def batch(
         asked = replace(asked, planes=planes)
     if poses is None and count < 1:
         raise CommandError(f"--count: expected at least 1, got {count}.")
-    # A file that cannot be read is told before anything is compiled.
+    # An error of the file comes before anything is compiled.
     read = None if poses is None else _read(poses)
     announce()
     warm_up()

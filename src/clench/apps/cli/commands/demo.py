@@ -40,20 +40,21 @@ def run_demo(models: tuple[str, str], out: Path, seed: int | None, page: Path, j
     from clench.apps.cli.output.printing import print_files, print_report, print_solution
     from clench.apps.pages.page_files import check_page
     from clench.core.files.json_files import check_folder
-    from clench.kernels.runtime.warming import warm_up
+    from clench.kernels.runtime.warming import announce, warm_up
 
     check_folder(out)
     check_page(page, out)
     hand_model, object_model = models
     if out.is_dir():
         clench.Record.check(out / "record.sqlite")
+    announce()
+    warm_up()
     with _progress() as step:
         step(f"Loading hand '{hand_model}' and object '{object_model}'")
         hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)
-        step("Solving (the first run compiles the kernels, which takes most of a minute; later runs load them)")
-        warm_up()
+        step("Solving")
         command = choose_command(hand, obj, models, seed)
-        # The first call of a process loads the compiled kernels; this one shows what a solve takes.
+        # The first call of a process loads the compiled kernels; this one shows the time of a solve.
         solution = clench.solve(hand, obj, command)
         solution = replace(solution, hand_model=loadable(hand_model), object_model=loadable(object_model))
         solution = clench.execution.complete(solution, hand, obj)

@@ -66,19 +66,19 @@ def execute(
         actuator: the kind of hand to move.
         hand: model of the hand; by default the solution's own.
         object: model of the object; by default the solution's own.
-        hand_file: TOML file that was used to load the hand.
-        palm: palm link that was used to load the hand.
-        scale: of the object; by default the solution's own.
-        table: the table that the solution was computed with, see `clench solve`.
-        obstacle: obstacles that the solution was computed with, see `clench solve`.
-        speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry out a solution that has violations, or next steps that drive links into each other, too.
-        skip_next_steps: end with the touch and the squeeze, without the next steps that the solution has.
+        hand_file: TOML file of the solution's hand.
+        palm: palm link of the solution's hand, if it was given.
+        scale: scale of the object; by default the solution's own.
+        table: table of the solution, as for `clench solve`.
+        obstacle: obstacles of the solution, as for `clench solve`; may be given several times.
+        speed: fraction of the joints' velocity limits, above 0 and up to 1.
+        force: also execute a solution that has violations, or next steps that drive links into each other.
+        skip_next_steps: end after the touch and the squeeze, and leave out the solution's next steps.
         hold: simulated: close on the free object, squeeze it as planned, pull it in six directions.
         lift: simulated: close on the object on a table, squeeze it as planned, lift it.
-        mass: hold, lift: of the object, kg (0.1).
-        friction: hold, lift: of its contacts (0.6).
-        drive: simulated: actuators of the joints: stiff servos, or the model's own actuators (servo).
+        mass: hold, lift: mass of the object [kg] (0.1).
+        friction: hold, lift: friction of its contacts (0.6).
+        drive: simulated: what moves the joints: stiff servos, or the model's own actuators (servo).
         controller: ros2: name of the joint_trajectory_controller (hand_controller).
         joint_states: ros2: topic of the joint states (/joint_states).
         interface: ros2: program interface (auto: rclpy, else cyclonedds).
@@ -86,10 +86,10 @@ def execute(
         config: orca: the hand's config.yaml.
         video: simulated: file for a moving picture (.gif, or .mp4 with clench[video]).
         stills: simulated: folder for pictures of the start, the touch, the squeeze, the end and next steps (PNG).
-        squeeze: ros2, orca: share of the squeeze plan's angle offsets that is told beyond the touch (1).
-        timeout: seconds to look for the controller.
+        squeeze: ros2, orca: share of the squeeze plan's angle offsets that is added to the touch (1).
+        timeout: time to look for the controller [s].
         to: signal: file:PATH, tcp:HOST:PORT, unix:PATH or topic:NAME.
-        record: signal: record (SQLite file) that the solution is appended to.
+        record: signal: record (SQLite file) to which the solution is appended.
         log: file for targets and measurements on the way (MCAP).
         out: file for the report (JSON).
         strict: exit with 1 unless the solution's status is grasp.

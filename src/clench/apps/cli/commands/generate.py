@@ -53,35 +53,35 @@ def generate(
     """Generate a dataset of grasps on all cores, continue interrupted runs, and merge it (docs/dataset.md).
 
     Args:
-        out: folder of the dataset; the same call goes on where an ended one stopped.
-        job: file (TOML, or JSON) with these options as keys, without the options of this run; options on the command
-            line override it.
+        out: folder of the dataset; the same call continues an interrupted run.
+        job: file (TOML or JSON) with these options as keys; options on the command line override it.
         hands: built-in names, paths to .urdf or .xml files, or names that clench[hands] finds (docs/own-hand.md).
         objects: built-in names, paths to meshes, or shapes such as cylinder:r=0.03,h=0.1.
-        scales: of the objects' lengths, e.g. 0.001 for meshes in millimetres; each object is used at each scale; 1 by
-            default.
-        count: grasps per hand, object and scale; 100 by default.
-        seed: the same seed gives the same grasps, for any number of workers and shards; 0 by default.
-        unit: grasps that are planned together at most; an interruption loses at most one unit per worker; 50 by
-            default.
+        scales: factors for the objects' lengths, e.g. 0.001 for meshes in millimetres; every object is used at every
+            scale; 1 by default.
+        count: number of grasps per hand, object and scale; 100 by default.
+        seed: seed; the same seed gives the same grasps for any number of workers and shards; 0 by default.
+        unit: largest number of grasps that are planned together; an interruption loses at most one unit per worker;
+            50 by default.
         hold: test every grasp in simulation, in six directions; grasps are planned on convex pieces.
-        friction: for planning; two numbers are a range; by default that of hand file and object, else 0.6.
-        mass: of the objects, kg; two numbers are a range; 0.1 by default.
-        gravity: its direction; by default objects are held in any direction.
-        kinds: of grasps; all by default.
+        friction: friction between links and object; two numbers are a range; by default the values of hand file and
+            object, else 0.6.
+        mass: mass of the objects [kg]; two numbers are a range; 0.1 by default.
+        gravity: direction of gravity; by default every direction.
+        kinds: kinds of grasps; all by default.
         fingers: names of the fingers that may close; all by default.
-        min_fingers: how many touch at least; 2 by default.
-        approach: direction in which the palm comes.
-        approach_angle: how far the palm may come from another direction [degrees]; 45 by default.
-        pose_sigma: standard deviation of the object's position, m, and of its rotation, rad: grasps are preferred
-            that hold when the object is displaced.
-        apart: distance of any two grasps of a unit, m: root mean square over all links; 0.02 by default.
-        effort: proposals per grasp; the best one of so many is kept; 40 by default.
-        most: proposals of a unit at most.
+        min_fingers: smallest number of fingers that touch; 2 by default.
+        approach: direction in which the palm approaches.
+        approach_angle: largest angle between the palm's direction and --approach [degrees]; 45 by default.
+        pose_sigma: standard deviations of the object's position [m] and rotation [rad]; clench prefers grasps that
+            hold when the object is displaced.
+        apart: smallest difference of two grasps of a unit: a root mean square over all links [m]; 0.02 by default.
+        effort: number of proposals per grasp; the best of them is kept; 40 by default.
+        most: largest number of proposals of a unit.
         without_path: leave out the path from the open hand to the touch, and the pregrasp.
-        shard: i/n: do the units of one of n runs; by default as SLURM's variables of an array say, else all.
-        workers: processes; all cores by default, 0 works in this process.
-        memory: a process that has had more is replaced after its unit, GB; 4 by default.
+        shard: i/n: run only part i of n; by default as the variables of a SLURM array say, else everything.
+        workers: number of processes; all cores by default; 0 works in this process.
+        memory: clench replaces a process that used more memory than this, after its unit [GB]; 4 by default.
         merge: merge the parts in this folder, and do nothing else.
         json: print one JSON document on standard output.
     """

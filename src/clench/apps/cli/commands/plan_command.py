@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from clench.models.objects.grasp_object import GraspObject
     from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
 
-# The values of the enumeration of this name, written out so that the command line loads without NumPy.
-
 
 def plan(
     *,
@@ -54,29 +52,33 @@ def plan(
     Args:
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        count: how many grasps are wanted.
+        count: number of grasps.
         hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
-        friction: of links on the object; two numbers are a range; by default that of hand file and object, else 0.6.
-        mass: of the object [kg]; 0.1 by default; two numbers are a range.
-        gravity: its direction in the world; by default the object is held in any direction.
-        kinds: of grasps; any by default.
+        friction: friction between links and object; two numbers are a range; by default the values of hand file and
+            object, else 0.6.
+        mass: mass of the object [kg]; two numbers are a range; 0.1 by default.
+        gravity: direction of gravity in the world; by default every direction.
+        kinds: kinds of grasps; any by default.
         fingers: names of the fingers that may close; all by default.
-        min_fingers: fingers that touch at least.
-        approach: direction in the world in which the palm comes.
-        approach_angle: how far the palm may come from another direction [degrees].
-        table: a table under the object, at its lowest point, or with its top at this height [m].
-        obstacle: other things, each as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz (docs/surroundings.md).
-        pose_sigma: the object may be off by this standard deviation [m], with 0.6 degrees for every millimetre.
-        apart: two grasps differ by at least this, as a root mean square over all links [m]; 0.02 by default.
-        effort: proposals per grasp; the best one of so many is returned; 40 by default.
-        most: proposals at most.
-        seconds: no new proposals after this time.
-        seed: the same seed gives the same grasps.
-        threads: how many are used; all cores by default.
-        without_path: leave out the free paths, which take longest.
-        hold: try every grasp in simulation: close on the free object, squeeze, pull in six directions (docs/hold.md).
+        min_fingers: smallest number of fingers that touch.
+        approach: direction in the world in which the palm approaches.
+        approach_angle: largest angle between the palm's direction and --approach [degrees].
+        table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
+        obstacle: obstacle in the world, as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz [m]; may be given
+            several times (docs/surroundings.md).
+        pose_sigma: standard deviation of the object's position [m]; the object also turns by 0.6 degrees for every
+            millimetre.
+        apart: smallest difference of two grasps: a root mean square over all links [m]; 0.02 by default.
+        effort: number of proposals per grasp; the best of them is returned; 40 by default.
+        most: largest number of proposals.
+        seconds: time after which no proposal begins [s].
+        seed: seed of the proposals; the same seed gives the same grasps.
+        threads: number of threads; all cores by default.
+        without_path: leave out the free paths, which take most of the time.
+        hold: test every grasp in simulation: close on the free object, squeeze, pull in six directions
+            (docs/hold.md).
         out: folder for plan.json, the solution and trajectory of every grasp, and pictures: the best grasps, where
             all of them touch the object, and the zones in which the hand grasps.
         html: file (.html) for a page that shows all grasps in any browser, without a network (docs/pictures.md).

@@ -51,27 +51,27 @@ def solve(
     Args:
         hand: built-in name, path to a .urdf or .xml file, or a name that clench[hands] finds (docs/own-hand.md).
         object: built-in name, path to a mesh, or a shape such as cylinder:r=0.03,h=0.1.
-        command: command file (JSON); without it clench plans one grasp, from --seed, as `clench plan` does.
+        command: command file (JSON); without it clench plans one grasp with --seed, as `clench plan` does.
         hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
         table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
-        obstacle: mesh or shape fixed in the world, as MESH_OR_SHAPE@x,y,z or with qw,qx,qy,qz behind [m]; may be given
-            several times.
-        collision_source: geometry of the hand to solve for.
-        planes: curl planes per finger.
-        order: in which the joints close; several are solved one by one, and the best is kept.
+        obstacle: obstacle in the world, as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz [m]; may be given
+            several times (docs/surroundings.md).
+        collision_source: geometry of the hand that is solved.
+        planes: number of curl planes per finger.
+        order: closing order of the joints; several orders are solved one by one, and the best answer is kept.
         criteria: weights of the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
-        seed: of the planned grasp; recorded with the result.
+        seed: seed of the planned grasp; recorded with the result.
         out: folder for solution.json, trajectory.json and figures.
         html: file (.html) for a page that shows the closing in any browser, without a network (docs/pictures.md).
         record: SQLite record to append the solution to.
         pose_error: show the effect of an error of the object's pose up to this many metres and degrees, e.g. 0.002 2.
-        explain: print the candidates of every finger with their scores, and why the chosen ones won.
-        forces: print how steady the grasp is, and the forces that hold the object.
-        mass: of the object, for the forces, which it prints [kg]; 0.1 by default; two numbers are a range.
-        friction: of links on the object, for the printed forces; two numbers are a range; by default that of hand file
-            and object, else 0.6. The choice always takes those of hand file and object.
+        explain: print the candidates of every finger with their scores, and the reason for the choice.
+        forces: print the grasp's quality, and the forces that hold the object.
+        mass: mass of the object for --forces [kg]; two numbers are a range; 0.1 by default.
+        friction: friction between links and object for --forces; two numbers are a range; by default the values of
+            hand file and object, else 0.6. The choice among candidates always takes the default.
         strict: exit with 1 unless the status is grasp.
         json: print the solution as one JSON document on standard output.
     """

@@ -63,29 +63,31 @@ def view(
             (docs/own-hand.md); for files the one that they name.
         object: built-in name (mug by default), path to a mesh, or a shape such as cylinder:r=0.03,h=0.1; for files the
             one that they name.
-        command: command file (JSON); without it clench plans a grasp, from --seed.
-        hand_file: TOML file that overrides what was found in the hand's model.
+        command: command file (JSON); without it clench plans a grasp with --seed.
+        hand_file: TOML file that overrides the interpretation of the hand's model.
         palm: name of the palm link, to pick a hand inside a whole robot.
         scale: multiplies the object's lengths, e.g. 0.001 for a mesh in millimetres.
-        table: a table under the object, at its lowest point, or with its top at this height [m].
-        obstacle: other things, each as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz (docs/surroundings.md).
-        collision_source: geometry of the hand to solve for.
-        order: in which the joints close.
-        criteria: what counts in the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
-        mass: of the object [kg]; 0.1 by default; of two numbers, a range, the largest counts.
-        friction: of links on the object; by default what hand file and object say, else 0.6; of two numbers the least
-            counts.
-        gravity: its direction in the world, for planning; by default the object is held in any direction.
-        kinds: of planned grasps; any by default.
+        table: put a table under the object: at its lowest point, or with its top at this height of the world [m].
+        obstacle: obstacle in the world, as MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz [m]; may be given
+            several times (docs/surroundings.md).
+        collision_source: geometry of the hand that is solved.
+        order: closing order of the joints.
+        criteria: weights of the choice: a preset (balanced, steady, gentle, quick) or a calibration file.
+        mass: mass of the object [kg]; of two numbers, the larger one counts; 0.1 by default.
+        friction: friction between links and object; of two numbers, the smaller one counts; by default the values of
+            hand file and object, else 0.6.
+        gravity: direction of gravity in the world, for planned grasps; by default every direction.
+        kinds: kinds of planned grasps; any by default.
         fingers: names of the fingers that may close in planned grasps; all by default.
-        min_fingers: fingers that touch at least in planned grasps.
-        approach: direction in the world in which the palm comes in planned grasps.
-        approach_angle: how far the palm may come from another direction [degrees].
-        seed: of planned grasps.
-        host: address to listen on. Anything but this machine itself makes clench print an address with a token.
-        port: to listen on; 0 takes a free one.
-        dark: begin with a dark page.
-        without_browser: print the address, and open no browser.
+        min_fingers: smallest number of fingers that touch in planned grasps.
+        approach: direction in the world in which the palm approaches in planned grasps.
+        approach_angle: largest angle between the palm's direction and --approach [degrees].
+        seed: seed of planned grasps.
+        host: address of the page's server. For any address but this machine itself, clench prints the page's address
+            with a token.
+        port: port of the page's server; 0 takes a free one.
+        dark: start with a dark page.
+        without_browser: print the page's address, and open no browser.
         json: print the address as one JSON document on standard output.
     """
     from clench.apps.viewer.opening import open_session
@@ -163,7 +165,7 @@ def _given(
     asked: dict[str, Any],
     forces: dict[str, Any],
 ) -> Given:
-    """Return what the options of a single scene say."""
+    """Return the inputs that the options of a single scene give."""
     import clench
     from clench.apps.cli.inputs.command_files import loadable
     from clench.apps.viewer.opening import Given

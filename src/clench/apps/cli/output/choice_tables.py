@@ -100,10 +100,10 @@ def _orders_table(orders: Mapping[str, Any]) -> Table:
 def _front_table(front: Sequence[HandSets], choice: Mapping[str, Any]) -> Table:
     """List combinations over all fingers that no other beats in every criterion, by the numbers of their candidates."""
     title = f"Pareto front of the hand, {len(front)} combinations by weighted sum (* chosen; candidates from 0)"
-    result = table_with(title, "", *front[0].sets, *_with_units(front[0].scores, choice), "sum [-]")
+    result = table_with(title, "", *front[0].candidates, *_with_units(front[0].scores, choice), "sum [-]")
     for entry in front[:_MOST_ROWS]:
         scores = [f"{v:.4g}" for v in entry.scores.values()]
-        row = ("*" if entry.chosen else "", *map(str, entry.sets.values()), *scores, f"{entry.total:z.4f}")
+        row = ("*" if entry.chosen else "", *map(str, entry.candidates.values()), *scores, f"{entry.total:z.4f}")
         result.add_row(*map(plain, row))
     return result
 

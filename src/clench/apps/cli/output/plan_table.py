@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from .tables import console_out, plain, print_table, table_with
 
-#: What the columns say that need a word.
+#: Explanations of some columns.
 _MEANINGS: Final = {
     "palm": "position of the palm link in the world",
     "epsilon": "the smallest wrench that the grasp does not resist, for forces that add up to 1 N",

@@ -1,4 +1,4 @@
-"""Cameras without perspective, and what one sees: colour, nearness and solid, pixel by pixel."""
+"""Cameras without perspective, and their pictures: colour, nearness and solid of each pixel."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What is nearest to a camera.
+    """The nearest solid of each pixel of a camera.
 
     Args:
         nearness: of the seen surface along `towards` [m], -inf for none, shape (H, W).
@@ -62,7 +62,7 @@ class Sight:
     solid: NDArray[np.int64]
 
     def hides(self, camera: Camera, points: FloatArray, around: int = 0) -> NDArray[np.bool_]:
-        """Say which points lie behind what is seen at their pixel, shape (N,).
+        """Say which points lie behind the nearest surface of their pixel, shape (N,).
 
         Args:
             camera: that took the picture. points: in the world [m], shape (N, 3).
@@ -81,7 +81,7 @@ class Sight:
 
 @dataclass(frozen=True, eq=False)
 class Picture(Sight):
-    """What a camera sees: also the lit colours, white where nothing is seen, shape (H, W, 3)."""
+    """The picture of a camera: also the lit colours, white without a solid, shape (H, W, 3)."""
 
     image: Image
 
@@ -126,7 +126,8 @@ def fitted_camera(
 
     Args:
         towards: from the scene to the viewer. focus: shape (N, 3) [m]. size: in pixels. scale: pixels per metre.
-        above: what is up in the picture; the world's z axis by default. filled: share of the picture that is used [-].
+        above: the upward direction of the picture; the world's z axis by default.
+        filled: used share of the picture [-].
     """
     right, up, back = look_along(towards, np.array([0.0, 0.0, 1.0]) if above is None else above)
     across = np.column_stack([focus @ right, focus @ up])

@@ -37,7 +37,7 @@ _TOGETHER: Final = 1e-3
 
 
 def photograph(stage: Stage, camera: Camera, points: FloatArray) -> tuple[Image, Picture, NDArray[np.bool_]]:
-    """Return the image of a view, smooth, what is seen in it, and which contacts are hidden.
+    """Return the smooth image of a view, the solids of its pixels, and which contacts are hidden.
 
     An object that hides contacts is translucent where the hand is behind it.
 

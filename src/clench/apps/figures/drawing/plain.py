@@ -16,9 +16,9 @@ from .camera import Camera, Picture
 def paint(
     solids: Sequence[Solid], meshes: Sequence[TriangleMesh], poses: FloatArray, shown: Sequence[int], camera: Camera
 ) -> Picture:
-    """Return what a camera sees of some solids.
+    """Return the picture of some solids by a camera.
 
-    Triangles that pass through each other, or are large beside their neighbours, may cover what is nearer. Obstacles
+    Triangles that pass through each other, or are large beside their neighbours, may cover nearer ones. Obstacles
     are painted first, because a table is larger than everything on it.
 
     Args:

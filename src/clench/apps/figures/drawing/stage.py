@@ -40,7 +40,7 @@ _KEY: Final = (1.0, -0.55, 0.95)
 #: Size at first; pictures of another size take little more [px].
 _SIZE: Final = (640, 640)
 _SHININESS: Final = 0.35
-#: How much farther than what is shown the camera sees [m].
+#: The camera sees farther than the shown solids by this [m].
 _ROOM: Final = 0.02
 #: Points that stand for a solid lie on a grid of this width [m].
 _GRID: Final = 3e-3
@@ -73,7 +73,7 @@ class Stage:
     Without OpenGL, pictures are plain, and a warning says so once.
 
     Args:
-        solids: what is on the stage. poses: of the solids in the world, shape (N, 4, 4).
+        solids: the solids on the stage. poses: of the solids in the world, shape (N, 4, 4).
     """
 
     def __init__(self, solids: Sequence[Solid], poses: FloatArray) -> None:
@@ -128,7 +128,7 @@ class Stage:
         return np.concatenate([np.empty((0, 3)), *placed])
 
     def sight(self, camera: Camera, without: Collection[SolidKind] = ()) -> Sight:
-        """Return what is nearest to a camera, without the solids of some kinds; much quicker than a picture."""
+        """Return the nearest solids of a camera's pixels, without some kinds; much quicker than a picture."""
         if self._renderer is None:
             return self._painted(camera, without, _FEW_TRIANGLES)
         near, far = self._aim(camera, without)
@@ -137,7 +137,7 @@ class Stage:
         return Sight(np.where(solid >= 0, far + nearness.astype(np.float64) * (near - far), -np.inf), solid)
 
     def picture(self, camera: Camera, without: Collection[SolidKind] = ()) -> Picture:
-        """Return what a camera sees, without the solids of some kinds."""
+        """Return the picture of a camera, without the solids of some kinds."""
         if self._renderer is None:
             return self._painted(camera, without, _PLAIN_TRIANGLES)
         sight = self.sight(camera, without)
@@ -153,7 +153,7 @@ class Stage:
         return paint(self.solids, self._thinned[most], self.poses, shown, camera)
 
     def close(self) -> None:
-        """Free what the graphics library holds."""
+        """Free the memory of the graphics library."""
         if self._renderer is not None:
             self._renderer.close()
 

@@ -14,7 +14,7 @@ from .stage import Stage
 
 #: Size of the pictures in which contacts are looked for [px].
 _SMALL: Final = (140, 140)
-#: A contact behind the object, which is drawn translucent, counts so much; behind the hand or an obstacle nothing.
+#: Weight of a contact behind the object, which is drawn translucent; behind the hand or an obstacle nothing.
 _BEHIND_OBJECT: Final = 0.5
 #: What counts besides the contacts in sight: their spread, how much of the object is seen, and contacts that no
 #: earlier view shows.

@@ -40,7 +40,7 @@ def palm_views(normal: FloatArray, stretch: FloatArray) -> tuple[list[FloatArray
 
 
 def hand_sides(hand: Hand) -> tuple[list[FloatArray], FloatArray]:
-    """Return from where an open hand is seen, a little aslant of its palm and of its side, and what is up."""
+    """Return viewpoint and upward direction for an open hand: a little aslant of its palm and of its side."""
     q = hand.open_angles()
     fingers = [finger for finger in hand.fingers if not finger.is_thumb] or list(hand.fingers)
     lines = [finger_line(hand, finger, q) for finger in fingers]

@@ -122,7 +122,7 @@ def _sides() -> FloatArray:
 
 
 def _heat(picture: Picture, camera: Camera, touches: Sequence[_Touches]) -> FloatArray:
-    """Return the share of grasps that touch near what is seen at every pixel, shape (H, W)."""
+    """Return the share of grasps that touch near the visible point of each pixel, shape (H, W)."""
     row, column = np.nonzero(picture.solid[::2, ::2] >= 0)
     row, column = 2 * row, 2 * column
     nearness = picture.nearness[row, column]
@@ -146,7 +146,7 @@ def _heat(picture: Picture, camera: Camera, touches: Sequence[_Touches]) -> Floa
 
 
 def _normals(picture: Picture, camera: Camera) -> FloatArray:
-    """Return the normal of what is seen at every pixel, towards the viewer, shape (H, W, 3).
+    """Return the normal of the visible surface at each pixel, towards the viewer, shape (H, W, 3).
 
     Of the two neighbours of a pixel in a direction the one at which the depth changes less counts: at the border of a
     surface the other one is behind it.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Planes beside each other at most; a set that touches on more shows the busiest.
+#: Planes beside each other at most; a candidate that touches on more shows the busiest.
 MOST_PANELS: Final = 3
 _MM: Final = 1e3
 _TEXT_WIDTH: Final = 430
@@ -29,7 +29,7 @@ _MARGIN: Final = 62
 
 
 def draw_finger(scenes: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
-    """Write the curl-plane figure of a finger's chosen set."""
+    """Write the curl-plane figure of a finger's chosen candidate."""
     shown = [scenes.scene(axis_group, plane) for axis_group, plane in scenes.touched_planes(MOST_PANELS)]
     text = 370.0 + 37.0 * len(scenes.plan.joints) + 54.0 * len(scenes.contacts)
     figure, panels = _panels(shown, text)
@@ -264,15 +264,15 @@ def _numbers(axes: Axes, contacts: Sequence[PlaneContact], distance: float) -> N
         style.number_label(axes, (float(place[0]), float(place[1])), numbers)
 
 
-def set_name(candidate: Candidate) -> str:
-    """Return the name of a set in titles."""
+def candidate_name(candidate: Candidate) -> str:
+    """Return the name of a candidate in titles."""
     return "full width" if candidate.plane is None else f"plane {candidate.plane}"
 
 
 def _explain(
     figure: Figure, scenes: FingerScenes, shown: Sequence[PlaneScene], result: FingerResult, left: float
 ) -> None:
-    """Write the column on the right: joints, contacts, the chosen set, and the legend."""
+    """Write the column on the right: joints, contacts, the chosen candidate, and the legend."""
     height = figure.get_figheight() * style.DPI
     top = height - 62.0
 
@@ -304,7 +304,7 @@ def _explain(
         for text in textwrap.wrap(f"none: {result.reason}", 58)[:4]:
             line(text, 16.0, fontsize=9.5)
     top -= 6.0
-    line(f"Chosen candidate: {set_name(scenes.candidate)}", fontsize=11, fontweight="bold", color=style.CHOSEN)
+    line(f"Chosen candidate: {candidate_name(scenes.candidate)}", fontsize=11, fontweight="bold", color=style.CHOSEN)
     for text in _meaning(scenes.candidate):
         line(text, 16.0, fontsize=9.5)
     _legend(figure, left)

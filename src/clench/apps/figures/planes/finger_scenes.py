@@ -35,10 +35,10 @@ _ASIDE: Final = 1e-6
 
 
 class FingerScenes:
-    """Make the plane scenes of one set of a finger.
+    """Make the plane scenes of one candidate of a finger.
 
     Args:
-        hand, obj, command, solution: as drawn. name: of the finger. candidate: one of its sets.
+        hand, obj, command, solution: as drawn. name: of the finger. candidate: one of its candidates.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class FingerScenes:
         self._close(candidate)
 
     def showing(self, candidate: Candidate) -> FingerScenes:
-        """Return the scenes of another set at the same posture, without planning the finger again."""
+        """Return the scenes of another candidate at the same posture, without planning the finger again."""
         other = copy(self)
         other._close(candidate)
         return other
@@ -161,7 +161,7 @@ class FingerScenes:
         return f"beside the plane{'s' if len(planes) > 1 else ''}, {where}"
 
     def touched_planes(self, most: int) -> list[tuple[int, int]]:
-        """Return (axis group, plane) pairs worth a picture, at most `most`: where the set touches, and every axis
+        """Return (axis group, plane) pairs worth a picture, at most `most`: where the candidate touches, and every axis
         group.
 
         Planes with contacts that last until the end come first, then planes with the most contacts.
@@ -221,7 +221,7 @@ class FingerScenes:
         T_axis_group_palm = invert(self.frames[axis_group])
         poses = self.poses_closed
         loops = [loop for i in sorted(still | before) for loop in self._cut(i, T_axis_group_palm @ poses[i], offset)]
-        if axis_group == 0:  # the first axis group's planes stand still, so every set sees the same
+        if axis_group == 0:  # the first axis group's planes stand still, so every candidate sees the same
             self._palms[offset] = tuple(loops)
         return tuple(loops)
 

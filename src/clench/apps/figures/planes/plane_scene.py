@@ -77,7 +77,7 @@ class PlaneScene:
         section: of the object. palm: loops of the links that do not move.
         open_links, closed_links: sections of the links that the axis group's joints move.
         joints: of this axis group, palm side first.
-        contacts: contacts of the set on this plane. others: contacts on other planes of the axis group.
+        contacts: contacts of the candidate on this plane. others: contacts on other planes of the axis group.
     """
 
     axis_group: int

@@ -38,7 +38,7 @@ class GraspFiles:
     Args:
         load_hand, load_object: load a model by its name; the object's scale and geometry are given, too.
         hand, object: models that were given, instead of those that files name.
-        hands, objects: what was loaded, by the name on the shelf. hand_models, object_models: their names in files.
+        hands, objects: the loaded models, by the name on the shelf. hand_models, object_models: their names in files.
     """
 
     load_hand: Callable[[str], Hand]

@@ -1,4 +1,4 @@
-"""Grasps to look through: what is known of each, and filters that choose among them."""
+"""Grasps to look through: the facts of each, and filters."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ListedGrasp:
 
     @property
     def text(self) -> str:
-        """Say what is known of it, on one line."""
+        """Return the facts of the grasp, on one line."""
         known = [self.status.replace("_", " "), self.kind, "" if self.held is None else self.tested]
         known.append("" if self.score is None else f"score {self.score:z.3f}")
         known.append(f"rejected: {self.rejected}" if self.rejected else "")
@@ -57,7 +57,7 @@ class ListedGrasp:
 
 @dataclass(frozen=True)
 class GraspFilter:
-    """What a grasp must be to be shown.
+    """The filters that a shown grasp passes.
 
     Args:
         status, kind, held: a word, or `ANY`. shown: one of `SHOWN`. reason: why it was rejected, or `ANY`.

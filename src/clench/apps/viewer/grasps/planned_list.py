@@ -1,4 +1,4 @@
-"""A search for grasps as a list: what was found, and every proposal that came to nothing, where it did."""
+"""A search for grasps as a list: the grasps, and every rejected proposal at its place."""
 
 from __future__ import annotations
 

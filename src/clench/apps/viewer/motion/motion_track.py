@@ -49,7 +49,7 @@ class MotionTrack:
     Args:
         times: [s], rising from 0, shape (N,). postures: [rad], shape (N, J).
         hands, objects: rows [w, x, y, z, X, Y, Z] of palm and object, shape (N, 7).
-        phases: when each begins [s], and its name. note: what there is to know about it.
+        phases: when each begins [s], and its name. note: a sentence about the motion.
         measured: points and forces of every state; empty where none were measured.
     """
 
@@ -173,7 +173,7 @@ class Recorder(Film):
             self._phases.append((float(data.time) - self._start, following[name]))
 
     def track(self, note: str) -> MotionTrack | None:
-        """Return what was recorded, None where nothing moved."""
+        """Return the recorded motion, or None if nothing moved."""
         rows = sorted(self._rows, key=lambda row: row[0])
         if len(rows) < 2:
             return None

@@ -80,7 +80,7 @@ class BrowsePanel:
         self._filter()
 
     def _follow(self, client: Any) -> None:
-        """Keep the strip at the lower edge of what a new tab sees, whenever its camera comes to rest."""
+        """Keep the strip at the lower edge of a new tab's view, whenever its camera comes to rest."""
 
         def moved(_: Any) -> None:
             self._resting.cancel()

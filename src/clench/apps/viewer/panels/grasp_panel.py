@@ -1,4 +1,4 @@
-"""The panel of what is grasped how: hand, object, preshape, order, geometry, friction and mass."""
+"""The panel of the problem: hand, object, preshape, order, geometry, friction and mass."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _SAME_ANGLE: Final = 1e-6
 
 
 class GraspPanel:
-    """Show and change what a state says besides poses and angles.
+    """Show and change the parts of a state besides poses and angles.
 
     Args:
-        server: of viser. session: what is changed.
+        server: viser's server. session: the session that the panel changes.
     """
 
     def __init__(self, server: viser.ViserServer, session: LiveSession) -> None:
@@ -76,7 +76,7 @@ class GraspPanel:
             self._session.change(lambda s: s.with_preshape(angles.get(name, s.command.angles)))
 
     def show(self, state: ViewState) -> None:
-        """Show what a state says."""
+        """Show a state in the panel."""
         hand = self._session.shelf.hand(state.hand)
         zones = {shape.name: shape.angles for shape in opposition_zones(hand)}
         options = (_AS_SET, _CLENCH, *zones)

@@ -36,7 +36,7 @@ class PosturePanel:
     """Show and change the angles from which the hand closes.
 
     Args:
-        server: of viser. session: what is changed.
+        server: viser's server. session: the session that the panel changes.
     """
 
     def __init__(self, server: viser.ViserServer, session: LiveSession) -> None:

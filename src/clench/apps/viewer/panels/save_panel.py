@@ -32,7 +32,7 @@ class SavePanel:
     """Hand out the solution, the command, Python code, a picture and a video.
 
     Args:
-        server: of viser. session: what is saved. play: has the motion of videos. show: draws one frame.
+        server: viser's server. session: the session to save. play: has the motion of videos. show: draws one frame.
         back: draws the answer again. paper: returns the colour behind pictures.
     """
 
@@ -120,7 +120,7 @@ class SavePanel:
         return "grasp.gif", content.getvalue()
 
     def _taken(self, client: Any, size: tuple[int, int]) -> Any:
-        """Return what a tab sees, on the colour of its page."""
+        """Return the picture of a tab's view, on the colour of its page."""
         from PIL import Image
 
         pixels = client.get_render(*size, transport_format="png", timeout=_PATIENCE)

@@ -40,8 +40,8 @@ def answer_card(quick: QuickAnswer, settled: SettledAnswer | None, note: str = "
     """Return the card of an answer.
 
     Args:
-        quick: what is known while dragging. settled: the exact numbers of the same answer, None while they are not
-            known. note: what there is to know besides.
+        quick: the answer while dragging. settled: the exact numbers of the same answer, None while they are not
+            known. note: a sentence to add.
     """
     color, sign, word = _STATUS[quick.status]
     proof = "certified" if quick.certified else "not certified"

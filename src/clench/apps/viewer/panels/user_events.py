@@ -1,4 +1,4 @@
-"""What the user sets in the page, told apart from what the program sets there itself."""
+"""Separate changes by the user in the page from changes by the program."""
 
 from __future__ import annotations
 

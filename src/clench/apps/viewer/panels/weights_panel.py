@@ -1,4 +1,4 @@
-"""The panel of the weights of the criteria, and what they do to the choice of the preshape."""
+"""The panel of the weights of the criteria, and their effect on the choice of the preshape."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class WeightsPanel:
     """Show and change what counts in the choice.
 
     Args:
-        server: of viser. session: what is changed.
+        server: viser's server. session: the session that the panel changes.
     """
 
     def __init__(self, server: viser.ViserServer, session: LiveSession) -> None:

@@ -1,1 +1,1 @@
-"""What the page draws in three dimensions."""
+"""The three-dimensional scene of the page: hand, object, contacts, small grasps, camera."""

@@ -15,7 +15,7 @@ from clench.models.objects.mass import mass_properties
 
 #: Vertical field of view of the camera [rad].
 FIELD_OF_VIEW: Final = 0.6
-#: Room around what is seen, for its size, alone and with a strip of small grasps [-].
+#: Size of the view over the size of hand and object: alone, and with a strip of small grasps [-].
 ROOM: Final = 1.2
 ROOM_FOR_STRIP: Final = 1.7
 #: How much the camera is lifted, and moved to the front of the palm, from the side [-].
@@ -30,7 +30,7 @@ def good_view(answer: QuickAnswer, object_pose: Pose, room: float = ROOM) -> tup
     """Return the point that a camera looks at, and where the camera is [m], shape (3,) each.
 
     Args:
-        answer: what is seen. object_pose: of the object. room: around it, for its size [-].
+        answer: gives hand and object. object_pose: of the object. room: size of the view over their size [-].
     """
     palm = answer.state.command.hand_pose
     mass = mass_properties(answer.obj)
@@ -64,7 +64,7 @@ class StripPlace:
 
 
 def strip_place(camera: Any, hand: Hand, obj: GraspObject, count: int) -> StripPlace:
-    """Return the place of a row for what a camera of viser sees now; without one, a row below the object.
+    """Return the place of a row in the present view of a viser camera; without a camera, below the object.
 
     Args:
         camera: of a tab; None: there is no tab. hand, obj: of the grasps. count: places of the row.

@@ -95,12 +95,12 @@ class FilmStrip:
         """Take the strip away."""
         for node in self._nodes:
             node.remove()
-        # Another name than before: what is removed and added at once under one name may stay as it was.
+        # A new name: a node that is removed and added at once under one name may keep its old look.
         self._nodes, self._version = [], self._version + 1
 
 
 class GraspMarks:
-    """Mark where palms are around the object: bright balls for high scores, grey cubes for what was rejected.
+    """Mark the palms of grasps around the object: bright balls for high scores, grey cubes for rejected proposals.
 
     Args:
         server: of viser. pick: is called with the number of the grasp that is clicked.
@@ -115,7 +115,7 @@ class GraspMarks:
         """Draw marks.
 
         Args:
-            numbers: what a click on each gives. places: in the object's frame [m], shape (N, 3).
+            numbers: the number that a click on each mark returns. places: in the object's frame [m], shape (N, 3).
             scores: NaN where there is none, fallen: whether it was rejected, shape (N,) each.
         """
         self.hide()
@@ -143,7 +143,7 @@ class GraspMarks:
         """Take the marks away."""
         for node in self._nodes:
             node.remove()
-        # Another name than before: what is removed and added at once under one name may stay as it was.
+        # A new name: a node that is removed and added at once under one name may keep its old look.
         self._nodes, self._version = [], self._version + 1
 
 

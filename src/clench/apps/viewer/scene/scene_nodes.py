@@ -65,7 +65,7 @@ class SceneNodes:
         self._shown: tuple[int, int, CollisionSource] | None = None
 
     def show_gizmos(self, *, hand: bool, object: bool) -> None:
-        """Show or hide the handles, not what they move."""
+        """Show or hide the handles; hand and object stay visible."""
         for gizmo, shown in ((self.hand_gizmo, hand), (self.object_gizmo, object)):
             gizmo.disable_axes = gizmo.disable_sliders = gizmo.disable_rotations = not shown
             gizmo.active_axes = (shown, shown, shown)
@@ -138,7 +138,7 @@ class SceneNodes:
         self._around.position, self._around.wxyz = object_pose.position, object_pose.wxyz
 
     def bend(self, hand: Hand, q: FloatArray) -> None:
-        """Put the links where a posture has them; only what has moved is sent.
+        """Place the links at a posture; the page sends only links that moved.
 
         Args:
             hand: that is shown. q: angles of all its joints [rad], shape (J,).

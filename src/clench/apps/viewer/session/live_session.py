@@ -28,7 +28,7 @@ _BEST_FIRST: Final = tuple(map(str, (Status.GRASP, Status.PARTIAL, Status.NO_CON
 
 
 class Listener(Protocol):
-    """Whoever shows what a session finds. Calls come from the session's thread."""
+    """A listener that shows the answers of a session. The session's thread calls it."""
 
     def adopted(self, state: ViewState) -> None:
         """Take notice of a state that the session, not the user, brought about."""
@@ -43,7 +43,7 @@ class Listener(Protocol):
         """Say what went wrong."""
 
     def noted(self, sentence: str) -> None:
-        """Say what there is to know about the answer."""
+        """Show a note about the answer."""
 
     def busy(self, sentence: str) -> None:
         """Say what takes a while; empty when it is over."""
@@ -51,7 +51,7 @@ class Listener(Protocol):
 
 @dataclass(frozen=True)
 class _Request:
-    """Args: state: what is wanted. ask: what to do with it. moving: the user may go on. keep: it is a step to undo."""
+    """Args: state: the new state. ask: the action. moving: the user may continue. keep: undo returns to this state."""
 
     state: ViewState
     ask: Ask
@@ -116,7 +116,7 @@ class LiveSession:
         self.change(lambda s: s, Ask.PLAN)
 
     def adopt(self) -> None:
-        """Tell the listeners the state, where it came from elsewhere than what they show."""
+        """Tell the listeners a state that does not come from them."""
         self._tell("adopted", self._state)
 
     def undo(self) -> bool:

@@ -1,4 +1,4 @@
-"""One thread that always works on the newest of what it was asked: nothing queues up."""
+"""A thread that always works on the newest request: nothing queues up."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Item = TypeVar("Item")
 
 
 class NewestWins(Generic[Item]):
-    """Work in a thread on what was asked last; what was asked in between is dropped.
+    """Work in a thread on the newest request, and drop older ones.
 
     Args:
-        work: is called with one item after another, never twice at a time. What it raises is printed.
+        work: called with one request after another, never twice at a time. Its exceptions are printed.
         name: of the thread.
     """
 
@@ -27,7 +27,7 @@ class NewestWins(Generic[Item]):
         self._thread.start()
 
     def ask(self, item: Item) -> None:
-        """Ask for something in place of what has not been begun."""
+        """Ask for something; it replaces a request that the thread has not begun."""
         with self._changed:
             self._waiting[:] = [item]
             self._changed.notify_all()

@@ -26,16 +26,16 @@ from .view_state import ViewState
 
 @dataclass(frozen=True, eq=False)
 class QuickAnswer:
-    """What a closing gives, without words.
+    """The numbers of a closing, without sentences.
 
     Args:
-        state: what was asked. hand, obj: the models.
+        state: the question. hand, obj: the models.
         status: by name. certified: see `GraspSolution`. fingers: status of every finger asked for, by name.
         joint_angles: of all joints [rad], shape (J,).
         links, fingers_at: link and finger of every contact that counts. positions: [m], normals: out of the object;
             in the world, shape (C, 3). friction: [-], shape (C,).
         bound: lower bound of the hold margin (epsilon, L1) [N per N]; 0 without force closure.
-        seconds: what the closing took.
+        seconds: time of the closing [s].
         solution: the whole answer, where it was computed at once.
     """
 
@@ -57,7 +57,7 @@ class QuickAnswer:
 
 
 class QuickSolver:
-    """Answer states one after another; what is the same from one to the next is packed once.
+    """Answer states one after another; pack anew only the inputs that changed.
 
     Args:
         shelf: what names of hands and objects mean.
@@ -111,7 +111,7 @@ class QuickSolver:
         key = (state.hand, state.object, command)
         if key != self._key:
             self._key, self._tracker = (), None
-            # An empty preshape would leave the choice to clench, at every change anew; the viewer keeps what it has.
+            # With an empty preshape, clench would choose again at every change. The viewer keeps its preshape.
             kept = command if command.preshape else replace(command, preshape="open")
             try:
                 self._tracker = Tracker(hand, obj, replace(kept, hand_pose=state.command.hand_pose))

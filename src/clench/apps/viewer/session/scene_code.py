@@ -1,4 +1,4 @@
-"""What is on the page as ten lines of Python."""
+"""Write the scene of the page as ten lines of Python."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def scene_code(state: ViewState, hand_code: str, object_code: Sequence[str]) -> 
     """Return a program that solves a state and plans its forces.
 
     Args:
-        state: what is shown. hand_code: what loads the hand. object_code: lines that make `obj`.
+        state: the state of the page. hand_code: loads the hand. object_code: lines that make `obj`.
     """
     friction = "" if state.friction is None else f", friction={state.friction!r}"
     lines = [

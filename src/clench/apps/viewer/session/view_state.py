@@ -1,4 +1,4 @@
-"""What the user asks for in the viewer: one immutable value, and the values before and after it."""
+"""The state of the viewer: one immutable value, and the values before and after it for undo and redo."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MOST_KEPT: Final = 200
 
 
 class Ask(StrEnum):
-    """Name what is to be done with a state."""
+    """Name the action on a state."""
 
     SOLVE = "solve"
     """close the hand; the posture stays as it is"""

@@ -9,7 +9,7 @@ from .model_files import ModelText
 
 
 def with_whole_meshes(text: ModelText) -> ModelText:
-    """Return a model whose OBJ files are of one object each, with the faces of all that they had."""
+    """Return a model whose OBJ files have one object each, with the faces of all their objects."""
     parts = {key: data for key, data in text.assets.items() if key.lower().endswith(".obj")}
     found = {key: list(_beginnings(data)) for key, data in parts.items()}
     joined = {key: _commented(parts[key], places) for key, places in found.items() if len(places) > 1}

@@ -33,7 +33,7 @@ _SAME_SIDE = 0.4
 
 @dataclass(frozen=True)
 class Vote:
-    """State which way the limits of one joint say that its finger closes.
+    """The closing direction of a finger according to the limits of one joint.
 
     Args:
         direction: +1 when the angle grows. share: how uneven the limits are, 1 when one is straight [-]. reason: why.

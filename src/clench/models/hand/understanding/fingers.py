@@ -82,7 +82,7 @@ def _bare_chain(hand: Hand, chain: tuple[int, ...]) -> Finding:
 
 
 def find_thumb(fingers: tuple[Finger, ...], stretch: FloatArray, closing: FloatArray) -> int | None:
-    """Return the finger that opposes the others, or None when all are alike or one cannot tell.
+    """Return the finger that opposes the others, or None if no finger stands out.
 
     Args:
         fingers: a name that says thumb decides.

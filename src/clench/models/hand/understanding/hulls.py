@@ -66,7 +66,7 @@ def hull_distances(hand: Hand) -> dict[str, float]:
 
 
 def largest_distance(hull: TriangleMesh, mesh: TriangleMesh) -> float:
-    """Return the largest distance from the surface of a hull to the mesh that it is the hull of [m].
+    """Return the largest distance from the surface of a convex hull to its mesh [m].
 
     The distance from a point to a mesh changes by no more than the point moves. Thus one sample bounds it over a whole
     triangle. Triangles are halved until no bound is far above a distance that was seen, or until `_LOOKS` were taken.

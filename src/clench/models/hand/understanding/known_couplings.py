@@ -1,4 +1,4 @@
-"""Know couplings that makers publish and often leave out of their files; say so, and never couple anything unasked."""
+"""Report couplings that makers publish and often leave out of their files; clench never adds them by itself."""
 
 from __future__ import annotations
 

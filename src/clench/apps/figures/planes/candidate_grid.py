@@ -11,7 +11,7 @@ import numpy as np
 from clench.apps.figures.drawing import style
 from clench.solver.solution import Candidate, FingerResult, FingerStatus
 
-from .curl_plane import draw_plane, frame_plane, overlap, set_name
+from .curl_plane import candidate_name, draw_plane, frame_plane, overlap
 from .finger_scenes import FingerScenes
 from .plane_scene import PlaneScene, along_y, bounds
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 #: Sets shown at most; of more, an even selection.
-MOST_SETS: Final = 8
+MOST_CANDIDATES: Final = 8
 _COLUMNS: Final = 4
 _PANEL: Final = 370
 #: Width of the figure at least, for the text above the panels, in pixels.
@@ -34,11 +34,11 @@ _TITLE: Final = 24
 _BOTTOM: Final = 42
 
 
-def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
-    """Write a figure with one panel per set at the chosen posture, the chosen one framed.
+def draw_candidates(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str, path: Path) -> Path:
+    """Write a figure with one panel per candidate at the chosen posture, the chosen one framed.
 
     Args:
-        scenes_of: of the chosen set. result: of the finger. hand, obj: names. path: of the PNG file.
+        scenes_of: of the chosen candidate. result: of the finger. hand, obj: names. path: of the PNG file.
     """
     chosen = result.candidates[result.chosen]
     alike = [c for c in result.candidates if c.posture == chosen.posture]
@@ -80,12 +80,12 @@ def draw_sets(scenes_of: FingerScenes, result: FingerResult, hand: str, obj: str
 
 
 def _selected(alike: list[Candidate], chosen: Candidate) -> list[Candidate]:
-    """Return at most `MOST_SETS` of the sets, spread evenly, always with the chosen one and the full width."""
+    """Return up to `MOST_CANDIDATES` candidates, spread evenly, always with the chosen one and the full width."""
     planes = [c for c in alike if c.plane is not None and c is not chosen]
-    kept = [c for c in alike if c.plane is None or c is chosen][: MOST_SETS // 2]
+    kept = [c for c in alike if c.plane is None or c is chosen][: MOST_CANDIDATES // 2]
     if chosen not in kept:
         kept[-1] = chosen
-    room = MOST_SETS - len(kept)
+    room = MOST_CANDIDATES - len(kept)
     if len(planes) > room:
         offsets = np.array([c.offset or 0.0 for c in planes])
         taken = [0, len(planes) - 1]  # the edges of the finger, then always the plane farthest from those taken
@@ -106,7 +106,7 @@ def _caption(axes: Axes, candidate: Candidate, scene: PlaneScene, chosen: bool) 
     """Title a panel, write its joint angles, and frame the chosen one."""
     drawn = "drawn: " if candidate.plane is None else ""
     where = f" ({drawn}{along_y(scene.offset)})"
-    title = f"{set_name(candidate)}{where}"
+    title = f"{candidate_name(candidate)}{where}"
     color = style.CHOSEN if chosen else style.INK
     axes.set_title(
         f"CHOSEN: {title}" if chosen else title,
@@ -152,7 +152,7 @@ def _short(names: list[str]) -> list[str]:
 
 
 def _verdict(candidate: Candidate) -> list[str]:
-    """Return up to two lines: the scores of the set, and its known overlap."""
+    """Return up to two lines: the scores of the candidate, and its known overlap."""
     scores = "  ".join(
         f"{name.replace('_', ' ')} {value:.3g}{_UNITS.get(name, '')}" for name, value in candidate.scores.items()
     )
@@ -178,7 +178,7 @@ def _explanation(scenes: FingerScenes, scene: PlaneScene, result: FingerResult, 
         True: "it stops at the first touch anywhere across the finger's width",
         False: "it scores best among the candidates",
     }[chosen.plane is None]
-    second = f"Chosen: {set_name(chosen)}: {why}."
+    second = f"Chosen: {candidate_name(chosen)}: {why}."
     return [f"{first}.{axis_group}", second if chosen.contacts else f"{second[:-1]}; {result.reason}."]
 
 
