@@ -80,8 +80,13 @@ def write_page(
     Raises:
         CommandError: no grasp to show. FileError: the file cannot be written.
     """
+    from clench.models.hand.hand import Hand
+    from clench.models.objects.grasp_object import GraspObject
+
     file = Path(path)
     check_writable(file)
+    check_type(hand, Hand, "hand")
+    check_type(obj, GraspObject, "obj")
     write_atomically(file, page_html(hand, obj, shown, trajectory).encode())
     return file
 
@@ -93,12 +98,8 @@ def page_html(
     trajectory: Trajectory | None = None,
 ) -> str:
     """Return the page that `write_page` writes."""
-    from clench.models.hand.hand import Hand
-    from clench.models.objects.grasp_object import GraspObject
     from clench.planner.grasp_plan import GraspPlan
 
-    check_type(hand, Hand, "hand")
-    check_type(obj, GraspObject, "obj")
     entries = _entries(shown)
     first = entries[0] if isinstance(entries[0], GraspSolution) else entries[0].solution
     solids = [
