@@ -93,7 +93,7 @@ def test_a_dataset_is_listed_and_its_commands_solve_to_its_rows(tmp_path: Path) 
     assert [not grasp.rejected for grasp in listed] == ok
     for grasp in listed:
         assert grasp.kind
-        assert grasp.score is not None
+        assert (grasp.score is None) == bool(grasp.rejected)
         solution = clench.solve(read.hands[grasp.hand], read.objects[grasp.object], grasp.command())
         assert grasp.posture is not None
         np.testing.assert_allclose(list(solution.joint_angles.values()), grasp.posture(), atol=1e-12)
