@@ -31,6 +31,7 @@ KERNELS = {
     "kernels/toi/toi_bounds": ["kernels/toi/test_toi_bounds.py", "kernels/toi/test_toi_links.py"],
     "kernels/toi/spatial_motion": ["kernels/toi/test_spatial_motion.py", "kernels/toi/test_toi_links.py"],
     "kernels/toi/toi_work": ["kernels/toi/test_toi_work.py", "closing/test_link_bodies.py", WIDTH],
+    "kernels/toi/passing_planes": ["kernels/toi/test_passing_planes.py", "kernels/toi/test_toi_translation.py"],
     "kernels/toi/toi_translation": ["kernels/toi/test_toi_translation.py"],
     "kernels/toi/toi_bodies": ["kernels/toi/test_toi_bodies.py"],
     "kernels/toi/separating_planes": ["kernels/toi/test_toi_bodies.py"],

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from clench.kernels.toi.passing_planes import COLUMNS, PLANES
 from clench.kernels.toi.toi_translation import PAIRS, first_contact
 from clench.kernels.trees.bvh import build_tree, feature_owners
 from clench.models.mesh import TriangleMesh
@@ -23,6 +24,7 @@ def travel(moving, rest, T, direction, limit=np.inf):
         np.array(direction, dtype=float),
         limit,
         np.empty((PAIRS, 2), dtype=np.int32),
+        np.empty((PLANES, COLUMNS)),
     )
 
 

@@ -144,9 +144,10 @@ def first_touch(
     Returns:
         distance [m], infinite when the hand passes; index into the packed bodies, then -1.
     """
+    from clench.kernels.toi.passing_planes import COLUMNS, PLANES
     from clench.kernels.toi.toi_translation import PAIRS, first_contact
 
-    stack = np.empty((PAIRS, 2), dtype=np.int32)
+    stack, planes = np.empty((PAIRS, 2), dtype=np.int32), np.empty((PLANES, COLUMNS))
     T_object_palm = invert(np.asarray(T_palm_object, dtype=np.float64))
     along = T_object_palm[:3, :3] @ direction
     placed = [(mesh, T_object_palm @ T) for mesh, T in _placed(hand, q, source)]
@@ -155,7 +156,7 @@ def first_touch(
         # Links that are ahead come first: they bound the search of those behind.
         T = np.ascontiguousarray(T_object_link[:3])
         distance, _, triangle = first_contact(
-            mesh.tree, mesh.owners, T, packed.full_tree, packed.full_owners, along, best, stack
+            mesh.tree, mesh.owners, T, packed.full_tree, packed.full_owners, along, best, stack, planes
         )
         if distance < best:
             best, touched = distance, int(packed.full_tree.body[triangle])

@@ -10,6 +10,7 @@ from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, mesh_of
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.plane_pose import compose
+from clench.kernels.toi.passing_planes import COLUMNS, PLANES
 from clench.kernels.toi.toi_translation import PAIRS, first_contact
 from clench.kernels.trees.bvh import Ints as Stack
 
@@ -56,6 +57,7 @@ def bring_up(
     count = meshes.link.shape[0]
     T, keys, order = np.empty((count, 3, 4)), np.empty(count), np.empty(count, dtype=np.int64)
     stack, along = np.empty((PAIRS, 2), dtype=np.int32), np.empty(3)
+    planes = np.empty((PLANES, COLUMNS))
     for n in range(len(shape)):
         put_direction(T_object_palm[n], normal, along)
         foremost = -np.inf
@@ -72,7 +74,7 @@ def bring_up(
             k = order[i]
             for r in range(3):
                 T[k, r, 3] -= back * along[r]
-            distance, touched = _meet(meshes, k, T[k], solid, along, best, stack)
+            distance, touched = _meet(meshes, k, T[k], solid, along, best, stack, planes)
             if touched >= 0:
                 best, body, link = distance, touched, k
             if best < back - short:
@@ -89,11 +91,20 @@ def put_direction(T: Floats, direction: Floats, out: Floats) -> None:
 
 @kernel
 def _meet(
-    meshes: LinkMeshArrays, k: int, T: Floats, solid: ObjectMesh, along: Floats, limit: float, stack: Stack
+    meshes: LinkMeshArrays,
+    k: int,
+    T: Floats,
+    solid: ObjectMesh,
+    along: Floats,
+    limit: float,
+    stack: Stack,
+    planes: Floats,
 ) -> tuple[float, int]:
     """Return how far a link moves until it touches, and which body, or -1."""
     owners = meshes.owners[meshes.triangle_first[k] : meshes.triangle_first[k + 1]]
-    distance, _, triangle = first_contact(mesh_of(meshes, k), owners, T, solid.tree, solid.owners, along, limit, stack)
+    distance, _, triangle = first_contact(
+        mesh_of(meshes, k), owners, T, solid.tree, solid.owners, along, limit, stack, planes
+    )
     if triangle < 0:
         return np.inf, -1
     return distance, solid.tree.body[triangle]

@@ -10,6 +10,8 @@ from clench.kernels.geometry.penetration import moved
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.trees.bvh import STACK_SIZE, Floats, Ints, MeshTree
 
+from .passing_planes import forget_passing, passes_triangle, passes_until, remember_passing
+
 Masks = NDArray[np.uint8]
 Triple = tuple[Point, Point, Point]
 
@@ -31,11 +33,13 @@ def first_contact(
     direction: Floats,
     limit: float,
     stack: Ints,
+    planes: Floats,
 ) -> tuple[float, int, int]:
     """Return how far a mesh moves along a direction until it first touches another.
 
     Events: moving vertex on face, moving face on vertex, edge on edge; all are linear in the distance. Pairs of nodes
-    are visited nearest first, and left when they cannot meet before the best contact so far.
+    are visited nearest first, and left when they cannot meet before the best contact so far. Their boxes tell it, or a
+    plane across the motion, or one along a triangle of a contact.
 
     Args:
         moving: the moving mesh.
@@ -45,7 +49,7 @@ def first_contact(
         rest_owners: `feature_owners` of it.
         direction: unit vector in the frame of the mesh at rest, shape (3,).
         limit: contacts farther than this are of no interest [m].
-        stack: scratch, shape (PAIRS, 2).
+        stack: scratch, shape (PAIRS, 2). planes: scratch, shape (PLANES, COLUMNS) of `passing_planes`.
 
     Returns:
         distance [m], infinite when there is no contact before `limit`; the triangles of both in tree order, or -1.
@@ -58,26 +62,33 @@ def first_contact(
     # A meeting that lies behind only by rounding is a contact at the start.
     slack = _FOOT * (_reach(moving.low, moving.high) + _reach(rest.low, rest.high))
     slack += _FOOT * (abs(T_rest_moving[0, 3]) + abs(T_rest_moving[1, 3]) + abs(T_rest_moving[2, 3]))
+    forget_passing(planes)
+    remember_passing((direction[0], direction[1], direction[2]), moving, T_rest_moving, direction, planes)
     stack[0, 0], stack[0, 1] = 0, 0
     waiting = 1
     while waiting:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
+        if passes_until(moving, a, rest, b, slack, best, planes):
+            continue
         if _entry(moving.low, moving.high, a, T_rest_moving, rest.low, rest.high, b, direction) >= best:
             continue
         if moving.count[a] and rest.count[b]:
+            before = best
             best, moving_triangle, rest_triangle = _meet_leaves(
                 moving,
                 moving_owners,
-                a,
                 T_rest_moving,
                 rest,
                 rest_owners,
-                b,
+                (a, b),
                 along,
                 slack,
                 (best, moving_triangle, rest_triangle),
+                planes,
             )
+            if best < before:
+                _remember_triangles(moving, moving_triangle, T_rest_moving, rest, rest_triangle, direction, planes)
             continue
         descend = rest.count[b] > 0 or (moving.count[a] == 0 and _size(moving, a) > _size(rest, b))
         c, d = (a + 1, b) if descend else (a, b + 1)
@@ -95,6 +106,21 @@ def first_contact(
     if moving_triangle < 0:
         return np.inf, -1, -1
     return best, moving_triangle, rest_triangle
+
+
+@kernel
+def _remember_triangles(
+    moving: MeshTree, i: int, T: Floats, rest: MeshTree, j: int, direction: Floats, planes: Floats
+) -> None:
+    """Remember the planes of two triangles that meet."""
+    m, n = moving.normals[i], rest.normals[j]
+    turned = (
+        T[0, 0] * m[0] + T[0, 1] * m[1] + T[0, 2] * m[2],
+        T[1, 0] * m[0] + T[1, 1] * m[1] + T[1, 2] * m[2],
+        T[2, 0] * m[0] + T[2, 1] * m[1] + T[2, 2] * m[2],
+    )
+    remember_passing(turned, moving, T, direction, planes)
+    remember_passing((n[0], n[1], n[2]), moving, T, direction, planes)
 
 
 @kernel
@@ -154,23 +180,26 @@ def _reach(low: Floats, high: Floats) -> float:
 def _meet_leaves(
     moving: MeshTree,
     moving_owners: Masks,
-    a: int,
     T: Floats,
     rest: MeshTree,
     rest_owners: Masks,
-    b: int,
+    leaves: tuple[int, int],
     along: Triple,
     slack: float,
     found: tuple[float, int, int],
+    planes: Floats,
 ) -> tuple[float, int, int]:
     """Return the best contact so far after all pairs of triangles of two leaves; `found`: before."""
+    a, b = leaves
     best, moving_triangle, rest_triangle = found
-    for i in range(moving.first[a], moving.first[a] + moving.count[a]):
-        u, v, w = corners(moving.vertices, moving.triangles, i)
-        one = (_turn(along, moved(T, u)), _turn(along, moved(T, v)), _turn(along, moved(T, w)))
-        for j in range(rest.first[b], rest.first[b] + rest.count[b]):
-            u, v, w = corners(rest.vertices, rest.triangles, j)
-            two = (_turn(along, u), _turn(along, v), _turn(along, w))
+    for j in range(rest.first[b], rest.first[b] + rest.count[b]):
+        u, v, w = corners(rest.vertices, rest.triangles, j)
+        if passes_triangle(moving, a, (u, v, w), slack, best, planes):
+            continue
+        two = (_turn(along, u), _turn(along, v), _turn(along, w))
+        for i in range(moving.first[a], moving.first[a] + moving.count[a]):
+            u, v, w = corners(moving.vertices, moving.triangles, i)
+            one = (_turn(along, moved(T, u)), _turn(along, moved(T, v)), _turn(along, moved(T, w)))
             if _apart(one, two, best):
                 continue
             distance = _meet(one, moving_owners[i], two, rest_owners[j], slack)
