@@ -140,3 +140,25 @@ def test_a_page_takes_grasps_alone(inputs: dict[str, Any], wrong: Any, tmp_path:
     with pytest.raises(clench.CommandError, match=r"^shown: expected solutions, a plan or a planned grasp, got \w+\.$"):
         clench.write_page(tmp_path / "page.html", inputs["hand"], inputs["obj"], wrong)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong", "said"),
+    [
+        ("order", "toghether", r"order: expected one of proximal-first, together, fingertip, got 'toghether'\."),
+        ("order", None, r"order: expected one of proximal-first, together, fingertip, got None\."),
+        ("orders", "together", r"orders: expected a list of closing orders, got 'together'\."),
+        ("orders", ["together", "x"], r"orders\[1\]: expected one of proximal-first, .*, got 'x'\."),
+        ("collision_source", "hull", r"collision_source: expected one of engine, raw, visual, got 'hull'\."),
+    ],
+)
+def test_a_command_refuses_a_wrong_name_when_it_is_made(key: str, wrong: object, said: str) -> None:
+    with pytest.raises(clench.CommandError, match=f"^{said}$"):
+        clench.GraspCommand(clench.Pose(), **{key: wrong})
+
+
+def test_a_command_takes_names_and_members_alike() -> None:
+    by_name = clench.GraspCommand(clench.Pose(), order="together", orders=["fingertip"], collision_source="raw")
+    assert by_name.order.is_simultaneous
+    assert [order.is_of_tips for order in by_name.orders] == [True]
+    assert by_name.collision_source is clench.types.CollisionSource.RAW

@@ -1,10 +1,13 @@
-"""Check the types of arguments that users mix up."""
+"""Check arguments that users mix up: their types, and names from a list."""
 
 from __future__ import annotations
 
-from typing import Final
+from enum import StrEnum
+from typing import Final, TypeVar
 
 from .exceptions import CommandError
+
+Choice = TypeVar("Choice", bound=StrEnum)
 
 #: Ways to make an object of each public type, by the name of the type.
 _MADE_BY: Final = {
@@ -36,3 +39,24 @@ def check_type(value: object, kind: type, key: str, *, also: str = "") -> None:
     expected = f"a clench.{kind.__name__}" + (f" or {also}" if also else "")
     shown = repr(value) if isinstance(value, str) else type(value).__name__
     raise CommandError(f"{key}: expected {expected}, got {shown}; {maker} makes one.")
+
+
+def checked_choice(value: object, choices: type[Choice], key: str) -> Choice:
+    """Return the member of an enumeration that a value names.
+
+    Args:
+        value: a member, or its text. choices: the enumeration. key: name of the argument.
+
+    Raises:
+        CommandError: no such member; the sentence lists all of them.
+    """
+    if value not in list(choices):
+        listed = ", ".join(str(choice) for choice in choices)
+        raise CommandError(f"{key}: expected one of {listed}, got {shortened(value)}.")
+    return choices(str(value))
+
+
+def shortened(value: object) -> str:
+    """Return a value as an error message shows it, in up to 60 characters."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

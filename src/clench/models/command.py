@@ -9,7 +9,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from clench.core.argument_types import check_type
+from clench.core.argument_types import check_type, checked_choice, shortened
+from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
 from clench.core.showing.short_repr import short_repr
 from clench.models.hand.hand import Hand
@@ -26,6 +27,16 @@ class ClosingOrder(StrEnum):
     """all simultaneously; a contact stops the joints before it in its finger, and the others continue"""
     FINGERTIP = "fingertip"
     """all simultaneously; only a contact of the last link counts"""
+
+    @property
+    def is_simultaneous(self) -> bool:
+        """Whether all joints close at once."""
+        return self is not ClosingOrder.PROXIMAL_FIRST
+
+    @property
+    def is_of_tips(self) -> bool:
+        """Whether only a contact of the last link counts."""
+        return self is ClosingOrder.FINGERTIP
 
 
 @dataclass(frozen=True)
@@ -90,6 +101,13 @@ class GraspCommand:
         check_type(self.hand_pose, Pose, "hand_pose")
         if self.object_pose is not None:
             check_type(self.object_pose, Pose, "object_pose")
+        chosen: dict[str, Any] = {"order": checked_choice(self.order, ClosingOrder, "order")}
+        if not isinstance(self.orders, list | tuple):
+            raise CommandError(f"orders: expected a list of closing orders, got {shortened(self.orders)}.")
+        chosen["orders"] = tuple(checked_choice(o, ClosingOrder, f"orders[{i}]") for i, o in enumerate(self.orders))
+        if self.collision_source is not None:
+            chosen["collision_source"] = checked_choice(self.collision_source, CollisionSource, "collision_source")
+        self.__dict__.update(chosen)  # names become members; the class is frozen
 
     @property
     def angles(self) -> Mapping[str, float]:

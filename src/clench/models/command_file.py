@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
+from clench.core.argument_types import checked_choice, shortened
 from clench.core.exceptions import CommandError, FileError
 from clench.core.files.file_bytes import expanded, read_file
 from clench.core.files.file_limits import COMMAND_CANDIDATES, COMMAND_ITEMS, JSON_BYTES
@@ -25,8 +26,6 @@ from clench.models.hand.hand import Hand, JointRole
 
 from .command import ClosingOrder, GraspCommand
 from .shapes import CollisionSource
-
-Choice = TypeVar("Choice", bound=StrEnum)
 
 #: A joint angle may pass a limit by this much [rad]: files round.
 LIMIT_TOLERANCE: Final = 1e-9
@@ -110,11 +109,8 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
         check_angle(hand, hand.joint_index(name), angle, f"preshape.{name}")
     for finger in _names(command.fingers, "fingers") or ():
         hand.finger(finger)
-    _choice(command.order, ClosingOrder, "order")
-    if command.orders:
-        _orders(command.orders, "orders")
     _count(command.rounds, "rounds", least=0)
-    if command.order != ClosingOrder.PROXIMAL_FIRST and command.rounds != 1:
+    if command.order.is_simultaneous and command.rounds != 1:
         raise CommandError(
             f"rounds: expected 1 with order '{command.order}', where every joint moves until it is held, "
             f"got {command.rounds}."
@@ -130,8 +126,6 @@ def check_command(hand: Hand, command: GraspCommand) -> None:
         check_steps(hand, command.next_steps)
     if command.task_wrenches:
         _wrenches(command.task_wrenches, "task_wrenches")
-    if command.collision_source is not None:
-        _choice(command.collision_source, CollisionSource, "collision_source")
     for key in ("full_width", "check_candidates", "measure"):
         _flag(getattr(command, key), key)
     if command.seed is not None:
@@ -185,7 +179,7 @@ def _check_root_link(hand: Hand, name: str) -> None:
 
 def _command(data: Any, folder: Path | None) -> GraspCommand:
     if not isinstance(data, dict):
-        raise CommandError(f"expected an object with at least 'hand_pose', got {_shown(data)}.")
+        raise CommandError(f"expected an object with at least 'hand_pose', got {shortened(data)}.")
     for key in data:
         if key not in KEYS:
             close = difflib.get_close_matches(key, KEYS, n=1)
@@ -199,7 +193,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "object_pose": _pose,
         "preshape": _preshape,
         "fingers": _names,
-        "order": lambda v, key: _choice(v, ClosingOrder, key),
+        "order": lambda v, key: checked_choice(v, ClosingOrder, key),
         "orders": _orders,
         "rounds": lambda v, key: _count(v, key, least=0),
         "speeds": lambda v, key: _weights(v, key, "a relative speed above 0"),
@@ -210,7 +204,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         "opposition_grid": lambda v, key: _numbers(v, key, "offsets in rad"),
         "check_candidates": _flag,
         "measure": _flag,
-        "collision_source": lambda v, key: _choice(v, CollisionSource, key),
+        "collision_source": lambda v, key: checked_choice(v, CollisionSource, key),
         "criteria": lambda v, key: _criteria(v, key, folder),
         "next_steps": _steps,
         "task_wrenches": _wrenches,
@@ -227,13 +221,13 @@ def _pose(value: Any, key: str) -> Pose:
         for part, what in (("position", "[x, y, z] in metres"), ("wxyz", "[w, x, y, z]")):
             # Text that looks like a number, and true, would pass for numbers further down.
             if part in value and not (isinstance(value[part], list) and all(map(_is_number, value[part]))):
-                raise CommandError(f"{key}.{part}: expected numbers {what}, got {_shown(value[part])}.")
+                raise CommandError(f"{key}.{part}: expected numbers {what}, got {shortened(value[part])}.")
     return Pose.from_dict(value, key)
 
 
 def _text(value: Any, key: str) -> str:
     if not isinstance(value, str) or not value:
-        raise CommandError(f"{key}: expected a name, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected a name, got {shortened(value)}.")
     return value
 
 
@@ -241,7 +235,7 @@ def _names(value: Any, key: str) -> tuple[str, ...] | None:
     if value is None:
         return None
     if isinstance(value, str) or not isinstance(value, (list, tuple)) or not value:
-        raise CommandError(f"{key}: expected a list of at least one name, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected a list of at least one name, got {shortened(value)}.")
     names = tuple(_text(name, f"{key}[{i}]") for i, name in enumerate(value))
     for i, name in enumerate(names):
         if name in names[:i]:
@@ -251,7 +245,7 @@ def _names(value: Any, key: str) -> tuple[str, ...] | None:
 
 def _weights(value: Any, key: str, what: str) -> dict[str, float]:
     if not isinstance(value, Mapping):
-        raise CommandError(f"{key}: expected an object of names with {what} each, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected an object of names with {what} each, got {shortened(value)}.")
     return {str(name): _number(number, f"{key}.{name}", what) for name, number in value.items()}
 
 
@@ -261,29 +255,29 @@ def _preshape(value: Any, key: str) -> dict[str, float] | str:
     if not isinstance(value, Mapping):
         raise CommandError(
             f"{key}: expected an object of names with a number in rad each, 'open', or the name of a preshape, "
-            f"got {_shown(value)}."
+            f"got {shortened(value)}."
         )
     return _weights(value, key, "a number in rad")
 
 
 def _numbers(value: Any, key: str, what: str) -> tuple[float, ...]:
     if not isinstance(value, (list, tuple)) or not value:
-        raise CommandError(f"{key}: expected a list of at least one number, {what}, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected a list of at least one number, {what}, got {shortened(value)}.")
     _few(value, key)
     return tuple(_number(v, f"{key}[{i}]", f"a number, {what}") for i, v in enumerate(value))
 
 
 def _number(value: Any, key: str, what: str) -> float:
     if not _is_number(value):
-        raise CommandError(f"{key}: expected {what}, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected {what}, got {shortened(value)}.")
     if not is_finite_number(value):
-        raise CommandError(f"{key}: expected {what} that is finite, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected {what} that is finite, got {shortened(value)}.")
     return float(value)
 
 
 def _whole(value: Any, key: str) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise CommandError(f"{key}: expected a whole number, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected a whole number, got {shortened(value)}.")
     return int(value)
 
 
@@ -291,7 +285,7 @@ def _count(value: Any, key: str, least: int = 1) -> int:
     count = _whole(value, key)
     if not least <= count <= COMMAND_ITEMS:
         bound = f"at least {least}" if count < least else f"at most {COMMAND_ITEMS}"
-        raise CommandError(f"{key}: expected {bound}, got {_shown(count)}.")
+        raise CommandError(f"{key}: expected {bound}, got {shortened(count)}.")
     return count
 
 
@@ -302,15 +296,8 @@ def _few(value: Sequence[Any], key: str) -> None:
 
 def _flag(value: Any, key: str) -> bool:
     if not isinstance(value, bool):
-        raise CommandError(f"{key}: expected true or false, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected true or false, got {shortened(value)}.")
     return value
-
-
-def _choice(value: Any, choices: type[Choice], key: str) -> Choice:
-    if value not in list(choices):
-        listed = ", ".join(str(choice) for choice in choices)
-        raise CommandError(f"{key}: expected one of {listed}, got {_shown(value)}.")
-    return choices(value)
 
 
 def check_steps(hand: Hand, steps: Sequence[Mapping[str, float]]) -> None:
@@ -330,14 +317,14 @@ def check_steps(hand: Hand, steps: Sequence[Mapping[str, float]]) -> None:
 
 def _steps(value: Any, key: str) -> tuple[dict[str, float], ...]:
     if not isinstance(value, (list, tuple)):
-        raise CommandError(f"{key}: expected a list of postures, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected a list of postures, got {shortened(value)}.")
     _few(value, key)
     return tuple(_weights(step, f"{key}[{i}]", "a number in rad") for i, step in enumerate(value))
 
 
 def _wrenches(value: Any, key: str) -> tuple[dict[str, tuple[float, ...]], ...]:
     if not isinstance(value, (list, tuple)) or not value:
-        raise CommandError(f"{key}: expected a list of at least one wrench to hold, got {_shown(value)}.")
+        raise CommandError(f"{key}: expected a list of at least one wrench to hold, got {shortened(value)}.")
     _few(value, key)
     return tuple(_wrench(wrench, f"{key}[{i}]") for i, wrench in enumerate(value))
 
@@ -346,13 +333,13 @@ def _wrench(value: Any, key: str) -> dict[str, tuple[float, ...]]:
     units = {"force": "N", "torque": "Nm"}
     if not isinstance(value, Mapping) or not value or set(value) - set(units):
         raise CommandError(
-            f"{key}: expected {{'force': [x, y, z], 'torque': [x, y, z]}} or one of them, got {_shown(value)}."
+            f"{key}: expected {{'force': [x, y, z], 'torque': [x, y, z]}} or one of them, got {shortened(value)}."
         )
     found: dict[str, tuple[float, ...]] = {}
     for part, unit in units.items():
         numbers = _numbers(value.get(part, (0.0, 0.0, 0.0)), f"{key}.{part}", f"in {unit}")
         if len(numbers) != 3:
-            raise CommandError(f"{key}.{part}: expected [x, y, z] in {unit}, got {_shown(value[part])}.")
+            raise CommandError(f"{key}.{part}: expected [x, y, z] in {unit}, got {shortened(value[part])}.")
         found[part] = numbers
     if not any(any(numbers) for numbers in found.values()):
         raise CommandError(f"{key}: expected a force or torque that is not 0.")
@@ -361,7 +348,7 @@ def _wrench(value: Any, key: str) -> dict[str, tuple[float, ...]]:
 
 def _orders(value: Any, key: str) -> tuple[ClosingOrder, ...]:
     names = _names(value, key) or ()
-    return tuple(_choice(name, ClosingOrder, f"{key}[{i}]") for i, name in enumerate(names))
+    return tuple(checked_choice(name, ClosingOrder, f"{key}[{i}]") for i, name in enumerate(names))
 
 
 def _criteria(value: Any, key: str, folder: Path | None) -> dict[str, float] | Path | str:
@@ -384,8 +371,3 @@ def _without_repeats(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -14,7 +14,6 @@ from clench.closing.kernel_run import close_candidates, row_of
 from clench.closing.packed_problem import PackedProblem, Terms, pack_problem
 from clench.closing.start_blocking import start_overlaps
 from clench.core.caching.deferring import once
-from clench.models.command import ClosingOrder
 from clench.scoring.calibration import Calibration
 from clench.scoring.choice import HandChoice, choose
 from clench.scoring.criterion_registry import ALWAYS, is_built_in, score_hand
@@ -61,7 +60,7 @@ def candidates_of(problem: Problem, calibration: Calibration) -> Candidates:
     solve raises what they raise. If all candidates need a measurement, one batch closes them, too.
     """
     plan, command = plan_hand(problem), problem.command
-    tip_only = command.order == ClosingOrder.FINGERTIP
+    tip_only = command.order.is_of_tips
     if command.check_candidates or not is_built_in(calibration.criteria):
         return Candidates(pack_problem(plan, problem.packed, (), tip_only), False)
     if plan.full_width is not None:
@@ -87,7 +86,7 @@ def _terms(calibration: Calibration) -> Terms:
 def finger_candidates(problem: Problem) -> Groups:
     """Return all candidates of every finger."""
     plan = plan_hand(problem)
-    packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
+    packed = pack_problem(plan, problem.packed, (), problem.command.order.is_of_tips)
     closed = close_candidates(packed, problem.T_palm_object[:3])
     return group_by_finger(plan, read_judged(problem, plan, closed))
 
@@ -112,7 +111,7 @@ def with_planes(problem: Problem, overlaps: Sequence[LinkDepth | None], whole: S
         problem: the three inputs. overlaps: per finger posture. whole: the full width of every finger.
     """
     plan = plan_hand(problem).planes
-    packed = pack_problem(plan, problem.packed, (), problem.command.order == ClosingOrder.FINGERTIP)
+    packed = pack_problem(plan, problem.packed, (), problem.command.order.is_of_tips)
     closed = close_candidates(packed, problem.T_palm_object[:3])
     candidates = read_candidates(plan, problem.packed, row_of(closed.free, 0), problem.T_palm_object, overlaps)
     _judge(problem, [*candidates, *whole])

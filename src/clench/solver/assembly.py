@@ -17,7 +17,7 @@ from clench.closing.motion import asked_fingers, decompose
 from clench.core.caching.deferring import DeferredMapping
 from clench.core.pose import FloatArray, Pose
 from clench.core.tolerances import ALLOWED_PENETRATION
-from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.recent_scenes import remember_scene
 
@@ -212,7 +212,7 @@ def _finger_status(c: FingerCandidate, problem: Problem) -> tuple[FingerStatus, 
     if c.overlap is not None:
         when = "on this plane, where joints about another axis would bring it" if c.late else f"before {name} moves"
         return FingerStatus.BLOCKED, f"{_overlap_text(c.overlap, problem)} {when}."
-    if problem.command.order == ClosingOrder.FINGERTIP and c.missed:
+    if problem.command.order.is_of_tips and c.missed:
         first, tip = hand.links[c.touches[0].link].name, hand.links[c.plan.finger.tip_link].name
         return FingerStatus.MISSED, f"{first} touches {_body_name(c.touches[0], problem)} before the tip {tip} does."
     if c.holding:

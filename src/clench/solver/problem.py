@@ -12,7 +12,7 @@ from clench.closing.collision.sizes import warn_of_size
 from clench.closing.motion import next_postures, palm_pose, task_wrenches
 from clench.core.exceptions import ObjectError, UnknownNameError
 from clench.core.pose import FloatArray, Pose
-from clench.models.command import ClosingOrder, GraspCommand
+from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
@@ -52,7 +52,7 @@ class Problem:
     @property
     def together(self) -> bool:
         """Whether all joints close simultaneously."""
-        return self.command.order != ClosingOrder.PROXIMAL_FIRST
+        return self.command.order.is_simultaneous
 
     @cached_property
     def T_palm_object(self) -> FloatArray:
@@ -114,5 +114,5 @@ def make_context(problem: Problem, calibration: Calibration) -> ScoringContext:
         0.0 - problem.T_world_palm.rotation[2],
         not problem.together and problem.command.rounds == 1,
         task_wrenches(problem.command, problem.T_world_palm),
-        problem.command.order == ClosingOrder.FINGERTIP,
+        problem.command.order.is_of_tips,
     )

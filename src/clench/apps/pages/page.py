@@ -125,12 +125,12 @@ def _entries(
     """
     from clench.planner.grasp_plan import GraspPlan, PlannedGrasp
 
-    if isinstance(shown, GraspSolution | PlannedGrasp):
-        return [shown]
-    entries = list(shown) if isinstance(shown, GraspPlan | Sequence) and not isinstance(shown, str) else [shown]
-    wrong = [entry for entry in entries if not isinstance(entry, GraspSolution | PlannedGrasp)]
-    if wrong:
-        raise CommandError(f"shown: expected solutions, a plan or a planned grasp, got {type(wrong[0]).__name__}.")
+    given: list[Any] = list(shown) if isinstance(shown, GraspPlan | list | tuple) else [shown]
+    entries: list[GraspSolution | PlannedGrasp] = []
+    for entry in given:
+        if not isinstance(entry, GraspSolution | PlannedGrasp):
+            raise CommandError(f"shown: expected solutions, a plan or a planned grasp, got {type(entry).__name__}.")
+        entries.append(entry)
     if not entries:
         why = f" {shown.text}" if isinstance(shown, GraspPlan) else ""
         raise CommandError(f"page: expected at least one grasp to show.{why}")
