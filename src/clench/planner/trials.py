@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray, Pose, invert, quaternions_from_rotations
+from clench.core.threads import share_out
 from clench.mechanics.epsilon.batch_bounds import epsilon_bounds
 from clench.mechanics.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
 from clench.mechanics.grasp.contacts import ContactModel, pair_friction
@@ -27,12 +28,17 @@ from .rejections import Fallen, Rejection
 
 #: The score is a mean of bounds at these shares of the lowest friction, so that a margin in it counts [-].
 FRICTION_SHARES = (0.5, 1.0)
+#: Proposals that a thread closes at once.
+AT_ONCE = 32
 #: Displacements of the object for which a grasp is closed again.
 DISPLACEMENTS = 16
 _BLOCKED = STATUSES.index(SolutionStatus.BLOCKED)
 #: Statuses that may be a grasp: for a hand without a thumb, some fingers suffice.
 _HOLDS = [STATUSES.index(SolutionStatus.GRASP), STATUSES.index(SolutionStatus.PARTIAL)]
 _LIMIT = FINGER_STATUSES.index(FingerStatus.LIMIT)
+
+#: Proposals that fall, by reason.
+Falls = list[tuple[Rejection, Proposals]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,25 +101,37 @@ class Closer:
         Args:
             proposals: the proposals. first: number of the first of them. rejected: counts of reasons, which is changed.
         """
-        trials: list[Trial] = []
+        shapes = np.array([arm.shape for arm in self.arms])[proposals.arm]
+        parts = list[NDArray[np.intp]]()
+        for shape in np.unique(shapes):
+            rows = np.flatnonzero(shapes == shape)
+            self._prepare(self.arms[proposals.arm[rows[0]]])
+            parts += np.array_split(rows, -(-len(rows) // AT_ONCE))
+        found: list[tuple[list[Trial], Falls]] = [([], [])] * len(parts)
+
+        def run(k: int) -> None:
+            some = proposals.taken(parts[k])
+            found[k] = self._tried(self.solve(self.arms[some.arm[0]], some.T_object_palm), some, first + parts[k])
+
+        share_out(run, range(len(parts)), self.threads)
+        trials = sorted((trial for part, _ in found for trial in part), key=lambda trial: trial.number)
+        for reason, fallen in (fall for _, falls in found for fall in falls):
+            rejected.fall(reason, fallen)
         scores = np.zeros(len(proposals))
-        for a in np.unique(proposals.arm).tolist():
-            rows = np.flatnonzero(proposals.arm == a)
-            batch = self.solve(self.arms[a], proposals.T_object_palm[rows])
-            found = self._tried(batch, self.arms[a], proposals.taken(rows), first + rows, rejected)
-            for trial in found:
-                scores[trial.number - first] = trial.score
-            trials += found
-        trials.sort(key=lambda trial: trial.number)
+        scores[[trial.number - first for trial in trials]] = [trial.score for trial in trials]
         return trials, scores
 
-    def solve(self, arm: Arm, T_object_palm: FloatArray) -> GraspBatch:
-        """Return the answers of one arm at places of the palm, shape (N, 4, 4)."""
+    def _prepare(self, arm: Arm) -> None:
+        """Plan the hand at the preshape of an arm, once."""
         if arm.shape not in self.solvers:
             self.solvers[arm.shape] = BatchSolver(self.hand, self.obj, self.command(arm))
+
+    def solve(self, arm: Arm, T_object_palm: FloatArray) -> GraspBatch:
+        """Return the answers of one arm at places of the palm, shape (N, 4, 4), solved in the calling thread."""
+        self._prepare(arm)
         T = self.obj.pose.matrix @ T_object_palm
         rows = np.concatenate([quaternions_from_rotations(T[:, :3, :3]), T[:, :3, 3]], axis=1)
-        return self.solvers[arm.shape].solve(rows, None, self.threads)
+        return self.solvers[arm.shape].solve(rows, None, 1)
 
     def displaced_score(self, trial: Trial, sigma: tuple[float, float]) -> float:
         """Return the mean score of a trial when the object is displaced at random, 0 where no grasp is left [N/N].
@@ -143,9 +161,8 @@ class Closer:
         found = [epsilon_bounds(first, *where, k * mu, centers, self._length, torsion) for k in FRICTION_SHARES]
         return np.mean(found, axis=0), found[-1]
 
-    def _tried(
-        self, batch: GraspBatch, arm: Arm, proposals: Proposals, numbers: NDArray[np.intp], rejected: Fallen
-    ) -> list[Trial]:
+    def _tried(self, batch: GraspBatch, proposals: Proposals, numbers: NDArray[np.intp]) -> tuple[list[Trial], Falls]:
+        """Return the trials of a batch, and the proposals that fall for each reason."""
         score, bound = self.bounds(batch)
         kinds = contact_kinds(self.hand, batch.contacts.first, batch.contacts.link, self._counted(batch)[1])
         requested = [KINDS.index(GraspKind(kind)) for kind in self.asked.kinds or GraspKind]
@@ -162,23 +179,17 @@ class Closer:
             (~in_region, Rejection.REGION),
             (bound <= 0.0, Rejection.NO_CLOSURE),
         )
-        left = np.ones(len(batch), dtype=np.bool_)
+        left, fallen = np.ones(len(batch), dtype=np.bool_), list[tuple[Rejection, Proposals]]()
         for falls, reason in checks:
-            rejected.fall(reason, proposals.taken(left & falls))
+            fallen.append((reason, proposals.taken(left & falls)))
             left &= ~falls
         rows, T = np.flatnonzero(left), proposals.T_object_palm
         places = self._places(batch.joint_angles[rows], T[rows])
-        return [
-            Trial(
-                int(numbers[n]),
-                arm,
-                T[n],
-                float(score[n]),
-                KINDS[kinds[n]],
-                links,
-            )
+        trials = [
+            Trial(int(numbers[n]), self.arms[proposals.arm[n]], T[n], float(score[n]), KINDS[kinds[n]], links)
             for n, links in zip(rows.tolist(), places, strict=True)
         ]
+        return trials, fallen
 
     def _touching(self, batch: GraspBatch) -> NDArray[np.int64]:
         """Return how many fingers touch the object in every answer, (N,)."""
