@@ -6,8 +6,9 @@ import math
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.geometry.core_distance import separation
 from clench.kernels.hulls.enclosing_hulls import lowest_corner
+from clench.kernels.hulls.gjk import keep_corners, nearest_of_simplex
+from clench.kernels.hulls.hull_window import SIMPLEX
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.toi_work import SweepWork
 from clench.kernels.trees.obb import slab_top
@@ -92,61 +93,45 @@ def plane_between(bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: 
 
 
 @kernel
-def nearest_with(k: int, corners: int, sweep: SweepWork) -> tuple[float, float, float, float]:
-    """Return distance and direction from the origin to the first rows of `sweep.placed`, with the last for row `k`."""
-    core, placed = sweep.core, sweep.placed
-    for c in range(3):
-        sweep.fixed[0, c] = 0.0
-        for i in range(corners):
-            core[i, c] = placed[7 if i == k else i, c]
-    d, nx, ny, nz, _, _, _, _, _ = separation(core, corners, sweep.fixed, 1)
-    return d, nx, ny, nz
-
-
-@kernel
-def take_corner(size: int, sweep: SweepWork) -> tuple[int, float, float, float, float]:
-    """Take the last row of `sweep.placed` into the triangle of its first rows, so that it lies nearest to the origin.
-
-    Args:
-        size: corners of the triangle so far; the last row takes the place of one of three.
-
-    Returns:
-        corners of the triangle, its distance from the origin and the direction to it.
-    """
-    placed, k, corners = sweep.placed, size, size + 1
-    if size < 3:
-        d, x, y, z = nearest_with(size, corners, sweep)
-    else:
-        corners, d, x, y, z = 3, math.inf, 0.0, 0.0, 0.0
-        for i in range(3):
-            found, nx, ny, nz = nearest_with(i, 3, sweep)
-            if found < d:
-                k, d, x, y, z = i, found, nx, ny, nz
-    if k < 3:
-        for c in range(3):
-            placed[k, c] = placed[7, c]
-    return corners, d, x, y, z
-
-
-@kernel
 def find_plane(
     bodies: BodyArrays, m: int, r: int, nx: float, ny: float, nz: float, sweep: SweepWork
 ) -> tuple[float, float, float, float]:
     """Return how far a plane keeps two bodies apart, and its unit normal, from body `r` to `m`.
 
-    The first direction that is tried is given; those that follow lead to the triangle, among differences of points of
+    The first direction that is tried is given. Those that follow lead to the simplex, among differences of points of
     the two hulls, that is nearest to the origin (Gilbert, Johnson and Keerthi). If hulls overlap, the result is not
     positive.
     """
     best, bx, by, bz = -math.inf, nx, ny, nz
-    size, away = 0, math.inf
+    simplex, weights, size, square = sweep.hull[SIMPLEX : SIMPLEX + 4], sweep.hull[SIMPLEX + 4], 0, math.inf
     for _ in range(TRIES):
         margin = plane_between(bodies, m, r, nx, ny, nz, sweep)
         if margin > best:
             best, bx, by, bz = margin, nx, ny, nz
-        if best >= GOOD * away:
+        if best >= GOOD * math.sqrt(square):
             break
-        size, away, nx, ny, nz = take_corner(size, sweep)
-        if away <= TOUCHING:
+        size, nearest, nx, ny, nz = add_corner(sweep.placed[7], size, simplex, weights)
+        if not nearest < square or nearest <= TOUCHING * TOUCHING:
             break
+        square = nearest
     return best, bx, by, bz
+
+
+@kernel
+def add_corner(p: Floats, size: int, simplex: Floats, weights: Floats) -> tuple[int, float, float, float, float]:
+    """Add a corner to a simplex, and keep those corners that its point nearest to the origin needs.
+
+    Returns:
+        how many corners are left, the square of the distance, and the unit vector to that point.
+    """
+    for c in range(3):
+        simplex[size, c] = p[c]
+    size, x, y, z = size + 1, p[0], p[1], p[2]
+    square = x * x + y * y + z * z
+    if size > 1:
+        square = nearest_of_simplex(simplex, size, weights)
+        size, x, y, z = keep_corners(simplex, size, weights)
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return size, 0.0, 1.0, 0.0, 0.0
+    return size, square, x / length, y / length, z / length
