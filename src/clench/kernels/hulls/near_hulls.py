@@ -27,9 +27,9 @@ def have_hulls(links: BodyArrays, m: int, r: int) -> bool:
 
 
 @kernel
-def put_between(sweep: SweepWork) -> None:
-    """Write the pose of the first link in the frame of the second one, for `parting`."""
-    compose_inverse(sweep.resting, sweep.moving, sweep.hull[NOW:END])
+def put_between(one: Floats, other: Floats, sweep: SweepWork) -> None:
+    """Write the pose of the first of two links in the frame of the second one, for `parting`."""
+    compose_inverse(other, one, sweep.hull[NOW:END])
 
 
 @kernel
@@ -44,10 +44,10 @@ def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork
     hulls, least, side = links.hulls, math.inf, n
     if not have_hulls(links, m, r):
         return -math.inf, n
-    put_between(sweep)
+    put_between(sweep.moving, sweep.resting, sweep)
     for i in range(hulls.body[m], hulls.body[m + 1]):
         for k in range(hulls.body[r], hulls.body[r + 1]):
-            gap, found = parting(hulls, i, k, n, sweep)
+            gap, found = parting(hulls, (i, k), n, sweep.moving, sweep.resting, sweep)
             if gap < least:
                 least, side = gap, found
             if least <= 0.0:
@@ -56,15 +56,17 @@ def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork
 
 
 @kernel
-def parting(hulls: HullArrays, i: int, k: int, n: Vector, sweep: SweepWork) -> tuple[float, Vector]:
+def parting(
+    hulls: HullArrays, both: tuple[int, int], n: Vector, one: Floats, other: Floats, sweep: SweepWork
+) -> tuple[float, Vector]:
     """Return how far two hulls are apart, a little less at most, and along which unit vector [m].
 
     If they overlap, the result is not positive.
 
     Args:
-        i, k: the hulls. n: where the search begins. sweep: has their poses, and what `put_between` wrote.
+        both: the hulls. n: where the search begins. one, other: their poses. sweep: has what `put_between` wrote.
     """
-    T, found = sweep.resting, sweep.hull[LAST]
+    (i, k), T, found = both, other, sweep.hull[LAST]
     for c in range(3):
         found[c] = n[0] * T[0, c] + n[1] * T[1, c] + n[2] * T[2, c]
     none = sweep.hull[CORNERS:PLANES]
@@ -75,7 +77,7 @@ def parting(hulls: HullArrays, i: int, k: int, n: Vector, sweep: SweepWork) -> t
         T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
         T[2, 0] * x + T[2, 1] * y + T[2, 2] * z,
     )
-    return hulls_gap(hulls, i, sweep.moving, k, sweep.resting, side), side
+    return hulls_gap(hulls, i, one, k, other, side), side
 
 
 @kernel

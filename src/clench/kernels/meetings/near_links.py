@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from clench.kernels.closing.layout import Ints
+from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.geometry.vectors import Vector
@@ -33,6 +33,8 @@ LENGTHS = 6
 AROUND = 8.0
 #: A direction along which links approach each other by less than this share of their speed counts as that [-].
 FLAT = 1e-2
+#: A step leads so far of the way to where a gap closes [-].
+CLOSING = 0.999
 
 
 @kernel
@@ -186,12 +188,12 @@ def step_by_hulls(pair: LinkPair, n: Vector, at: float, until: float, step: floa
     m, r = links_of(pair)
     if not have_hulls(links, m, r):
         return -1.0
-    put_between(sweep)
+    put_between(sweep.moving, sweep.resting, sweep)
     for i in range(links.hulls.body[m], links.hulls.body[m + 1]):
         for k in range(links.hulls.body[r], links.hulls.body[r + 1]):
             if hulls_gap(links.hulls, i, sweep.moving, k, sweep.resting, n) >= across * step:
                 continue
-            margin, side = parting(links.hulls, i, k, n, sweep)
+            margin, side = parting(links.hulls, (i, k), n, sweep.moving, sweep.resting, sweep)
             if margin <= TOUCH:
                 return -1.0
             step = step_along(pair, -1 - i, -1 - k, margin, side, at, until, step)
@@ -224,30 +226,91 @@ def step_along(pair: LinkPair, i: int, k: int, gap: float, n: Vector, at: float,
         i, k: two elements, or -1 minus two hulls. gap: how far planes keep them apart now [m].
     """
     _, speed, bend = approach_along(pair, n, at, until)
-    level = min(0.5 * gap, 0.5 * TOUCH)
+    level, longest, ahead = min(0.5 * gap, 0.5 * TOUCH), step, pair.workspace.ahead
     if speed * step < gap - level:
         return step
     least = max(gap - level, 0.0) / speed
     for _ in range(LENGTHS):
         if step <= least:
-            return step
-        left = gap_ahead(pair, i, k, n)
+            break
+        left = gap_along(pair, (i, k), n, ahead[0], ahead[1])
         if lowest_on(step, gap, left, bend) > level:
-            return step
+            break
         step = max(shorter_step(step, gap - level, left - level, bend), least)
         put_ahead(pair, at + step)
-    if step > least:
-        put_ahead(pair, at + least)
-    return least
+    else:
+        step = least
+        put_ahead(pair, at + step)
+    return step_farther(pair, (i, k), gap, n, at, until, (step, longest))
 
 
 @kernel
-def gap_ahead(pair: LinkPair, i: int, k: int, n: Vector) -> float:
-    """Return how far two parts are apart along a unit vector at the poses `workspace.ahead`; see `step_along`."""
-    links, ahead, placed = pair.full_width.links, pair.workspace.ahead, pair.sweep.placed
+def step_farther(
+    pair: LinkPair,
+    both: tuple[int, int],
+    gap: float,
+    n: Vector,
+    at: float,
+    until: float,
+    steps: tuple[float, float],
+) -> float:
+    """Return how far of a step planes are seen to keep two parts apart that are apart after a shorter step.
+
+    A plane that fits the parts where the step begins loses them where a face turns. So the plane that fits them at the
+    end of a longer step is tried. That step leads to where their gap would close if it went on as on the shorter one.
+
+    Args:
+        both, gap, n, at, until: see `step_along`.
+        steps: the shorter step, to which `workspace.ahead` belongs, and the longest one that is of use.
+    """
+    step, longest = steps
+    ahead, sweep = pair.workspace.ahead, pair.sweep
+    if step >= longest:
+        return step
+    left, n = parts_ahead(pair, both, n)
+    longer = longest
+    if left < gap:
+        longer = min(longest, CLOSING * step * gap / (gap - left))
+    if longer <= step:
+        return step
+    put_ahead(pair, at + longer)
+    _, n = parts_ahead(pair, both, n)
+    begin, left = gap_along(pair, both, n, sweep.moving, sweep.resting), gap_along(pair, both, n, ahead[0], ahead[1])
+    if lowest_on(longer, begin, left, approach_along(pair, n, at, until)[2]) > min(0.5 * left, 0.5 * TOUCH):
+        return longer
+    put_ahead(pair, at + step)
+    return step
+
+
+@kernel
+def parts_ahead(pair: LinkPair, both: tuple[int, int], n: Vector) -> tuple[float, Vector]:
+    """Return how far two parts are apart at the poses `workspace.ahead`, and along which unit vector; see `step_along`.
+
+    If they overlap, neither means anything.
+
+    Args:
+        n: where a search begins.
+    """
+    links, ahead, sweep, (i, k) = pair.full_width.links, pair.workspace.ahead, pair.sweep, both
     if i < 0:
-        return hulls_gap(links.hulls, -1 - i, ahead[0], -1 - k, ahead[1], n)
+        put_between(ahead[0], ahead[1], sweep)
+        gap, n = parting(links.hulls, (-1 - i, -1 - k), n, ahead[0], ahead[1], sweep)
+        put_between(sweep.moving, sweep.resting, sweep)
+        return gap, n
+    placed = sweep.placed
     put_core(links, i, ahead[0], placed)
     put_core(links, k, ahead[1], placed[4:])
+    d, nx, ny, nz, _, _, _, _, _ = separation(placed, links.corners[i], placed[4:], links.corners[k])
+    return d - links.radius[i] - links.radius[k], (nx, ny, nz)
+
+
+@kernel
+def gap_along(pair: LinkPair, both: tuple[int, int], n: Vector, one: Floats, other: Floats) -> float:
+    """Return how far two parts are apart along a unit vector at poses of their links; see `step_along`."""
+    links, placed, (i, k) = pair.full_width.links, pair.sweep.placed, both
+    if i < 0:
+        return hulls_gap(links.hulls, -1 - i, one, -1 - k, other, n)
+    put_core(links, i, one, placed)
+    put_core(links, k, other, placed[4:])
     gap = plane_gap(placed, links.corners[i], placed[4:], links.corners[k], n[0], n[1], n[2])
     return float(gap - links.radius[i] - links.radius[k])
