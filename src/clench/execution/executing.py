@@ -42,18 +42,18 @@ class Executor(Protocol):
 def execute(
     solution: GraspSolution, actuator: Executor, *, speed: float = 1.0, force: bool = False, next_steps: bool = True
 ) -> ExecutionReport:
-    """Carry out a solution: open, close along the computed path, all fingers arriving together; go to its next steps.
+    """Execute a solution: open the hand, close it along a planned path, and go to the next steps.
 
-    An invalid solution is not executed. A solution without a free path is not executed either: every link is checked
-    against every other link, the object and obstacles along the whole motion, see `plan_trajectory`. The report says
-    why.
+    clench does not execute an invalid solution, or a solution without a free path. It checks every link against every
+    other link, the object and obstacles along the whole motion, see `plan_trajectory`. The report says why clench
+    refused a solution.
 
     Args:
         solution: the solution to execute.
         actuator: the hand that moves, e.g. `SimulatedHand`.
         speed: fraction of the joints' velocity limits to use, above 0 and up to 1.
-        force: carry it out all the same. A `HardwareHand` still refuses a path that is not free.
-        next_steps: carry out its next steps, too, after the touch and the squeeze.
+        force: execute such a solution all the same. A `HardwareHand` still refuses a path that is not free.
+        next_steps: go to the next steps of the solution after the touch, and after the squeeze if there is one.
 
     Raises:
         CommandError: the solution is for another hand or another geometry of hand or object, `speed` is out of range,

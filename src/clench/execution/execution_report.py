@@ -143,7 +143,7 @@ class ExecutionReport:
         hold: result of a hold test, None without one.
         driven_by: drive of every joint of a simulated hand: an actuator of the model, "servo" or "coupled".
         next_steps: results of the solution's next steps, up to the first step that was not reached.
-        sent: count of commands to a controller, None if the actuator is none.
+        sent: number of commands to a controller, and the last one; None if the actuator is not a controller.
     """
 
     actuator: str

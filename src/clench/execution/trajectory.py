@@ -165,22 +165,18 @@ def plan_trajectory(
     clearance: float = CLEARANCE,
     force: bool = False,
 ) -> Trajectory:
-    """Plan a free path from the open hand to the touch, and on to the next steps, and time it.
+    """Plan and time a free path from the open hand to the touch, and on to the next steps (docs/motions.md).
 
     The path is proven free. Over all of it, no link of the hand overlaps another link, the object or an obstacle by
-    more than 10 µm, in the geometry of the solution. Pairs of links that may overlap are listed in the hand report.
+    more than 10 µm, in the geometry of the solution. The hand report lists the pairs of links that may overlap.
 
-    The first free path of the following ones is returned.
+    With the object, the hand first moves to a pregrasp off the object, on a straight line in joint space. From there,
+    all fingers touch at the same moment, at 10 mm/s. A finger that would meet something on the line goes along its
+    closing path, joint by joint. If two fingers would meet, one waits for the other. Without the object, or without a
+    free pregrasp, every finger goes along its closing path. Fingers may then touch one after another.
 
-    1. With the object, the hand moves to a pregrasp off the object. From there all fingers touch at the same moment, at
-    10 mm/s. All fingers move to the pregrasp on a straight line in joint space. A finger that would meet something on
-    this line goes along its closing path, joint by joint. If two fingers would meet, one waits for the other. Without
-    the object, or without a free pregrasp, every finger goes through its closing path. Then the later joints of a
-    finger close after the first ones touched, and fingers may touch one after another.
-
-    Among fingers that move together, the slowest one sets the duration. Posture joints that differ between the open
-    hand and the solution move first. Without the object, the fingers go along paths that the solution's certificate
-    covers, and only links are checked against each other.
+    The slowest of the fingers that move together sets the duration. Posture joints that differ between the open hand
+    and the solution move first. Without the object, clench checks only links against each other.
 
     Args:
         solution: the solution.
@@ -188,7 +184,7 @@ def plan_trajectory(
         obj: the object that was solved for; the solution gives its pose.
         speed: fraction of the velocity limits to use, above 0 and up to 1.
         acceleration: largest of every joint [rad/s²].
-        clearance: of the pregrasp [m]; less where the way from there is not free.
+        clearance: distance of the pregrasp from the object [m]; less if the way from there is not free.
         force: return a path even if none is free.
 
     Raises:

@@ -24,9 +24,9 @@ class ClosingOrder(StrEnum):
     PROXIMAL_FIRST = "proximal-first"
     """one degree of freedom after another, from the palm outwards (the patent)"""
     TOGETHER = "together"
-    """all simultaneously; a contact stops the joints before it in its finger, and the others continue"""
+    """all at once; a contact stops the joints that move the touching link, and the others continue"""
     FINGERTIP = "fingertip"
-    """all simultaneously; only a contact of the last link counts"""
+    """all at once; a finger succeeds only if its last link touches first"""
 
     @property
     def is_simultaneous(self) -> bool:
@@ -47,15 +47,16 @@ class GraspCommand:
         hand_pose: `T_world_palm`, or the pose of `root_link` when that is named.
         root_link: the link that `hand_pose` places; None is the palm.
         object_pose: `T_world_object`; None keeps the object's own.
-        preshape: angles [rad] by joint name: posture joints, and open values of closing joints. Or a name: "open", or
-            that of a preshape of the hand (`clench hand` lists them). If it names no posture joint and no preshape,
-            clench compares the preshapes of the hand and chooses one (docs/preshapes.md).
+        preshape: angles [rad] by joint name, of posture joints and open values of closing joints; or "open"; or the
+            name of a preshape of the hand (`clench hand` lists them). If it has no angle of a posture joint and is no
+            name, clench compares the preshapes of the hand and chooses one (docs/preshapes.md).
         fingers: names of the fingers that close, in order; None is all.
-        order, rounds: closing order, and how often it is gone through; 0 rounds: until nothing moves any more.
-        orders: alternatives, used instead of `order`: each is solved by itself, and the best solution is kept.
-        speeds: relative closing speeds for simultaneous closing, by name of a free joint; 1 if not named.
-        planes: number of curl planes per finger; the edges of narrower links are added to them.
-        full_width: also compute the candidate that closes over all planes together.
+        order: closing order. rounds: how often the closing goes through the joints; 0: until nothing moves.
+        orders: alternatives, used instead of `order`; clench solves each by itself, and keeps the best solution.
+        speeds: relative speeds in the orders in which all joints move at once, by name of a joint that follows no
+            other; 1 if not named.
+        planes: number of curl planes per finger; clench adds planes at the edges of narrower links.
+        full_width: also close over the full width: the solid links, also between the planes.
         yaw_grid: offsets [rad] added to a finger's abduction joint as alternatives.
         open_variants: offsets [rad] added, in the closing direction, to the open values as alternatives.
         check_candidates: measure the penetration of every candidate, which costs more than the solve.
@@ -63,14 +64,14 @@ class GraspCommand:
         collision_source: geometry of the hand; None is the hand's default.
         opposition_grid: offsets [rad] added to the thumb's first posture joint as alternatives.
         criteria: weights by criterion name, the name of a preset, or a path to a calibration file; None is the default.
-        next_steps: postures [rad] by joint name that the hand goes to after the grasp, one after another; joints that a
-            step does not name stay. For the criteria about them, and carried out.
-        task_wrenches: task loads on the object for their criterion, `force` [N] and `torque` [Nm] in the world about
-            the centre of mass; each load is held alone.
+        next_steps: postures [rad] by joint name to which the hand goes after the grasp, one after another. Joints that
+            a step does not name stay. Two criteria count these steps, and `execute` executes them.
+        task_wrenches: loads of the task on the object, for the criterion `actuation_force_task`: `force` [N] and
+            `torque` [Nm] in the world about the centre of mass. The hand holds one load at a time.
         seed: recorded with the result; nothing random depends on it.
 
     Raises:
-        CommandError: a pose that is no `Pose`. All other values are checked against the hand, when they are used.
+        CommandError: a pose that is no `Pose`. A solve checks the other values against the hand.
     """
 
     hand_pose: Pose

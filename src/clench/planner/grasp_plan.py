@@ -131,8 +131,7 @@ class GraspPlan(Displayed):
         hand, object: their names. grasps: see `PlannedGrasp`. asked: the options.
         proposed: how many wrist poses were proposed. closed: at how many the hand was closed.
         force_closed: how many of these resist every wrench, by the bound of epsilon.
-        rejected: how many proposals fell for each reason, by its name. waiting: number of good proposals that were not
-            needed.
+        rejected: number of rejected proposals by reason. waiting: number of good proposals that were not needed.
         late: the time budget ended the search. widest: how far apart pads of the hand come [m].
         times: seconds by stage.
     """

@@ -32,7 +32,7 @@ class Calibration:
     Args:
         name: of the preset or file. weights: of the criteria in the sum, at least 0.
         scales: the value that counts as 1, above 0, if it differs from the criterion's own.
-        limits: sets beyond come last: the least allowed where more is better, the most where less is.
+        limits: the least value if more is better, else the largest value; candidates beyond a limit come last.
         joints: weight of a joint in the range of motion, 1 where not named.
     """
 

@@ -31,21 +31,22 @@ class SolutionStatus(StrEnum):
     NO_CONTACT = "no_contact"
     """no finger touches"""
     BLOCKED = "blocked"
-    """palm, a fixed link or every finger overlaps the object before anything moves"""
+    """before anything moves, the palm, a fixed link or every requested finger overlaps the object or an obstacle"""
 
 
 class FingerStatus(StrEnum):
     """Name how a finger ended."""
 
     TOUCH = "touch"
+    """a link of the finger touches the object"""
     LIMIT = "limit"
-    """every closing joint reached its limit without touching"""
+    """the finger ends without a contact with the object: at its limits, at an obstacle or at another link"""
     BLOCKED = "blocked"
-    """a link of the finger overlaps the object before anything moves, or would on its plane alone"""
+    """a link of the finger overlaps the object or an obstacle before it moves, or would on its plane alone"""
     NO_MOTION = "no_motion"
     """no closing joint can move"""
     MISSED = "missed"
-    """another link touched before the tip, which alone was to touch"""
+    """in the order `fingertip`, another link touched before the tip"""
 
 
 class ContactKind(StrEnum):
@@ -65,7 +66,7 @@ class ContactKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Describe where a link touches; positions and normals in the world frame.
+    """A contact: where a link touches, with position and normal in the world frame.
 
     Args:
         finger, link: names. body: the touched body of the object.
@@ -73,8 +74,9 @@ class Contact:
         plane: index of the curl plane, None between the planes; offset: place along the axis group's y axis [m].
         kind: see `ContactKind`. passed: a later motion opened it by more than 1 µm.
         position: [m], shape (3,). normal: unit, out of the object, shape (3,).
-        gap: distance left at the final posture [m].
-        curve_angle: tangent angle of the object's perimeter curve [rad]; link_angle: sum of the joint angles [rad].
+        gap: distance at the final posture, negative for an overlap [m].
+        curve_angle: tangent angle of the object's curve in the plane [rad]. link_angle: angle of the link's touching
+            side [rad]; None for tips and edges.
     """
 
     finger: str
@@ -193,8 +195,9 @@ class GraspSolution(Displayed, LateFields):
             guarantee or why there is none; ``"deviation"`` is that of shapes swept as polyhedra [m].
         choice: why these candidates: criteria, totals, runners-up, and sentences (docs/calibration.md).
         max_penetration: over the full width and all links [m], None when not computed.
-        speeds: relative closing speeds of free joints in an order where all move simultaneously; 1 if not named.
-        rounds: number of passes through the joints, 0 for until rest.
+        speeds: relative closing speeds in the orders in which all joints move at once, by joint that follows no other;
+            1 if not named.
+        rounds: how often the closing goes through the joints; 0: until nothing moves.
         next_steps: postures [rad] by joint name that the hand goes to after the grasp, as commanded.
         joint_limits: lower and upper limit [rad] of every joint, so that the solution can judge itself.
     """

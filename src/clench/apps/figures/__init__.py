@@ -24,7 +24,7 @@ __all__ = ["draw_plan", "draw_solution"]
 def draw_solution(
     hand: Hand, obj: GraspObject, command: GraspCommand | Pose, solution: GraspSolution, directory: str | Path
 ) -> list[Path]:
-    """Draw every finger in its curl planes, its candidates, and the hand from two sides.
+    """Draw every finger in its curl planes, its candidates, and the hand from three sides.
 
     Args:
         hand, obj, command: the solved problem, as given to `clench.solve`. solution: the answer.

@@ -80,7 +80,7 @@ class JointMap:
         return joint_map_from_dict(data, source)
 
     def of(self, hand: Hand) -> dict[str, MappedJoint]:
-        """Return how every joint of the hand that a controller may move is said, by the model's names.
+        """Return the mapping of every joint that the controller may move, by the model's names.
 
         Followers are left out unless the map names them: the mechanism moves them.
 

@@ -32,16 +32,16 @@ class HoldTest(StrEnum):
 class Hold:
     """Tell how a grasp is tested: the hand closes on a free object, squeezes as planned, and pulls or lifts it.
 
-    Apart from the time step and the servos, the default values are those of DexGraspBench
-    (https://github.com/JYChen18/DexGraspBench).
+    The default pull, thresholds, duration, friction and mass are those of the six-direction test of DexGraspBench
+    (https://github.com/JYChen18/DexGraspBench). Other settings differ (docs/hold.md).
 
     Args:
         mass: of the object [kg]. friction: of all contacts with the object [-].
         torsion: torsional friction of these contacts [m]. contact_model: of the squeeze plan; only "soft" counts on it.
         squeeze: how much of the planned forces is applied, 0 for none [-].
         pull: force on the centre of mass per mass [N/kg]. duration: of each pull [s].
-        max_distance: of the centre of mass from where the object stood before the hand closed [m], and
-        max_angle: of the object [rad]: from there on it is dropped.
+        max_distance, max_angle: the object counts as dropped if its centre of mass has moved this far [m], or if it has
+            turned this far [rad], from its place before the hand closed.
         test: see `HoldTest`. height: of the lift [m].
         planned_mass, planned_friction: for planning the squeeze, numbers or ranges (least, largest) [kg], [-]; None:
             the mass and the friction of the test.
@@ -143,7 +143,8 @@ class HoldReport:
         held: the object was held in every direction. reason: one sentence.
         settings: of the test. plan: statement of the squeeze plan about the mass.
         planned: whether that plan is feasible; if not, the forces that it found are applied.
-        torques: told to the joints beyond the touch [Nm], by name. angles: of the joints after the squeeze [rad].
+        torques: that the servos are to exert at the touch [Nm], by joint. angles: of the joints after the squeeze
+            [rad].
         first_touch: when each finger first touched the free object [s], None when it did not; from the pregrasp on.
         closed: motion from the pregrasp to the touch. squeezed: motion from there by the squeeze.
         forces: of every finger, squeezed, before the first pull.

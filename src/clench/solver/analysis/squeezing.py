@@ -58,7 +58,7 @@ class SqueezePlan:
             known gain are left out.
         tensions: of the hand's tendons [N], None without tendons.
         grasp: the contacts, friction, centre of mass and length scale that were used.
-        found: the same in the frames of mechanics.
+        found: the plan as it was computed, with forces in the frames of the contacts.
     """
 
     feasible: bool
@@ -131,7 +131,7 @@ def plan_squeeze(
         disturbances: rows (force [N], torque [Nm]) in the world about the centre of mass, shape (N, 6). None: the
             largest weight as a pull along ±x, ±y, ±z of the palm, and as a torque at the length scale about the same
             axes. With `gravity=None` the weight acts in any direction and adds to given disturbances.
-        margin: the largest that is asked for; beyond it, torques are made small instead [-].
+        margin: a margin that suffices; once it is reached, the plan makes the torques small instead [-].
         contact_model, friction, torsion, center_of_mass: see `grasp_quality`.
         reserve: part of the lowest friction that the plan counts on, where the mass can be held so [-].
 

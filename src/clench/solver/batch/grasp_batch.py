@@ -196,8 +196,8 @@ class GraspBatch(LateFields):
         If clench chose the posture, `choice["preshapes"]` has the reason, as of `clench.solve`. The postures are
         compared again at this pose when the reason is first read.
 
-        Of about two thousand poses, what the kernels found stays with the batch. For others, and for a batch from a
-        file, the pose is solved again.
+        A batch keeps what the kernels found at about two thousand poses. Other poses, and the poses of a batch from a
+        file, are solved again.
         """
         from clench.solver.preshapes.posture_choice import with_reason
         from clench.solver.solve import solve
