@@ -36,12 +36,12 @@ def plan_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
         kinds: some of "pinch", "tripod", "precision", "power"; None is any.
         fingers: names of the fingers that may close; None is all. min_fingers: how many touch at least.
         approach: direction in the world in which the palm comes; approach_angle: how far off it may be [rad].
-        touch, avoid: parts of the object where all contacts, or no contacts, are to be; see `clench.Region`.
+        touch, avoid: parts of the object where all contacts, or no contacts, are to be; see `clench.types.Region`.
         reachable: a function from poses of the palm, `T_world_palm` of shape (N, 4, 4), to N truth values.
         pose_sigma: standard deviation of the object's position [m], and of its rotation [rad] as a second number
             (default 0.6° per mm). The planner prefers grasps that hold when the object is displaced.
-        apart: the root mean square over all links of the distance of two grasps is at least this [m].
-        effort: proposals per grasp that is wanted; the best one of so many is returned.
+        apart: least distance of two grasps [m]: the root mean square, over all links, of how far a link is moved.
+        effort: proposals per wanted grasp; the planner returns the best one of so many.
         most: proposals at most; 2000 or 4 times `count` times `effort` by default.
         seconds: the search ends after this time, but not before a first round and its first grasp. `GraspPlan.proposed`
             gives the number of proposals.

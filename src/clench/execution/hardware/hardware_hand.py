@@ -58,7 +58,7 @@ class HardwareHand:
         max_deviation: largest allowed distance of a joint from its target, on the way [rad].
         settling: how long the hand may take to arrive after the trajectory's end [s].
         squeeze: share of the angle offsets of the solution's squeeze plan that joints get beyond the touch, 0 for none
-            [-]. A solution without a plan is not squeezed (see `clench.complete`).
+            [-]. A solution without a plan is not squeezed (see `clench.execution.complete`).
         stay_connected: leave the driver connected at the end, for hands that let go when it leaves; call
             `driver.disconnect` later.
 

@@ -355,7 +355,7 @@ class Hand(Keeper, Displayed):
         return self._tied(q, self.couplings)
 
     def tied(self, q: FloatArray) -> FloatArray:
-        """Return a posture as `coupled` does, but keep followers that can break away."""
+        """Return a posture as `coupled` does, but keep the angles of followers with `breakaway`."""
         return self._tied(q, [c for c in self.couplings if not c.breakaway])
 
     def _tied(self, q: FloatArray, couplings: Iterable[Coupling]) -> FloatArray:
