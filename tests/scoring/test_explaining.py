@@ -60,7 +60,7 @@ def test_a_candidate_that_wins_by_what_it_fulfils_says_so():
 def test_one_candidate_and_equal_candidates():
     """Two pairs of joint angles of the same length score the same."""
     assert explained([[candidate()]])["fingers"]["index"]["text"] == "the full width is the only candidate."
-    assert "nothing to choose" in explained([[candidate()]])["text"]
+    assert "No finger has two candidates" in explained([[candidate()]])["text"]
     motion = Calibration(weights={"range_of_motion": 1.0})
     same = explained([[candidate((0.25, 0.5)), candidate((0.5, 0.25), plane=1)]], motion)
     assert "score the same" in same["fingers"]["index"]["text"]

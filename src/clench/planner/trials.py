@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray, Pose, invert, quaternions_from_rotations
 from clench.core.threads import share_out
-from clench.mechanics.epsilon.batch_bounds import epsilon_bounds
 from clench.mechanics.grasp.contact_kinds import KINDS, GraspKind, contact_kinds
-from clench.mechanics.grasp.contacts import ContactModel, pair_friction
+from clench.mechanics.grasp.contacts import ContactModel
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.objects.mass import mass_properties
+from clench.solver.batch.batch_epsilon import HOLDS, BatchEpsilon
 from clench.solver.batch.batch_solver import BatchSolver
 from clench.solver.batch.grasp_batch import FINGER_STATUSES, STATUSES, GraspBatch
 from clench.solver.preshapes.preshapes import Preshape
@@ -33,8 +33,6 @@ AT_ONCE = 32
 #: Displacements of the object for which a grasp is closed again.
 DISPLACEMENTS = 16
 _BLOCKED = STATUSES.index(SolutionStatus.BLOCKED)
-#: Statuses that may be a grasp: for a hand without a thumb, some fingers suffice.
-_HOLDS = [STATUSES.index(SolutionStatus.GRASP), STATUSES.index(SolutionStatus.PARTIAL)]
 _LIMIT = FINGER_STATUSES.index(FingerStatus.LIMIT)
 
 #: Proposals that fall, by reason.
@@ -77,13 +75,9 @@ class Closer:
 
     def __post_init__(self) -> None:
         """Look up the data that every grasp needs."""
-        mass = mass_properties(self.obj)
-        self._center, self._length = mass.center, mass.length
-        lowest = self.asked.lowest_friction
-        links = range(len(self.hand.links))
-        self._friction = np.array(
-            [[lowest or pair_friction(self.hand, link, body) for body in self.obj.bodies] for link in links]
-        )
+        torsion = self.asked.torsion if self.asked.model is ContactModel.SOFT else None
+        self._epsilon = BatchEpsilon(self.hand, self.obj, self.asked.lowest_friction, torsion)
+        self._center = mass_properties(self.obj).center
         self._graspable = np.array([body.role is BodyRole.GRASPABLE for body in self.obj.bodies])
         self._solid = [*self.hand.solid_links]
 
@@ -150,26 +144,18 @@ class Closer:
 
     def bounds(self, batch: GraspBatch) -> tuple[FloatArray, FloatArray]:
         """Return score and bound of every answer [N/N], shape (N,) each; 0 for anything but a grasp."""
-        contacts = batch.contacts
-        owner, keep = self._counted(batch)
-        keep = keep & np.isin(batch.status_codes, _HOLDS)[owner]
-        first = np.concatenate([[0], np.cumsum(np.bincount(owner[keep], minlength=len(batch)))])
-        mu = self._friction[contacts.link[keep], contacts.body[keep]]
-        centers = np.array([Pose(row[4:], row[:4]).apply(self._center) for row in batch.object_poses]).reshape(-1, 3)
-        torsion = self.asked.torsion if self.asked.model is ContactModel.SOFT else None
-        where = contacts.position[keep], contacts.normal[keep]
-        found = [epsilon_bounds(first, *where, k * mu, centers, self._length, torsion) for k in FRICTION_SHARES]
+        found = [self._epsilon.bounds(batch, share) for share in FRICTION_SHARES]
         return np.mean(found, axis=0), found[-1]
 
     def _tried(self, batch: GraspBatch, proposals: Proposals, numbers: NDArray[np.intp]) -> tuple[list[Trial], Falls]:
         """Return the trials of a batch, and the proposals that fall for each reason."""
         score, bound = self.bounds(batch)
-        kinds = contact_kinds(self.hand, batch.contacts.first, batch.contacts.link, self._counted(batch)[1])
+        kinds = contact_kinds(self.hand, batch.contacts.first, batch.contacts.link, self._epsilon.counted(batch)[1])
         requested = [KINDS.index(GraspKind(kind)) for kind in self.asked.kinds or GraspKind]
         touching = self._touching(batch)
         thumbs = [k for k, f in enumerate(batch.finger_names) if self.hand.finger(f).is_thumb]
         at_limit = (batch.finger_codes[:, thumbs] == _LIMIT).any(axis=1)
-        in_region, holds = self._in_regions(batch), np.isin(batch.status_codes, _HOLDS)
+        in_region, holds = self._in_regions(batch), np.isin(batch.status_codes, HOLDS)
         checks = (
             (batch.status_codes == _BLOCKED, Rejection.OVERLAPS),
             (~holds & at_limit, Rejection.THUMB_LIMIT),
@@ -193,17 +179,11 @@ class Closer:
 
     def _touching(self, batch: GraspBatch) -> NDArray[np.int64]:
         """Return how many fingers touch the object in every answer, (N,)."""
-        owner, keep = self._counted(batch)
+        owner, keep = self._epsilon.counted(batch)
         touched = np.zeros((len(batch), len(batch.finger_names)), dtype=np.bool_)
         touched[owner[keep], batch.contacts.finger[keep]] = True
         count: NDArray[np.int64] = touched.sum(axis=1)
         return count
-
-    def _counted(self, batch: GraspBatch) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the grasp of every contact, and whether it counts, (C,): not opened again and no obstacle's."""
-        contacts = batch.contacts
-        owner = np.repeat(np.arange(len(batch)), np.diff(contacts.first))
-        return owner, ~contacts.passed & self._graspable[contacts.body]
 
     def _in_regions(self, batch: GraspBatch) -> NDArray[np.bool_]:
         inside = np.ones(len(batch), dtype=np.bool_)

@@ -139,7 +139,7 @@ def _finger_text(finger: FingerChoice, group: Sequence[FingerCandidate], choice:
 def _hand_text(choice: HandChoice, groups: Groups, names: Sequence[str]) -> str:
     second = choice.runner_up
     if second is None:
-        return "There was nothing to choose: no finger has two candidates that the scores could decide between."
+        return "No finger has two candidates that the scores could decide between."
     changed = [k for k, (i, j) in enumerate(zip(choice.chosen, second.candidates, strict=True)) if i != j]
     both = [(groups[k][choice.chosen[k]], groups[k][second.candidates[k]]) for k in changed]
     swapped = ", ".join(

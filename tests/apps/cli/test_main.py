@@ -61,6 +61,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     monkeypatch.setitem(vars(clench), "plan_grasps", lambda *_, **__: [planned])
     monkeypatch.setitem(vars(clench.execution), "complete", lambda solution, *_, **__: solution)
     monkeypatch.setattr(sizes, "warn_of_size", lambda *_: None)
+    monkeypatch.setattr("clench.apps.cli.output.printing.print_closure", lambda *_: None)
     # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
     monkeypatch.setattr(warming, "announce", lambda: None)
     monkeypatch.setattr(warming, "warm_up", lambda: None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -70,12 +71,42 @@ def test_a_solve_prints_what_was_compared(tmp_path, capsys) -> None:
     pose = clench.Pose.from_dict(HELD, "hand_pose")
     said = clench.solve(hand, mug, clench.GraspCommand(hand_pose=pose, planes=1)).choice["preshapes"]
     assert said["text"] in printed
-    rows = {line.split("│")[2].strip(): line.split("│") for line in printed.splitlines() if line.count("│") == 8}
-    assert set(said["compared"]) <= set(rows)
-    assert rows[said["chosen"]][1].strip() == "*"
-    assert rows[said["runner_up"]][1].strip() == "2"
+    words = [line.replace("│", " ").split() for line in printed.splitlines()]
+    rows = {
+        name: row
+        for name in said["compared"]
+        for row in words
+        if name in row[:2] and {"grasp", "partial"} & set(row[1:3])
+    }
+    assert set(said["compared"]) == set(rows)
+    assert rows[said["chosen"]][0] == "*"
+    assert rows[said["runner_up"]][0] == "2"
+    assert all(f"{each['epsilon_bound']:.3f}" in rows[name] for name, each in said["compared"].items())
     assert solve_mug(tmp_path, preshape="open") == 0
     assert "preshapes" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("preshape", "options", "sentence"),
+    [
+        ("open", (), r"force closure: the grasp resists every wrench at friction 0\.6; epsilon is at least 0\.\d+\n"),
+        ("grip-75mm", (), r"no force closure found at friction 0\.6: some pulls may move the object;"),
+        ("open", ("--html", "page.html"), r"force closure: .* at friction 0\.6; epsilon is 0\.197\n"),
+    ],
+)
+def test_a_solve_says_whether_the_grasp_resists_every_wrench(
+    tmp_path, capsys, monkeypatch, preshape, options, sentence
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert solve_mug(tmp_path, *options, preshape=preshape) == 0
+    assert re.search(sentence, capsys.readouterr().out)
+
+
+def test_an_answer_without_a_grasp_says_nothing_of_closure(tmp_path, capsys) -> None:
+    far = {"hand_pose": {"position": [0.0, 0.0, 9.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}, "preshape": "open"}
+    (tmp_path / "far.json").write_text(json.dumps(far))
+    assert main(["solve", "--hand", "robonaut2", "--object", "mug", "--command", str(tmp_path / "far.json")]) == 1
+    assert "closure" not in capsys.readouterr().out
 
 
 def test_files_and_documents_agree(tmp_path, capsys) -> None:

@@ -66,13 +66,33 @@ def test_the_best_of_all_preshapes_is_chosen(pose: clench.Pose) -> None:
     best = min(BEST.index(s.status) for s in alone.values())
     assert BEST.index(solution.status) == best
     if best < 2:
+        compared = said(solution)["compared"]
         totals = {name: total(s) for name, s in alone.items() if BEST.index(s.status) == best and s.certified}
-        assert totals[said(solution)["chosen"]] == pytest.approx(max(totals.values()), abs=1e-9)
-        told = {name: said(solution)["compared"][name]["total"] for name in totals}
-        assert told == pytest.approx(totals, abs=1e-9)
+        assert {name: compared[name]["total"] for name in totals} == pytest.approx(totals, abs=1e-9)
+        closed = {name: value for name, value in totals.items() if compared[name]["epsilon_bound"] > 0.0}
+        assert totals[said(solution)["chosen"]] == pytest.approx(max((closed or totals).values()), abs=1e-9)
     else:
         assert said(solution)["chosen"] == "open"
     assert dict(alone[said(solution)["chosen"]].joint_angles) == dict(solution.joint_angles)
+
+
+def test_a_grasp_that_resists_every_wrench_comes_before_one_that_moves_less() -> None:
+    """The bound is never above epsilon, and the chosen grasp holds the mug, which the best by its sum does not."""
+    solution = clench.solve(HAND, MUG, command())
+    compared = said(solution)["compared"]
+    for name, each in compared.items():
+        alone = clench.solve(HAND, MUG, command(preshape=name))
+        exact = clench.grasp_quality(alone, HAND, MUG).epsilon.radius if alone.contacts else 0.0
+        assert each["epsilon_bound"] <= exact + 1e-9
+    by_sum = max((n for n in compared if compared[n]["status"] == "grasp"), key=lambda n: compared[n]["total"])
+    assert compared[by_sum]["epsilon_bound"] == 0.0 < compared[said(solution)["chosen"]]["epsilon_bound"]
+    assert clench.plan_squeeze(solution, HAND, MUG).feasible
+    assert not clench.plan_squeeze(clench.solve(HAND, MUG, command(preshape=by_sum)), HAND, MUG).feasible
+
+
+def test_the_reason_names_force_closure() -> None:
+    texts = [said(clench.solve(HAND, MUG, command(pose)))["text"] for pose in clench.approach_poses(HAND, MUG, 40, 3)]
+    assert any(text.endswith("because it alone resists every wrench.") for text in texts)
 
 
 def test_it_grasps_where_the_open_hand_does_not() -> None:

@@ -125,11 +125,8 @@ def _certificate(solution: GraspSolution) -> str:
 
 
 def _choice(solution: GraspSolution) -> list[str]:
-    choice = solution.choice or {}
-    sentences = [each.get("text") for each in (choice.get("preshapes"), choice) if isinstance(each, dict)]
-    sentences += [] if isinstance(choice, dict) or not choice else [choice.get("text")]
-    told = [f"<p>{text(sentence)}</p>" for sentence in sentences if sentence]
-    return ["<h2>Why this grasp</h2>", *told] if told else []
+    said = (solution.choice or {}).get("text")
+    return ["<h2>Why this grasp</h2>", f"<p>{text(said)}</p>"] if said else []
 
 
 def _squeeze(solution: GraspSolution) -> list[str]:

@@ -1,8 +1,8 @@
 """The posture that clench chooses: the hand closes from its preshapes at every pose (docs/preshapes.md).
 
-The order of precedence is: the better status, the certificate, the limits of the calibration, the weighted sum of the
-criteria. Motion counts from the open hand and includes posture joints. Among equal closings, the posture nearest to the
-open hand wins.
+The order of precedence is: the better status, the certificate, force closure, the limits of the calibration, the
+weighted sum of the criteria. Motion counts from the open hand and includes posture joints. Among equal closings, the
+posture nearest to the open hand wins.
 """
 
 from __future__ import annotations
@@ -68,8 +68,10 @@ def with_posture(solution: GraspSolution, said: Mapping[str, Any], seconds: floa
     """Return a solution whose `choice` gives the reason for the posture, and the time of its choice [s]."""
     choice, timing = solution.choice, dict(solution.timing)
     timing["total"] = timing.get("total", 0.0) + seconds
-    # Two mappings: a reader of the reason for the posture does not wait for the reasons for the candidates.
-    parts: list[Any] = [{"preshapes": said}, {} if choice is None else choice]
+    # Several mappings: a reader of the reason for the posture does not wait for the reasons for the candidates.
+    parts: list[Any] = [{"preshapes": said}]
+    if choice is not None:
+        parts += [DeferredMapping(lambda: {"text": f"{said['text']} {choice['text']}"}), choice]
     return solution.with_known(
         choice=ChainMap(*parts),
         timing={"posture": seconds, **timing},
@@ -158,7 +160,9 @@ class PostureSolver:
         steps = np.floor(scores.total / _SAME + 0.5)
         known = (~np.isnan(scores.values)).sum(axis=2)
         away = np.broadcast_to(self._away, steps.shape)
-        order = np.lexsort((away, -steps, -known, ~scores.inside, ~scores.certified, scores.place), axis=-1)
+        open_grasps = scores.epsilon <= 0.0
+        keys = (away, -steps, -known, ~scores.inside, open_grasps, ~scores.certified, scores.place)
+        order = np.lexsort(keys, axis=-1)
         return scores, order
 
     def _explain(self, scores: Scores, ranked: list[int]) -> dict[str, Any]:
@@ -174,6 +178,7 @@ class PostureSolver:
         return {
             "status": BEST_FIRST[int(scores.place[0, k])].value,
             "certified": bool(scores.certified[0, k]),
+            "epsilon_bound": float(scores.epsilon[0, k]),
             "inside": bool(scores.inside[0, k]),
             "scores": self._values(scores, k),
             "total": float(scores.total[0, k]),
@@ -191,7 +196,12 @@ class PostureSolver:
         before = f"{ours} comes before {theirs}"
         if statuses[0] != statuses[1]:
             return f"{before} because it ends as {statuses[0]}, and {theirs} as {statuses[1]}."
-        for what, values in (("is certified", scores.certified), ("is inside the limits", scores.inside)):
+        rules = (
+            ("is certified", scores.certified),
+            ("resists every wrench", scores.epsilon > 0.0),
+            ("is inside the limits", scores.inside),
+        )
+        for what, values in rules:
             if values[0, best] != values[0, second]:
                 return f"{before} because it alone {what}."
         a, b = self._values(scores, best), self._values(scores, second)

@@ -15,6 +15,7 @@ from clench.models.hand.hand import Finger, Hand, JointRole
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.scoring.calibration import Calibration
 from clench.scoring.criterion_registry import ALWAYS, find_criterion, is_of_hand
+from clench.solver.batch.batch_epsilon import BatchEpsilon
 from clench.solver.batch.grasp_batch import STATUSES, GraspBatch
 from clench.solver.solution import GraspSolution, SolutionStatus, solve_scores
 
@@ -35,13 +36,15 @@ class Scores(NamedTuple):
 
     Args:
         place: of the status, 0 for a grasp, shape (N, K). certified, inside: whether the certificate holds, and whether
-            all values are inside the limits, (N, K). values: of the criteria, NaN where nothing is said, (N, K, P).
+            all values are inside the limits, (N, K). epsilon: lower bound of the epsilon quality [N/N], (N, K).
+        values: of the criteria, NaN where nothing is said, (N, K, P).
         total: weighted sum [-], (N, K).
     """
 
     place: NDArray[np.int64]
     certified: NDArray[np.bool_]
     inside: NDArray[np.bool_]
+    epsilon: FloatArray
     values: FloatArray
     total: FloatArray
 
@@ -97,7 +100,8 @@ class PostureScorer:
         for p, name in enumerate(names):
             total += self.calibration.worth(name, 1.0) * np.nan_to_num(values[:, :, p])
         idle = place >= _TOUCHING
-        return Scores(place, certified, inside | idle, values, np.where(idle, 0.0, total))
+        epsilon = self._epsilon.bounds(answers).reshape(shape).T
+        return Scores(place, certified, inside | idle, epsilon, values, np.where(idle, 0.0, total))
 
     def _measure(self, answers: GraspBatch) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return range of motion [rad], touching links and limit distance of every finger, (N, F) each, as `ALWAYS`."""
@@ -106,6 +110,10 @@ class PostureScorer:
         motion: FloatArray = (np.abs(q - self.opened)[:, None] * weight).sum(axis=2)
         left: FloatArray = (np.abs(end - q[:, None]) / span).min(axis=2, initial=1.0)
         return motion, self._touching(answers), left
+
+    @cached_property
+    def _epsilon(self) -> BatchEpsilon:
+        return BatchEpsilon(self.hand, self.obj)
 
     @cached_property
     def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -37,7 +37,7 @@ def run_demo(models: tuple[str, str], out: Path, seed: int | None, page: Path, j
     """
     import clench
     from clench.apps.cli.output.preshape_tables import print_posture_choice
-    from clench.apps.cli.output.printing import print_files, print_report, print_solution
+    from clench.apps.cli.output.printing import print_closure, print_files, print_report, print_solution
     from clench.apps.pages.page_files import check_page
     from clench.core.files.json_files import check_folder
     from clench.kernels.runtime.warming import announce, warm_up
@@ -71,6 +71,7 @@ def run_demo(models: tuple[str, str], out: Path, seed: int | None, page: Path, j
         print_json(solution.to_dict())
     else:
         print_solution(solution, [*hand.warnings, *obj.warnings], [])
+        print_closure(solution, hand, obj)
         print_posture_choice(solution)
         print_report(report)
         print_files(files)

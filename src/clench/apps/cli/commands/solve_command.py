@@ -82,7 +82,7 @@ def solve(
     from clench.apps.cli.inputs.kernel_loading import compile_kernels, load_kernels
     from clench.apps.cli.output.choice_tables import plain_front, print_choice
     from clench.apps.cli.output.preshape_tables import print_posture_choice
-    from clench.apps.cli.output.printing import print_forces, print_pose_error, print_solution
+    from clench.apps.cli.output.printing import print_closure, print_forces, print_pose_error, print_solution
     from clench.apps.cli.output.results import exit_code, print_json, write_results
     from clench.closing.collision.sizes import warn_of_size
     from clench.models.objects.object_loading import size_warnings
@@ -124,6 +124,8 @@ def solve(
     else:
         untold = [warning for warning in the_object.warnings if warning not in told]
         print_solution(solution, [*the_hand.warnings, *untold], files)
+        if not forces:
+            print_closure(solution, the_hand, the_object, gripped)
         _tell_planned(planned)
         print_posture_choice(solution)
         if error is not None:

@@ -40,12 +40,14 @@ def print_posture_choice(solution: GraspSolution) -> None:
     console, compared = console_out(), said["compared"]
     names = list(dict.fromkeys(name for each in compared.values() for name in each["scores"]))
     words = [name.replace("_", " ") for name in names]
-    table = table_with("preshapes that were compared (* chosen, 2 next best)", "", "preshape", "status", *words, "sum")
+    title = "preshapes that were compared (* chosen, 2 next best; epsilon: a lower bound)"
+    table = table_with(title, "", "preshape", "status", "epsilon", *words, "sum")
     table.columns[1].no_wrap = True
     marks = {said["chosen"]: "*", said["runner_up"]: "2"}
     for name, each in compared.items():
         scores = [f"{each['scores'][key]:.4g}" if key in each["scores"] else "" for key in names]
-        row = (marks.get(name, ""), name, each["status"], *scores, f"{each['total']:z.4f}")
+        bound, total = f"{each['epsilon_bound']:z.3f}", f"{each['total']:z.4f}"
+        row = (marks.get(name, ""), name, each["status"], bound, *scores, total)
         table.add_row(*map(plain, row))
     print_table(console, table)
     console.print(plain(said["text"]), soft_wrap=True)

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from clench.execution.execution_report import ExecutionReport, NextStepReached
     from clench.execution.formats.exchange import ExportReport
     from clench.execution.simulation.hold import HoldReport
+    from clench.models.hand.hand import Hand
     from clench.models.hand.hand_report import HandReport
+    from clench.models.objects.grasp_object import GraspObject
     from clench.solver.analysis.pose_error import PoseErrorReport
     from clench.solver.analysis.record import RecordEntry
     from clench.solver.solution import FingerResult, GraspSolution
@@ -48,6 +50,29 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     _sentences(console, "violation", solution.violations())
     _sentences(console, "warning", warnings)
     print_files(files)
+
+
+def print_closure(solution: GraspSolution, hand: Hand, obj: GraspObject, friction: Any = None) -> None:
+    """Print whether a grasp resists every wrench; nothing for an answer without a grasp.
+
+    Args:
+        solution: the answer; without its quality, a fast lower bound of epsilon decides. hand, obj: as solved.
+        friction: of all contacts [-], the lowest of a range counts; None: that of hand and object.
+    """
+    from clench.mechanics.epsilon.epsilon_quality import epsilon_bound
+    from clench.solver.analysis.holding import hold
+
+    if solution.status.value not in ("grasp", "partial"):
+        return
+    contacts = hold(solution, hand, obj, friction=friction).held
+    at = f"at friction {contacts.contacts.friction.min(initial=np.inf):g}"
+    exact = None if solution.quality is None else solution.quality["epsilon"]
+    radius, word = (epsilon_bound(contacts), "at least ") if exact is None else (exact, "")
+    if radius > 0.0:
+        text = f"force closure: the grasp resists every wrench {at}; epsilon is {word}{radius:z.3f}"
+    else:
+        text = f"no force closure found {at}: some pulls may move the object; 'clench plan' finds poses that resist all"
+    console_out().print(plain(text), soft_wrap=True)
 
 
 def print_forces(solution: GraspSolution) -> None:
