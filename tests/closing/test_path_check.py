@@ -168,14 +168,3 @@ def test_links_that_rub_against_each_other_for_long_end_the_proof() -> None:
     assert np.isnan(found.depth)
     assert 0.0 < found.place < 1.0
     assert "cannot be proven that they stay apart" in found.sentence
-
-
-@pytest.mark.parametrize("size", [1, 1000])
-def test_shares_of_threads_change_nothing(monkeypatch, size: int) -> None:
-    hand, rng = two_chains(True), np.random.default_rng(3)
-    paths = [rng.uniform(-1.5, 1.5, (3, len(hand.joints))) for _ in range(20)]
-    expected = [find_path_overlap(hand, path, SOURCE) for path in paths]
-    assert any(expected)
-    assert not all(expected)
-    monkeypatch.setattr("clench.closing.collision.path_check._PAIRS", size)
-    assert [find_path_overlap(hand, path, SOURCE) for path in paths] == expected

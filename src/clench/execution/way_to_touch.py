@@ -11,11 +11,11 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from clench.closing.collision.path_check import PathOverlap, find_path_overlap, is_path_free
+from clench.closing.collision.path_check import PathOverlap, check_path, find_path_overlap, is_path_free
 from clench.core.exceptions import MotionError
 from clench.core.pose import FloatArray
 from clench.models.command import ClosingOrder
@@ -42,6 +42,13 @@ _MOST_PLANS: Final = 24
 _MOST_STUCK: Final = 3
 #: Times [s], shape (N,), and postures [rad], shape (N, J).
 _Part = tuple[FloatArray, FloatArray]
+
+
+class _Last(NamedTuple):
+    """The rest of a way; it is proven if no link overlaps anything at the touch, because then no direction counts."""
+
+    part: _Part
+    proven: bool
 
 
 @dataclass(frozen=True)
@@ -124,29 +131,33 @@ class WayFinder:
                 return certified
         return way if way.overlap is None or not failed else failed[0]
 
-    def _landing(self, clearance: float) -> tuple[FloatArray, _Part] | None:
+    def _landing(self, clearance: float) -> tuple[FloatArray, _Last] | None:
         """Return a pregrasp and the straight line from there to all contacts; None if it is not free."""
-        goal = self._pregrasp(clearance)
-        if goal is None:
+        found = self._pregrasp(clearance)
+        if found is None:
             return None
+        goal, proven = found
         slow = np.minimum(self.pace[0], np.abs(self.end - goal) * (LANDING_SPEED / clearance))
         joints = range(len(goal))
         line = time_path(self._line(joints, goal, self.end), slow, self.pace[1])
-        return goal, _joined([line], self.end, [joints])
+        return goal, _Last(_joined([line], self.end, [joints]), proven)
 
-    def _pregrasp(self, clearance: float) -> FloatArray | None:
-        """Return a posture from which the straight line to the touch is free; a joint rests where that helps."""
+    def _pregrasp(self, clearance: float) -> tuple[FloatArray, bool] | None:
+        """Return a posture from which the straight line to the touch is free; a joint rests where that helps.
+
+        Return also whether the line is free in both directions.
+        """
         goal = self._landings.start(clearance)
         if goal is None:
             return None
-        overlap = self.overlap(self._lifted(goal))
+        overlap, begun = check_path(self.hand, self._lifted(goal), self.source, self.around)
         if overlap is None:
-            return goal
+            return goal, not begun
         suspects = [overlap]
         for j in (j for f in self._fingers_of(overlap) for j in self.hand.fingers[f].joints):
             goal = self._landings.start(clearance, (j,))
             if goal is not None and is_path_free(self.hand, self._lifted(goal), self.source, self.around, suspects):
-                return goal
+                return goal, not begun
         return None
 
     def _lifted(self, goal: FloatArray) -> FloatArray:
@@ -179,12 +190,12 @@ class WayFinder:
         count = len(self.hand.fingers)
         return self._timed(FingerPlan((0,) * count, (False,) * count), self.end)
 
-    def search(self, goal: FloatArray, *, straight: bool = True, last: _Part | None = None) -> Way:
+    def search(self, goal: FloatArray, *, straight: bool = True, last: _Last | None = None) -> Way:
         """Return a free way to a posture; where none is found the first one tried, with its overlap.
 
         Args:
             goal: the posture [rad], shape (J,). straight: whether fingers first try straight lines, or else their
-                closing paths. last: times [s] and postures [rad] of the rest of the way.
+                closing paths. last: the rest of the way.
         """
         count = len(self.hand.fingers)
         plans = [FingerPlan((0,) * count, (straight,) * count)]
@@ -212,16 +223,17 @@ class WayFinder:
         assert first is not None
         return first
 
-    def _checked(self, plan: FingerPlan, goal: FloatArray, last: _Part | None) -> Way:
+    def _checked(self, plan: FingerPlan, goal: FloatArray, last: _Last | None) -> Way:
         times, positions = self._timed(plan, goal)
-        pregrasp = None
+        pregrasp, checked = None, positions
         if last is not None:
             pregrasp = len(times) - 1
-            times = np.concatenate([times[:-1], times[-1] + last[0]])
-            positions = np.vstack([positions[:-1], last[1]])
+            times = np.concatenate([times[:-1], times[-1] + last.part[0]])
+            positions = np.vstack([positions[:-1], last.part[1]])
+            checked = checked if last.proven else positions
             # Without a contact, there is nothing to keep a clearance from.
             pregrasp = pregrasp if pregrasp < len(times) - 1 else None
-        overlap = self.overlap(positions)
+        overlap = self.overlap(checked)
         names = [f.name for f in self.hand.fingers]
         moved = [bool((self.start[f.own] != goal[f.own]).any()) for f in self.hand.fingers]
         turns = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from clench.closing.link_bodies import link_bodies
 from clench.closing.linkage import hand_frames
 from clench.core.pose import FloatArray
-from clench.core.threads import core_count, share_out
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import BodyRole, GraspObject
 from clench.models.shapes import CollisionSource
@@ -22,11 +21,6 @@ from .packed_object import PackedObject, pack_object
 if TYPE_CHECKING:
     from clench.kernels.geometry.bodies import BodyArrays
     from clench.kernels.toi.pair_motion import PathProblem
-
-#: Pairs of bodies that a thread checks at once.
-_PAIRS: Final = 64
-#: Way-points whose joints are this close to a straight line lie on it [rad].
-STRAIGHT: Final = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,13 +99,24 @@ def find_path_overlap(
         hand: the hand. path: way-points [rad], shape (W, J); joints move at constant speed between two of them.
         source: geometry of the links. around: the object; None checks the hand alone.
     """
-    points, kept = _corners(np.ascontiguousarray(path, dtype=np.float64))
-    lines = _Lines(path, points, kept)
-    if around is None:
-        return _first(hand, lines, source, None, around)
+    return check_path(hand, path, source, around)[0]
+
+
+def check_path(
+    hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None = None
+) -> tuple[PathOverlap | None, bool]:
+    """Return what `find_path_overlap` returns, and whether any pair overlaps where the path begins.
+
+    A path that is free, and on which no pair overlaps where it begins, is free in the other direction, too.
+    """
+    found, begun = list[PathOverlap](), False
     # Body by body: a link that is in one of them where the path begins must still stay out of the others.
-    found = [_first(hand, lines, source, number, around) for number in range(len(around.bodies))]
-    return min((overlap for overlap in found if overlap is not None), key=lambda o: o.place, default=None)
+    for number in range(len(around.bodies)) if around is not None else (None,):
+        overlap, overlaps = _first(hand, _problem(hand, path, source, number, around), source, number, around)
+        begun = begun or overlaps
+        if overlap is not None:
+            found.append(overlap)
+    return min(found, key=lambda o: o.place, default=None), begun
 
 
 def is_path_free(
@@ -126,10 +131,9 @@ def is_path_free(
     """
     from clench.kernels.toi.path_overlap import first_overlap
 
-    points = _corners(np.ascontiguousarray(path, dtype=np.float64))[0]
     for number in range(len(around.bodies)) if around is not None else (None,):
-        problem = _problem(hand, points, source, number, around)
-        name = None if around is None or number is None else next(iter(around.bodies[number].body_names), "object")
+        problem = _problem(hand, path, source, number, around)
+        name = None if around is None or number is None else _body_name(around.bodies[number])
         asked = np.zeros(len(problem.pairs), dtype=np.bool_)
         for met in suspects:
             if not met.with_object:
@@ -138,7 +142,7 @@ def is_path_free(
             elif met.other == name:
                 asked |= (problem.pairs == [hand.link_index(met.link), -1]).all(axis=1)
         some = problem._replace(pairs=problem.pairs[asked], allowed=problem.allowed[asked])
-        if asked.any() and first_overlap(some, np.empty(2)) >= 0:
+        if asked.any() and first_overlap(some, np.empty(3)) >= 0:
             return False
     found = find_path_overlap(hand, path, source, around)
     if found is not None:
@@ -146,59 +150,33 @@ def is_path_free(
     return found is None
 
 
-class _Lines(NamedTuple):
-    """A path as straight lines: its way-points, the ends of the lines, and the numbers of the ends."""
-
-    path: FloatArray
-    points: FloatArray
-    kept: NDArray[np.int64]
+def _body_name(packed: PackedObject) -> str:
+    return packed.body_names[0] if packed.body_names else "object"
 
 
 def _first(
-    hand: Hand, lines: _Lines, source: CollisionSource, number: int | None, around: PlacedObject | None
-) -> PathOverlap | None:
-    """Return the first overlap with one body of the object; with the first one, or without any, of the links, too."""
-    from clench.kernels.toi.path_overlap import OVERLAP
+    hand: Hand, problem: PathProblem, source: CollisionSource, number: int | None, around: PlacedObject | None
+) -> tuple[PathOverlap | None, bool]:
+    """Return the first overlap with one body of the object, or of the links; and whether any overlap at the start."""
+    from clench.kernels.toi.path_overlap import OVERLAP, first_overlap
 
-    path, points, kept = lines
-    problem = _problem(hand, points, source, number, around)
-    found, out = _first_pair(problem)
+    out, path = np.zeros(3), problem.path
+    found = first_overlap(problem, out)
+    place, depth, begun = out.tolist()
     if found < 0:
-        return None
+        return None, begun > 0.0
     m, r = problem.pairs[found].tolist()
-    corner = min(int(out[0]), len(points) - 1)
-    share = out[0] - corner
-    after = min(corner + 1, len(points) - 1)
-    q = points[corner] + share * (points[after] - points[corner])
-    place = _place(path[kept[corner] : kept[after] + 1], share) + float(kept[corner])
     name = hand.links[m].name
     # A pair that is apart is found before it is much deeper than the tolerance.
-    from_start = bool(out[1] > problem.allowed[found] + 3.0 * OVERLAP)
+    from_start = bool(depth > problem.allowed[found] + 3.0 * OVERLAP)
     if r >= 0:
-        return PathOverlap(place, name, hand.links[r].name, False, float(out[1]), from_start=from_start)
+        return PathOverlap(place, name, hand.links[r].name, False, depth, from_start=from_start), begun > 0.0
     assert around is not None
     assert number is not None
+    before = min(int(place), len(path) - 1)
+    q = path[before] + (place - before) * (path[min(before + 1, len(path) - 1)] - path[before])
     body, position = _where(hand, q, m, source, around.bodies[number], around.T_palm_object)
-    return PathOverlap(place, name, body, True, float(out[1]), position, from_start)
-
-
-def _first_pair(problem: PathProblem) -> tuple[int, FloatArray]:
-    """Return the pair that overlaps first, -1 when none does, and its place and depth; threads share the pairs."""
-    from clench.kernels.toi.path_overlap import first_overlap
-
-    count = len(problem.pairs)
-    parts = [slice(start, start + _PAIRS) for start in range(0, count, _PAIRS)]
-    found, out = np.full(len(parts), -1), np.full((len(parts), 2), np.inf)
-
-    def look(n: int) -> None:
-        some = parts[n]
-        found[n] = first_overlap(problem._replace(pairs=problem.pairs[some], allowed=problem.allowed[some]), out[n])
-
-    share_out(look, range(len(parts)), core_count())
-    if not (found >= 0).any():
-        return -1, np.zeros(2)
-    n = int(np.argmin(np.where(found >= 0, out[:, 0], np.inf)))
-    return int(found[n]) + parts[n].start, out[n]
+    return PathOverlap(place, name, body, True, depth, position, from_start), begun > 0.0
 
 
 def _where(
@@ -207,85 +185,41 @@ def _where(
     """Return the name of a body and the place in the palm's frame at which a link is deepest in it [m]."""
     deepest = hand_depths(hand, q, packed, T_palm_object, source, links=[link])
     spot = next((d.place for d in deepest if d.place is not None), None)
-    name = packed.body_names[0] if packed.body_names else "object"
+    name = _body_name(packed)
     if spot is None:
         return name, None
     x, y, z = (T_palm_object @ np.append(spot, 1.0))[:3].tolist()
     return name, (x, y, z)
 
 
-def _corners(path: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return the way-points of a path at which its direction changes, and their numbers."""
-    kept = [0]
-    for k in range(1, len(path) - 1):
-        a, b, c = path[kept[-1]], path[k], path[k + 1]
-        whole = c - a
-        length = float(whole @ whole)
-        share = float((b - a) @ whole) / length if length > 0.0 else -1.0
-        if 0.0 <= share <= 1.0 and np.abs(a + share * whole - b).max() <= STRAIGHT:
-            continue
-        kept.append(k)
-    if len(path) > 1:
-        kept.append(len(path) - 1)
-    return np.ascontiguousarray(path[kept]), np.array(kept, dtype=np.int64)
-
-
-def _place(line: FloatArray, share: float) -> float:
-    """Return the place among way-points on a straight line, (N, J), of a share of the way to the last one."""
-    whole = line[-1] - line[0]
-    if not whole.any():
-        return 0.0
-    shares = (line - line[0]) @ whole / (whole @ whole)
-    k = int(np.searchsorted(shares, share, side="right")) - 1
-    if k >= len(line) - 1:
-        return float(len(line) - 1)
-    return float(k + (share - shares[k]) / (shares[k + 1] - shares[k]))
-
-
 def _problem(
     hand: Hand, path: FloatArray, source: CollisionSource, number: int | None, around: PlacedObject | None
 ) -> PathProblem:
-    from clench.kernels.geometry.bodies import no_body
-    from clench.kernels.geometry.link_meshes import ObjectMesh
-    from clench.kernels.toi.pair_motion import PathProblem
-    from clench.kernels.trees.bvh import build_tree
-
-    links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
-    tables = _tables(hand, source)
+    tables, points = _tables(hand, source), np.ascontiguousarray(path, dtype=np.float64)
     if around is None or number is None:
-        pairs, body, T = tables.between, no_body(), np.eye(4)
-        none = build_tree(np.empty((0, 3)), np.empty((0, 3)))
-        solid = ObjectMesh(none, np.empty(0, dtype=np.uint8), True, np.empty((0, 3)))
-    else:
-        packed, T = around.bodies[number], around.T_palm_object
-        pairs, body, solid = tables.with_object if number else tables.all, packed.bodies, object_mesh(packed)
-    pads = np.array([hand.links[m].pad_indentation if r < 0 else 0.0 for m, r in pairs.tolist()], dtype=np.float64)
-    return PathProblem(
-        frames=hand_frames(hand),
-        links=links,
-        meshes=meshes,
-        mesh=tables.mesh,
-        lineage=tables.lineage,
-        reach=tables.reach,
+        return tables.alone._replace(path=points)
+    packed, (pairs, allowed) = around.bodies[number], tables.with_object if number else tables.all
+    return tables.alone._replace(
         pairs=pairs,
-        allowed=pads,
-        object=body,
-        solid=solid,
-        T_palm_object=np.ascontiguousarray(np.asarray(T, dtype=np.float64)[:3]),
-        path=path,
+        allowed=allowed,
+        object=packed.bodies,
+        solid=object_mesh(packed),
+        T_palm_object=np.ascontiguousarray(around.T_palm_object[:3], dtype=np.float64),
+        path=points,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Tables:
-    """The data of a hand that all its paths share; see `PathProblem`. `between` are the pairs without the object."""
+class _Tables(NamedTuple):
+    """The data of a hand that all its paths share.
 
-    mesh: NDArray[np.int64]
-    lineage: NDArray[np.int64]
-    reach: FloatArray
-    all: NDArray[np.int64]
-    between: NDArray[np.int64]
-    with_object: NDArray[np.int64]
+    Args:
+        alone: without an object, for no path. all: pairs of links and links with the object, (P, 2), and how far each
+            may overlap [m], (P,). with_object: the links with the object alone.
+    """
+
+    alone: PathProblem
+    all: tuple[NDArray[np.int64], FloatArray]
+    with_object: tuple[NDArray[np.int64], FloatArray]
 
 
 def _tables(hand: Hand, source: CollisionSource) -> _Tables:
@@ -293,6 +227,11 @@ def _tables(hand: Hand, source: CollisionSource) -> _Tables:
 
 
 def _make_tables(hand: Hand, source: CollisionSource) -> _Tables:
+    from clench.kernels.geometry.bodies import no_body
+    from clench.kernels.geometry.link_meshes import ObjectMesh
+    from clench.kernels.toi.pair_motion import PathProblem
+    from clench.kernels.trees.bvh import build_tree
+
     links, meshes = link_bodies(hand, source), link_mesh_arrays(hand, source)
     allowed = set(hand.allowed_pairs_for(source))
     count = len(hand.links)
@@ -304,13 +243,26 @@ def _make_tables(hand: Hand, source: CollisionSource) -> _Tables:
             lineage[i] |= lineage[link.parent]
     solid = [i for i in hand.solid_links if links.root[i] >= 0]
     between = [(m, r) for m in solid for r in solid if r < m and (r, m) not in allowed]
-    with_object = [(m, -1) for m in solid]
-    return _Tables(
-        mesh,
-        lineage,
-        _reach(hand, links, lineage),
-        *(np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in ([*between, *with_object], between, with_object)),
+    with_object = np.array([(m, -1) for m in solid], dtype=np.int64).reshape(-1, 2)
+    pairs = np.array(between, dtype=np.int64).reshape(-1, 2)
+    pads, none = np.array([hand.links[m].pad_indentation for m in solid], dtype=np.float64), np.zeros(len(pairs))
+    alone = PathProblem(
+        frames=hand_frames(hand),
+        links=links,
+        meshes=meshes,
+        mesh=mesh,
+        lineage=lineage,
+        reach=_reach(hand, links, lineage),
+        pairs=pairs,
+        allowed=none,
+        object=no_body(),
+        solid=ObjectMesh(
+            build_tree(np.empty((0, 3)), np.empty((0, 3))), np.empty(0, dtype=np.uint8), True, np.empty((0, 3))
+        ),
+        T_palm_object=np.eye(4)[:3],
+        path=np.zeros((1, len(hand.joints))),
     )
+    return _Tables(alone, (np.vstack([pairs, with_object]), np.concatenate([none, pads])), (with_object, pads))
 
 
 def _reach(hand: Hand, bodies: BodyArrays, lineage: NDArray[np.int64]) -> FloatArray:

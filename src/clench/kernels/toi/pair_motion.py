@@ -18,6 +18,7 @@ from clench.kernels.hulls.body_sweep import sweep_body
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import compose, compose_inverse, copy_pose, put_point
 
+from .path_lines import PAIR, PathLines, keep_pair_lines, make_path_lines
 from .toi_work import BodyPair, SweepWork, make_sweep_work
 
 
@@ -54,7 +55,9 @@ class PathWork(NamedTuple):
 
     Args:
         normal: of the plane that parted the pair last, in the frame of the second body; 0 without one, (3,).
-        left: largest relative motion of a pair from each way-point to the end of the path [m], (W,).
+        turning: the joints that move one of a pair, (J,). arms: largest distances of its points from them [m], (J,).
+        lines: ends of the straight lines of the path, and of those that the pair sees, see `path_lines`.
+        left: largest relative motion of the pair from each end of a line to the end of the path [m], (W,).
     """
 
     q: Floats
@@ -62,6 +65,9 @@ class PathWork(NamedTuple):
     scratch: Floats
     placed: Floats
     normal: Floats
+    turning: Ints
+    arms: Floats
+    lines: PathLines
     left: Floats
     sweep: SweepWork
     depth: DepthWork
@@ -76,6 +82,9 @@ def make_path_work(joints: int, links: int, points: int) -> PathWork:
         np.empty((3, 3, 4)),
         np.empty((1, 3)),
         np.zeros(3),
+        np.empty(joints, dtype=np.int64),
+        np.empty(joints),
+        make_path_lines(joints, links, points),
         np.empty(points),
         make_sweep_work(joints + 1, 0),
         make_depth_work(),
@@ -90,36 +99,50 @@ def moves_one(problem: PathProblem, m: int, r: int, link: int) -> bool:
 
 @kernel
 def put_left(problem: PathProblem, m: int, r: int, work: PathWork) -> None:
-    """Write to `work.left` how far the points of a pair can move relative to each other until the end of the path."""
-    path, frames, links = problem.path, problem.frames, problem.frames.joint.shape[0]
-    last = path.shape[0] - 1
-    work.left[last] = 0.0
-    other = r if r >= 0 else frames.palm[0]
+    """Write the lines that a pair sees, and how far its points can move relative to each other until their end."""
+    lines, left, count = work.lines, work.left, put_turning(problem, m, r, work)
+    keep_pair_lines(problem.path, work.turning, count, lines)
+    path, last = lines.path, lines.count[PAIR]
+    left[last] = 0.0
     for n in range(last):
         k, motion = last - 1 - n, 0.0
-        for i in range(links):
-            j = frames.joint[i]
-            if j >= 0 and path[k, j] != path[k + 1, j]:
-                turn = abs(path[k + 1, j] - path[k, j])
-                if moves_one(problem, m, other, i):
-                    motion += turn * problem.reach[m, j]
-                elif moves_one(problem, other, m, i):
-                    # The object is at rest in the palm's frame, where a joint before the palm moves the link.
-                    motion += turn * problem.reach[r if r >= 0 else m, j]
-        work.left[k] = work.left[k + 1] + motion
+        for i in range(count):
+            j = work.turning[i]
+            motion += abs(path[k + 1, j] - path[k, j]) * work.arms[i]
+        left[k] = left[k + 1] + motion
+
+
+@kernel
+def put_turning(problem: PathProblem, m: int, r: int, work: PathWork) -> int:
+    """Write to `work.turning` and `work.arms` the joints that move one of a pair; return how many there are."""
+    frames, count = problem.frames, 0
+    other = r if r >= 0 else frames.palm[0]
+    for i in range(frames.joint.shape[0]):
+        j = frames.joint[i]
+        if moves_one(problem, m, other, i):
+            work.turning[count], work.arms[count] = j, problem.reach[m, j]
+            count += 1
+        elif moves_one(problem, other, m, i):
+            # The object is at rest in the palm's frame, where a joint before the palm moves the link.
+            work.turning[count], work.arms[count] = j, problem.reach[r if r >= 0 else m, j]
+            count += 1
+    return count
 
 
 @kernel
 def place_pair(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> None:
-    """Write the poses of a pair in the palm's frame to `work.sweep`, a share `t` of the way after way-point `k`."""
-    path, frames, palm = problem.path, problem.frames, problem.frames.palm[0]
-    step = 1 if k + 1 < path.shape[0] else 0
-    for j in range(path.shape[1]):
-        work.q[j] = path[k, j] + t * (path[k + step, j] - path[k, j])
+    """Write the poses of a pair in the palm's frame to `work.sweep`, on a share `t` of its line `k`."""
+    path, frames, palm = work.lines.path, problem.frames, problem.frames.palm[0]
+    if t > 0.0:
+        for j in range(path.shape[1]):
+            work.q[j] = path[k, j] + t * (path[k + 1, j] - path[k, j])
     for i in range(frames.parent.shape[0]):
         needed = problem.lineage[m, i] != 0 or problem.lineage[palm, i] != 0
         if needed or (r >= 0 and problem.lineage[r, i] != 0):
-            put_link(frames, i, work.q, work.scratch[0], work.scratch[1], work.poses)
+            if t > 0.0:
+                put_link(frames, i, work.q, work.scratch[0], work.scratch[1], work.poses)
+            else:
+                copy_pose(work.lines.stations[work.lines.kept[PAIR, k], i], work.poses[i])
     compose_inverse(work.poses[palm], work.poses[m], work.sweep.moving)
     if r >= 0:
         compose_inverse(work.poses[palm], work.poses[r], work.sweep.resting)
@@ -156,7 +179,7 @@ def put_chain(
     Returns:
         the number of rows, 0 where neither moves, and the first and the last pivot in the root's frame [m].
     """
-    joint, path, links = problem.frames.joint, problem.path, problem.frames.joint.shape[0]
+    joint, path, links = problem.frames.joint, work.lines.path, problem.frames.joint.shape[0]
     count, first, last = 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for n in range(2 * links):
         back = n < links
@@ -217,4 +240,14 @@ def turned(T: Floats, p: Vector) -> Vector:
         T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2],
         T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2],
         T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2],
+    )
+
+
+@kernel
+def turned_back(T: Floats, p: Vector) -> Vector:
+    """Return a vector in the frame that a pose comes from."""
+    return (
+        T[0, 0] * p[0] + T[1, 0] * p[1] + T[2, 0] * p[2],
+        T[0, 1] * p[0] + T[1, 1] * p[1] + T[2, 1] * p[2],
+        T[0, 2] * p[0] + T[1, 2] * p[1] + T[2, 2] * p[2],
     )

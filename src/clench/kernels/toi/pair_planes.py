@@ -6,6 +6,7 @@ Two bodies that slide along each other touch all the way. A plane between the tw
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
@@ -14,8 +15,14 @@ from clench.kernels.geometry.vectors import Vector, cross, dot, plus, scaled
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 
-from .pair_motion import PathProblem, PathWork, moves_one, target_of, turned
+from .pair_motion import PathProblem, PathWork, moves_one, place_pair, target_of, turned, turned_back
 from .toi_work import put_core
+
+#: The rest of a segment that a plane may prove at once is shortened by this factor, and so many lengths are tried.
+SHORTER: Final = 0.25
+WINDOWS: Final = 3
+#: A way-point, and the share of the way to the next one.
+Place = tuple[int, float]
 
 
 @kernel
@@ -59,7 +66,7 @@ def approach(
     Args:
         m, other: the links. n: in the root's frame. sign: of the direction along `n`.
     """
-    frames, path, links = problem.frames, problem.path, problem.links
+    frames, path, links = problem.frames, work.lines.path, problem.links
     put_point(work.poses[m], links.node[links.root[m]], work.placed[0])
     center = (work.placed[0, 0], work.placed[0, 1], work.placed[0, 2])
     speed, omega, rates, bend = 0.0, (0.0, 0.0, 0.0), 0.0, 0.0
@@ -83,12 +90,12 @@ def approach(
 
 
 @kernel
-def palm_moves(problem: PathProblem, m: int, k: int) -> bool:
+def palm_moves(problem: PathProblem, m: int, k: int, path: Floats) -> bool:
     """Say whether a joint moves the palm, and the object with it, but not a link, on a segment."""
     frames, palm, moves = problem.frames, problem.frames.palm[0], False
     for i in range(frames.joint.shape[0]):
         if moves_one(problem, palm, m, i):
-            moves = moves or problem.path[k, frames.joint[i]] != problem.path[k + 1, frames.joint[i]]
+            moves = moves or path[k, frames.joint[i]] != path[k + 1, frames.joint[i]]
     return moves
 
 
@@ -113,31 +120,104 @@ def keep_direction(n: Vector, work: PathWork) -> None:
 
 
 @kernel
-def parted_share(problem: PathProblem, m: int, r: int, k: int, margin: float, work: PathWork) -> float:
-    """Return for which share of a segment the plane of `work.normal` keeps a pair apart, up to `margin` [m]; 0 without.
+def height_between(problem: PathProblem, m: int, r: int, n: Vector, motion: float, work: PathWork) -> float:
+    """Return how far the first body of a pair lies beyond the second one along a unit vector [m].
 
-    The plane turns with the joints that move both bodies. A gap that begins as `h`, changes at a speed of at least `b`
-    and bends by at most `M` is at least `h + b s - M s² / 2`. `place_pair` has placed the pair.
+    Elements that no relative motion of `motion` [m] can bring to the other body may be left out.
+
+    Args:
+        m, r: the pair, as `place_pair` has placed it. n: in the palm's frame.
     """
     sweep, links, ball = work.sweep, problem.links, problem.links.node[problem.links.root[m]]
-    palm, kept = problem.frames.palm[0], (work.normal[0], work.normal[1], work.normal[2])
-    if dot(kept, kept) == 0.0 or (r < 0 and palm_moves(problem, m, k)):
-        return 0.0
     target, b = target_of(problem, r)
-    n = turned(sweep.resting, kept)
     put_point(sweep.moving, ball, work.placed[0])
     c = (work.placed[0, 0], work.placed[0, 1], work.placed[0, 2])
     below = -highest(links, m, sweep.moving, (-n[0], -n[1], -n[2]), c, ball[3], work)
-    radius = ball[3] + work.left[k] - work.left[k + 1]
-    h = below - highest(target, b, sweep.resting, n, c, radius, work) + margin
+    return float(below - highest(target, b, sweep.resting, n, c, ball[3] + motion, work))
+
+
+@kernel
+def base_of(problem: PathProblem, m: int, r: int) -> int:
+    """Return the last link from which both bodies of a pair hang: the palm for the object."""
+    if r < 0:
+        return int(problem.frames.palm[0])
+    base = 0
+    for i in range(problem.frames.joint.shape[0]):
+        if problem.lineage[m, i] != 0 and problem.lineage[r, i] != 0:
+            base = i
+    return base
+
+
+@kernel
+def stays_above(start: float, end: float, bend: float) -> bool:
+    """Say whether a height that changes from `start` to `end` and bends by at most `bend` is never below 0.
+
+    After a share s of the way it is at least `(1 - s) start + s end - bend s (1 - s) / 2`.
+    """
+    if start < 0.0 or end < 0.0:
+        return False
+    change = abs(end - start)
+    if 2.0 * change >= bend:
+        return True
+    return 0.5 * (start + end) - 0.5 * change * change / bend - 0.125 * bend >= 0.0
+
+
+@kernel
+def parted_window(
+    problem: PathProblem, m: int, r: int, place: Place, n: Vector, h: float, bend: float, margin: float, work: PathWork
+) -> float:
+    """Return for which share of a segment a plane keeps a pair apart, by its heights at both ends of a window.
+
+    Args:
+        m, r: the pair. place: its way-point and share, where `place_pair` leaves it. n: normal of the plane, in the
+            palm's frame. h: height there, with the margin [m]. bend: bound on its acceleration on a whole segment [m].
+        margin: part of the heights [m].
+    """
+    (k, t), base, palm = place, base_of(problem, m, r), problem.frames.palm[0]
+    motion = work.left[k] - work.left[k + 1]
+    local, length, found = turned_back(work.poses[base], turned(work.poses[palm], n)), 1.0 - t, 0.0
+    for _ in range(WINDOWS):
+        place_pair(problem, m, r, k, t + length, work)
+        there = turned_back(work.poses[palm], turned(work.poses[base], local))
+        end = height_between(problem, m, r, there, motion, work) + margin
+        if stays_above(h, end, bend * length * length):
+            found = length
+            break
+        length *= SHORTER
+    place_pair(problem, m, r, k, t, work)
+    return found
+
+
+@kernel
+def parted_share(problem: PathProblem, m: int, r: int, k: int, t: float, margin: float, work: PathWork) -> float:
+    """Return for which share of a segment the plane of `work.normal` keeps a pair apart, up to `margin` [m]; 0 without.
+
+    The plane turns with the joints that move both bodies. A gap that begins as `h`, changes at a speed of at least `b`
+    and bends by at most `M` is at least `h + b s - M s² / 2`. If that is not enough for the rest of the segment, the
+    heights at both ends of a window may be, see `stays_above`. `place_pair` has placed the pair.
+    """
+    palm, kept = problem.frames.palm[0], (work.normal[0], work.normal[1], work.normal[2])
+    if dot(kept, kept) == 0.0 or (r < 0 and palm_moves(problem, m, k, work.lines.path)):
+        return 0.0
+    n = turned(work.sweep.resting, kept)
+    h = height_between(problem, m, r, n, work.left[k] - work.left[k + 1], work) + margin
     if not h > 0.0:
         return 0.0
     # `work.poses` places links in the root's frame, `sweep` in the palm's.
-    n = turned(work.poses[palm], n)
-    speed, bend = approach(problem, m, r if r >= 0 else palm, n, k, 1.0, work)
+    root = turned(work.poses[palm], n)
+    speed, bend = approach(problem, m, r if r >= 0 else palm, root, k, 1.0, work)
     if r >= 0:
-        other, more = approach(problem, r, m, n, k, -1.0, work)
+        other, more = approach(problem, r, m, root, k, -1.0, work)
         speed, bend = speed + other, bend + more
+    share = share_above(h, speed, bend)
+    if share >= 1.0 - t:
+        return share
+    return max(share, parted_window(problem, m, r, (k, t), n, h, bend, margin, work))
+
+
+@kernel
+def share_above(h: float, speed: float, bend: float) -> float:
+    """Return up to which share s, at most 1, `h + speed s - bend s² / 2` is not negative."""
     if bend <= 0.0:
         return 1.0 if h + speed >= 0.0 else -h / speed
     root = math.sqrt(speed * speed + 2.0 * bend * h)

@@ -11,13 +11,24 @@ import math
 from typing import Final
 
 from clench.kernels.closing.layout import Floats
-from clench.kernels.geometry.link_meshes import ObjectMesh, depth_of, mesh_of
+from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, depth_of, has_contained, mesh_of
 from clench.kernels.hulls.near_elements import list_touching
 from clench.kernels.hulls.near_hulls import links_parting
 from clench.kernels.runtime.compiling import entry_kernel, kernel
+from clench.kernels.sections.plane_pose import compose_inverse
 
-from .pair_motion import PathProblem, PathWork, free_share, make_path_work, place_pair, put_left, target_of
+from .pair_motion import (
+    PathProblem,
+    PathWork,
+    free_share,
+    make_path_work,
+    place_pair,
+    put_left,
+    put_turning,
+    target_of,
+)
 from .pair_planes import keep_direction, keep_normal, parted_share
+from .path_lines import PAIR, keep_lines, place_on_path
 from .toi_work import ball_gap, bodies_overlap, body_gap
 
 #: Two bodies may overlap by this much and still count as touching: the tolerance of the proof [m].
@@ -27,7 +38,7 @@ FOUND: Final = 5e-6
 #: The sweep takes a pair up to this gap [m].
 TOUCH: Final = 1e-6
 #: The sweep continues with a pair whose gap has grown to this [m].
-APART: Final = 1e-4
+APART: Final = 2e-5
 #: Bodies that overlapped where the path began are looked at in steps of this motion until they are apart [m].
 EXEMPT_STEP: Final = 2e-4
 #: No pair is looked at more often on one path: bodies that rub against each other all the way are given up.
@@ -45,9 +56,12 @@ def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -
 
     Args:
         was_apart: the pair did not overlap at all where it was looked at last. It has not moved by more than `OVERLAP`
-            beyond a touch since. So no closed body lies in the other one if no elements cross.
+            beyond a touch since. So no closed body lies in the other one if no elements cross. Otherwise a point of
+            each part tells.
     """
     m, r = problem.pairs[p, 0], problem.pairs[p, 1]
+    if balls_gap(problem, m, r, work) >= APART:
+        return APART
     if r >= 0:
         gap, side = links_parting(problem.links, m, r, (0.0, 0.0, 1.0), work.sweep)
         if gap > FOUND:
@@ -61,7 +75,8 @@ def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -
         work.normal[axis] = 0.0
     if work.sweep.pair[0] >= 0:
         keep_normal(problem, r, work)
-    if was_apart and are_closed(problem, m, r) and not cross(problem, p, listed, gap, work):
+    crossing = not are_closed(problem, m, r) or cross(problem, p, listed, gap, work)
+    if not crossing and (was_apart or not holds_part(problem, m, r, work)):
         return gap
     depth = depth_between(problem, m, r, work)
     return -depth if depth > max(0.0, -gap) else gap
@@ -88,26 +103,47 @@ def cross(problem: PathProblem, p: int, listed: int, gap: float, work: PathWork)
 
 
 @kernel
-def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
-    """Return how deep a pair overlaps in its present place [m]; 0 when it is apart."""
-    meshes, k = problem.meshes, problem.mesh[m]
-    limit = 2.0 * meshes.radius[k]
-    if r < 0:
-        return depth_of(meshes, k, work.sweep.moving, problem.solid, work.sweep.resting, limit, work.depth)[0]
-    other = problem.mesh[r]
-    solid = ObjectMesh(
-        mesh_of(meshes, other),
-        meshes.owners[meshes.triangle_first[other] : meshes.triangle_first[other + 1]],
-        meshes.closed[other] != 0,
-        meshes.points[meshes.point_first[other] : meshes.point_first[other + 1]],
-    )
-    return depth_of(meshes, k, work.sweep.moving, solid, work.sweep.resting, limit, work.depth)[0]
+def balls_gap(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
+    """Return the gap between the balls around a pair in its present place [m]."""
+    target, b = target_of(problem, r)
+    return float(ball_gap(problem.links, problem.links.root[m], target, target.root[b], work.sweep))
 
 
 @kernel
-def step_on(left: Floats, k: int, t: float, motion: float) -> tuple[int, float]:
+def solid_link(meshes: LinkMeshArrays, k: int) -> ObjectMesh:
+    """Return the surface of a link as that of an object."""
+    return ObjectMesh(
+        mesh_of(meshes, k),
+        meshes.owners[meshes.triangle_first[k] : meshes.triangle_first[k + 1]],
+        meshes.closed[k] != 0,
+        meshes.points[meshes.point_first[k] : meshes.point_first[k + 1]],
+    )
+
+
+@kernel
+def holds_part(problem: PathProblem, m: int, r: int, work: PathWork) -> bool:
+    """Say whether a part of one body of a pair lies in the other one, in their present place."""
+    meshes, k, T, p = problem.meshes, problem.mesh[m], work.depth.poses[0], work.depth.points[0]
+    compose_inverse(work.sweep.resting, work.sweep.moving, T)
+    if r < 0:
+        return bool(has_contained(meshes, k, T, problem.solid, p))
+    return bool(has_contained(meshes, k, T, solid_link(meshes, problem.mesh[r]), p))
+
+
+@kernel
+def depth_between(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
+    """Return how deep a pair overlaps in its present place [m]; 0 when it is apart."""
+    meshes, k, sweep = problem.meshes, problem.mesh[m], work.sweep
+    limit = 2.0 * meshes.radius[k]
+    if r < 0:
+        return float(depth_of(meshes, k, sweep.moving, problem.solid, sweep.resting, limit, work.depth)[0])
+    other = solid_link(meshes, problem.mesh[r])
+    return float(depth_of(meshes, k, sweep.moving, other, sweep.resting, limit, work.depth)[0])
+
+
+@kernel
+def step_on(left: Floats, last: int, k: int, t: float, motion: float) -> tuple[int, float]:
     """Return the place at which a pair has moved by `motion` [m] since a place; the last way-point at the latest."""
-    last = left.shape[0] - 1
     while k < last:
         own = left[k] - left[k + 1]
         rest = (1.0 - t) * own
@@ -121,14 +157,13 @@ def step_on(left: Floats, k: int, t: float, motion: float) -> tuple[int, float]:
 @kernel
 def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> tuple[int, float]:
     """Return the place at which a pair that is apart touches next; the last way-point where it does not."""
-    target, b = target_of(problem, r)
-    left, last = work.left, work.left.shape[0] - 1
+    left, last = work.left, work.lines.count[PAIR]
     while k < last:
         place_pair(problem, m, r, k, t, work)
-        balls = ball_gap(problem.links, problem.links.root[m], target, target.root[b], work.sweep)
+        balls = balls_gap(problem, m, r, work)
         rest = left[k] - t * (left[k] - left[k + 1])
         if balls > BALLS * rest:
-            k, t = step_on(left, k, t, balls)
+            k, t = step_on(left, last, k, t, balls)
             continue
         share = free_share(problem, m, r, k, t, TOUCH, work)
         if share < 1.0:
@@ -138,41 +173,50 @@ def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: Pat
 
 
 @kernel
-def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tuple[float, float]:
+def pass_plane(
+    problem: PathProblem, m: int, r: int, k: int, t: float, least: float, work: PathWork
+) -> tuple[int, float, bool]:
+    """Return the place up to which the plane of `work.normal` proves a pair, and whether that is `least` [m] on."""
+    share, motion = parted_share(problem, m, r, k, t, OVERLAP, work), work.left[k] - work.left[k + 1]
+    if share >= 1.0 - t:
+        return k + 1, 0.0, True
+    if share * motion >= least:
+        return k, t + share, True
+    return k, t, False
+
+
+@kernel
+def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tuple[float, float, bool]:
     """Return the place at which a pair first overlaps, and the depth there [m]; infinite and 0 without an overlap.
 
-    The depth is not a number where `MOST_LOOKS` are not enough to prove that the pair stays apart.
-
-    A pair that overlaps where the path begins may stay as deep as it was at any look since, until it is apart.
+    Return also whether the pair overlaps where the path begins. Such a pair may stay as deep as it was at any look
+    since, until it is apart. The depth is not a number where `MOST_LOOKS` are not enough to prove that the pair stays
+    apart.
 
     Args:
-        until: later places are of no interest.
+        until: later places on the path are of no interest.
     """
     m, r, pad = problem.pairs[p, 0], problem.pairs[p, 1], problem.allowed[p]
     put_left(problem, m, r, work)
-    left, last, k, t, exempt, looks, gap = work.left, work.left.shape[0] - 1, 0, 0.0, 0.0, 0, -1.0
+    left, last, k, t, exempt, looks, gap, begun = work.left, work.lines.count[PAIR], 0, 0.0, 0.0, 0, -1.0, False
     for axis in range(3):
         work.normal[axis] = 0.0
-    while k + t <= until:
+    while until == math.inf or place_of(problem, m, r, k, t, work) <= until:
         place_pair(problem, m, r, k, t, work)
-        rest = left[k] - t * (left[k] - left[min(k + 1, last)])
+        rest, passed = left[k] - t * (left[k] - left[min(k + 1, last)]), False
         if k < last and exempt == 0.0:
-            share = parted_share(problem, m, r, k, OVERLAP, work)
-            if share >= 1.0 - t:
-                k, t = k + 1, 0.0
-                continue
-            if share * (left[k] - left[k + 1]) >= FOUND:
-                t += share
+            k, t, passed = pass_plane(problem, m, r, k, t, FOUND, work)
+            if passed:
                 continue
         looks += 1
         if looks > MOST_LOOKS:
-            return k + t, math.nan
+            return place_of(problem, m, r, k, t, work), math.nan, begun
         gap = gap_between(problem, p, gap >= 0.0, work)
         depth = -gap - pad
         if k + t == 0.0 and depth > FOUND:
-            exempt = depth
+            exempt, begun = depth, True
         if depth > (exempt + OVERLAP if exempt > 0.0 else FOUND):
-            return k + t, depth + pad
+            return place_of(problem, m, r, k, t, work), depth + pad, begun
         exempt = min(exempt, depth) if depth > FOUND else 0.0
         motion = EXEMPT_STEP if exempt > 0.0 else OVERLAP - depth
         if k == last or (exempt == 0.0 and motion >= rest):
@@ -181,21 +225,34 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
             k, t = next_touch(problem, m, r, k, t, work)
             if k == last:
                 break
-        else:
-            k, t = step_on(left, k, t, motion)
-    return math.inf, 0.0
+            continue
+        if exempt == 0.0:
+            k, t, passed = pass_plane(problem, m, r, k, t, motion, work)
+        if not passed:
+            k, t = step_on(left, last, k, t, motion)
+    return math.inf, 0.0, begun
+
+
+@kernel
+def place_of(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> float:
+    """Return the place on the path of a place on a line of a pair."""
+    return float(place_on_path(problem.path, k, t, work.turning, put_turning(problem, m, r, work), work.lines))
 
 
 @entry_kernel(allocates=True)
 def first_overlap(problem: PathProblem, out: Floats) -> int:
-    """Return the pair that overlaps first on a path, -1 when none does; write place and depth to `out`, (2,).
+    """Return the pair that overlaps first on a path, -1 when none does.
 
-    The place is the number of the way-point before, plus the share of the way to the next one.
+    Write to `out`, (3,), the place and the depth, and how many pairs overlap where the path begins. The place is the
+    number of the way-point before, plus the share of the way to the next one.
     """
     work = make_path_work(problem.path.shape[1], problem.frames.parent.shape[0], problem.path.shape[0])
-    found, until = -1, math.inf
+    found, until, out[2] = -1, math.inf, 0.0
+    keep_lines(problem.path, problem.frames, work.turning, work.lines)
     for p in range(problem.pairs.shape[0]):
-        place, depth = overlap_of(problem, p, until, work)
+        place, depth, begun = overlap_of(problem, p, until, work)
+        if begun:
+            out[2] += 1.0
         if place < until:
             found, until = p, place
             out[0], out[1] = place, depth
