@@ -205,8 +205,21 @@ def _facets(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _hull(points: FloatArray) -> ConvexHull:
+    """Return the hull of points, in triangulated facets.
+
+    Qhull takes twice as long if it looks out for rounding. Without, it may leave points outside. Facets that close a
+    surface and have all points on their inner side are those of the hull.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
+    try:
+        hull = ConvexHull(points, qhull_options="Qt Q0")
+        equations = hull.equations
+        beyond = (equations[:, :-1] @ points.T).max(axis=1) + equations[:, -1]
+        if beyond.max() <= _ROUNDING * float(np.abs(points).max()):
+            return hull
+    except QhullError:
+        pass
     try:
         return ConvexHull(points, qhull_options="Qt Qx")
     except QhullError:

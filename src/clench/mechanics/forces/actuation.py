@@ -21,7 +21,7 @@ from clench.core.showing.short_repr import short_repr
 from clench.mechanics.grasp.held import HeldObject
 from clench.mechanics.grasp.loads import check_loads
 
-from .programs import ConeProgram, balanced, demand_cones, demand_limits, demand_tensions
+from .programs import ConeProgram, balanced, demand_cones, demand_limits, demand_tensions, hardest_changes
 
 #: Largest normal force that is considered, as a multiple of the load [-].
 MOST_FORCE: Final = 1e3
@@ -185,25 +185,32 @@ class HoldingProgram:
             self.cone.at_most(sign * self.torques / self.arm - worst, np.zeros(len(self.torques)))
 
     def demand_forces(
-        self, extra: FloatArray | None = None, change: FloatArray | None = None, by: FloatArray | None = None
+        self, ends: FloatArray | None = None, changes: FloatArray | None = None, by: FloatArray | None = None
     ) -> None:
-        """Demand cones and torque limits for the forces in M cases; without arguments, for the forces alone.
+        """Demand cones and torque limits for the forces at every end, and under every change; else for them alone.
 
         Args:
-            extra: constant forces that are added, shape (M, C * width).
-            change: forces that are added for every unit of an unknown, shape (M, C * width).
-            by: the row that gives this unknown, shape (size,).
+            ends: constant forces that are added, shape (E, C * width).
+            changes: forces that are added for every unit of an unknown, besides none, shape (N, C * width).
+            by: the row that gives this unknown, which is not negative, shape (size,).
         """
-        held = self.held
-        constant = np.zeros((1, len(self.forces))) if extra is None else extra
-        forces, torques = self.forces[None], (self.torques / self.arm)[None]
-        J = held.jacobian / self.arm
-        if change is not None and by is not None:
-            forces = forces + change[:, :, None] * by
-            torques = torques + (change @ J)[:, :, None] * by
-        demand_cones(self.cone, held.contacts, forces, constant)
+        held, nothing = self.held, np.zeros((1, len(self.forces)))
+        constant = nothing if ends is None else ends
+        each = nothing if changes is None else np.vstack([nothing, changes])
+        along = np.zeros(self.cone.size) if by is None else by
+        demand_cones(
+            self.cone,
+            held.contacts,
+            np.tile(self.forces + each[:, :, None] * along, (len(constant), 1, 1)),
+            np.repeat(constant, len(each), axis=0),
+            np.tile(hardest_changes(held.contacts, each), (len(constant), 1)),
+        )
+        J, torques = held.jacobian / self.arm, self.torques / self.arm
         limits = held.dofs.limits / (self.unit * self.arm)
-        demand_limits(self.cone, np.broadcast_to(torques, (len(constant), *torques.shape[1:])), limits, constant @ J)
+        for sign in (1.0, -1.0):
+            # The change that adds most to a torque decides.
+            most = (sign * each @ J).max(axis=0)
+            demand_limits(self.cone, sign * torques + most[:, None] * along, limits, sign * constant @ J)
 
     def solve(self) -> tuple[HoldingForces, FloatArray] | None:
         """Return the forces, balanced to rounding, and all unknowns; None when nothing satisfies the demands."""

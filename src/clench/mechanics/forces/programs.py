@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.core.pose import FloatArray
 from clench.mechanics.grasp.contacts import ContactSet
@@ -87,38 +88,63 @@ class ConeProgram:
         return None
 
 
-def demand_cones(program: ConeProgram, contacts: ContactSet, forces: FloatArray, extra: FloatArray) -> None:
+def demand_cones(
+    program: ConeProgram, contacts: ContactSet, forces: FloatArray, extra: FloatArray, needed: NDArray[np.bool_]
+) -> None:
     """Demand that contact forces lie inside their friction cones, in M cases.
 
     Args:
         program: to add to. contacts: C of them.
         forces: rows that give all force components from the unknowns, shape (1 or M, C * width, size).
-        extra: added to them, shape (M, C * width).
+        extra: added to them, shape (M, C * width). needed: which contacts matter in which case, shape (M, C).
     """
     width, cases = contacts.width, (len(extra), len(contacts), contacts.width)
-    scale = np.ones((len(contacts), width))
-    scale[:, :2] = 1.0 / contacts.reach[:, :2]
-    scale[:, 3:] = 1.0 / contacts.reach[:, 2:]
-    scale[:, 2] = 1.0 - _INSIDE
+    scale = _cone_scale(contacts)
     order = [2, 0, 1, 3][:width]
-    rows = (forces.reshape(len(forces), *cases[1:], -1) * scale[:, :, None])[:, :, order]
-    values = (extra.reshape(cases) * scale)[:, :, order]
-    rows = np.broadcast_to(rows, (*cases, rows.shape[-1]))
+    rows = np.broadcast_to(forces.reshape(len(forces), *cases[1:], -1), (*cases, program.size))[needed]
+    scales = np.broadcast_to(scale, cases)[needed]
+    rows = (rows * scales[:, :, None])[:, order]
+    values = (extra.reshape(cases)[needed] * scales)[:, order]
     program.inside_cones(rows.reshape(-1, program.size), values.reshape(-1), width)
 
 
-def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, extra: FloatArray) -> None:
-    """Demand `|rows x + extra| <= limits`, a little inside, in M cases.
+def hardest_changes(contacts: ContactSet, changes: FloatArray) -> NDArray[np.bool_]:
+    """Return which changes of the forces may take a contact out of its cone first, shape (N, C).
+
+    Where a change differs from another one by a force inside the cone, forces that survive the other one survive it.
 
     Args:
-        program: to add to. rows: shape (M, D, size). limits: shape (D,). extra: shape (M, D).
+        contacts: C of them. changes: shape (N, C * width).
+    """
+    count = len(changes)
+    each = (changes.reshape(count, len(contacts), contacts.width) * _cone_scale(contacts)).transpose(1, 0, 2)
+    between = each[:, :, None] - each[:, None]  # of a change (second axis) from another one (third axis)
+    leaning = np.concatenate([between[..., :2], between[..., 3:]], axis=-1)
+    easier = between[..., 2] >= np.sqrt((leaning * leaning).sum(axis=-1))
+    # Of changes that are equal, the first one counts.
+    easier &= ~easier.transpose(0, 2, 1) | (np.arange(count)[:, None] > np.arange(count))
+    return np.asarray(~easier.any(axis=2).T)
+
+
+def _cone_scale(contacts: ContactSet) -> FloatArray:
+    """Return factors of the forces that make the cones, a little narrowed, round and of half angle 45°, (C, width)."""
+    scale = np.ones((len(contacts), contacts.width))
+    scale[:, :2] = 1.0 / contacts.reach[:, :2]
+    scale[:, 3:] = 1.0 / contacts.reach[:, 2:]
+    scale[:, 2] = 1.0 - _INSIDE
+    return scale
+
+
+def demand_limits(program: ConeProgram, rows: FloatArray, limits: FloatArray, extra: FloatArray) -> None:
+    """Demand `rows x + extra <= limits`, a little inside, in M cases.
+
+    Args:
+        program: to add to. rows: shape (D, size). limits: shape (D,). extra: shape (M, D).
     """
     # Contacts do not load the other joints.
-    loaded = (rows != 0.0).any(axis=(0, 2)) | (extra != 0.0).any(axis=0)
-    inner = np.broadcast_to(limits[loaded] * (1.0 - _INSIDE), (len(rows), int(loaded.sum()))).reshape(-1)
-    used, constant = rows[:, loaded].reshape(-1, program.size), extra[:, loaded].reshape(-1)
-    program.at_most(used, inner - constant)
-    program.at_most(-used, inner + constant)
+    loaded = (rows != 0.0).any(axis=1) | (extra != 0.0).any(axis=0)
+    inner = limits[loaded] * (1.0 - _INSIDE) - extra[:, loaded]
+    program.at_most(np.tile(rows[loaded], (len(extra), 1)), inner.reshape(-1))
 
 
 def demand_tensions(program: ConeProgram, torques: FloatArray, drive: TendonDrive, first: int) -> FloatArray:

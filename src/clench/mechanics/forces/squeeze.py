@@ -123,9 +123,7 @@ def squeeze_forces(
     ends = np.zeros((1, len(change))) if spread is None else np.outer([1.0, -1.0], K @ check_loads(spread)[0])
     task = SqueezeTask(held, nominal, unit, ends, change.T[~lost], enough, most_force)
     careful = _with_friction(task, reserve)
-    # Most grasps that hold nothing do not even hold the load itself, which a small program tells.
-    held_at_all = not nominal.any() or least_effort(held, nominal) is not None
-    found, counted = _squeeze_of(task, careful, needed) if held_at_all else (None, task)
+    found, counted = _squeeze_of(task, careful, needed)
     if found is None:
         reason = once(lambda: why_not(held, nominal))
         return SqueezeForces.with_late(
@@ -154,6 +152,9 @@ def _squeeze_of(
     found = _least_torque(careful, careful.enough * (1.0 if needed else 1.0 - _GIVEN_UP))
     if found is not None:
         return found, careful
+    # Most grasps that hold nothing do not even hold the load itself, which a small program tells.
+    if task.load.any() and least_effort(task.held, task.load) is None:
+        return None, task
     if needed == 0.0:
         for each in (careful, task):
             best = _largest_margin(each)
@@ -213,10 +214,7 @@ def _least_torque(task: SqueezeTask, margin: float) -> tuple[HoldingForces, floa
 
 def _demand(program: HoldingProgram, task: SqueezeTask, spread: FloatArray) -> None:
     program.cone.at_most(program.normals.sum(axis=0)[None], np.array([task.most_force / task.unit]))
-    nothing = np.zeros((1, task.changes.shape[1]))
-    changes = np.tile(np.vstack([nothing, task.changes / task.unit]), (len(task.ends), 1))
-    ends = np.repeat(task.ends / task.unit, 1 + len(task.changes), axis=0)
-    program.demand_forces(ends, changes, spread)
+    program.demand_forces(task.ends / task.unit, task.changes / task.unit, spread)
 
 
 def _answers(held: HeldObject) -> FloatArray:
