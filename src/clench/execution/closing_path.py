@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -26,20 +27,24 @@ def closing_path(
     at which a joint starts or stops is a way-point; between two of them the path is a straight line.
     """
     away = end - start
-    closing = np.array([j.direction for j in hand.joints], dtype=np.float64)
+    closing = hand.kept(("closing directions",), lambda: np.array([float(j.direction) for j in hand.joints]))
     rate = np.where(np.abs(away) > STILL, np.sign(away), closing) * speed
     free = start.copy()
     for c in hand.couplings:
         rate[c.follower] = c.ratio * rate[c.leader]
         free[c.follower] = c.ratio * start[c.leader] + c.offset
-    moves = np.isin(np.arange(len(start)), joints) & (away != 0.0) & (rate != 0.0)
+    moves = np.zeros(len(start), dtype=np.bool_)
+    moves[list(joints)] = True
+    moves &= (away != 0.0) & (rate != 0.0)
     events = np.array([start - free, end - free])[:, moves] / rate[moves]
     last = float(events.max(initial=0.0))
     if last <= 0.0:
         return start[None].copy()
-    s = np.linspace(0.0, 1.0, steps + 1)
-    places = distinct(np.concatenate([np.clip(events.ravel(), 0.0, last), last * s * s * (3.0 - 2.0 * s)]))
-    between = np.clip(free + places[:, None] * rate, np.minimum(start, end), np.maximum(start, end))
+    s = _shares(steps)
+    inside = np.minimum(np.maximum(events.ravel(), 0.0), last)
+    places = distinct(np.concatenate([inside, last * s * s * (3.0 - 2.0 * s)]))
+    between = np.maximum(free + places[:, None] * rate, np.minimum(start, end))
+    between = np.minimum(between, np.maximum(start, end))
     path: FloatArray = np.where(moves, between, start)
     path[0], path[-1] = start, np.where(moves, end, start)
     return path
@@ -47,6 +52,16 @@ def closing_path(
 
 def distinct(values: FloatArray) -> FloatArray:
     """Return values in order, from 0 on; of values that differ by rounding alone, the first."""
-    ordered = np.unique(values)
-    distinct: FloatArray = ordered[np.diff(ordered, prepend=-np.inf) > ROUNDING * ordered[-1]]
+    ordered = np.sort(values)
+    later = np.ones(len(ordered), dtype=np.bool_)
+    later[1:] = ordered[1:] - ordered[:-1] > ROUNDING * ordered[-1]
+    distinct: FloatArray = ordered[later]
     return distinct
+
+
+@lru_cache(maxsize=8)
+def _shares(steps: int) -> FloatArray:
+    """Return evenly spaced shares from 0 to 1, shape (steps + 1,)."""
+    shares = np.linspace(0.0, 1.0, steps + 1)
+    shares.flags.writeable = False
+    return shares

@@ -54,7 +54,8 @@ class Landing:
         contacts = [c for c in solution.contacts if not c.passed]
         links = [hand.link_index(c.link) for c in contacts]
         rows = _normal_rows(solution, hand, contacts, self._q, self._dofs)
-        self._rows = [rows[np.isin(links, finger.links)] for finger in hand.fingers]
+        of_finger = [[k for k, link in enumerate(links) if link in finger.links] for finger in hand.fingers]
+        self._rows = [rows[np.array(own, dtype=np.intp)] for own in of_finger]
 
     def start(self, clearance: float, resting: Collection[int] = ()) -> FloatArray | None:
         """Return the posture where the line starts [rad], shape (J,).
@@ -119,15 +120,15 @@ def _room(
     hand: Hand, q: FloatArray, dofs: DegreesOfFreedom, used: list[int], clearance: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the lowest and highest rates that keep all joints inside their limits [rad/m], each shape (D,)."""
-    low, high = [], []
-    for d in used:
-        moved = np.flatnonzero(dofs.motion[:, d])
-        share = dofs.motion[moved, d] * clearance
-        ends = np.array([[hand.joints[j].lower - q[j], hand.joints[j].upper - q[j]] for j in moved]) / share[:, None]
-        most = _FARTHEST / float(np.abs(share).max())
-        low.append(min(0.0, max(-most, float(ends.min(axis=1).max()))))
-        high.append(max(0.0, min(most, float(ends.max(axis=1).min()))))
-    return np.array(low), np.array(high)
+    low, high = np.zeros(len(used)), np.zeros(len(used))
+    for k, d in enumerate(used):
+        most, down, up = np.inf, -np.inf, np.inf
+        for j in np.flatnonzero(dofs.motion[:, d]).tolist():
+            share, joint = float(dofs.motion[j, d]) * clearance, hand.joints[j]
+            ends = float(joint.lower - q[j]) / share, float(joint.upper - q[j]) / share
+            most, down, up = min(most, _FARTHEST / abs(share)), max(down, min(ends)), min(up, max(ends))
+        low[k], high[k] = min(0.0, max(-most, down)), max(0.0, min(most, up))
+    return low, high
 
 
 def _even_rates(rows: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:

@@ -192,9 +192,15 @@ def contact_frames(normals: FloatArray) -> FloatArray:
     The first tangent is perpendicular to the coordinate axis that is farthest from the normal.
     """
     far = np.eye(3)[np.abs(normals).argmin(axis=1)] if len(normals) else np.empty((0, 3))
-    first = np.cross(far, normals)
+    first = _cross(far, normals)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(normals, first), normals], axis=2)
+    return np.stack([first, _cross(normals, first), normals], axis=2)
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the cross products of rows; for small arrays, `np.cross` takes ten times as long."""
+    product: FloatArray = a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    return product
 
 
 @lru_cache(maxsize=32)

@@ -73,11 +73,10 @@ def hand_jacobian(hand: Hand, q: FloatArray, contacts: ContactSet, dofs: Degrees
     """
     if contacts.links is None or not len(contacts):
         return np.zeros((len(contacts) * contacts.width, len(dofs.joints)))
-    joints, carriers, moved = hand.kept(("contact joints",), lambda: _moved_by(hand))
+    joints, carriers, moved, lines = hand.kept(("contact joints",), lambda: _moved_by(hand))
     poses = hand.link_poses(q)[carriers]
-    axes = np.einsum("jab,jb->ja", poses[:, :3, :3], np.array([hand.joints[j].axis for j in joints]))
-    anchors = np.array([hand.joints[j].anchor for j in joints])
-    anchors = np.einsum("jab,jb->ja", poses[:, :3, :3], anchors) + poses[:, :3, 3]
+    axes = np.einsum("jab,jb->ja", poses[:, :3, :3], lines[0])
+    anchors = np.einsum("jab,jb->ja", poses[:, :3, :3], lines[1]) + poses[:, :3, 3]
     arms = contacts.positions[:, None] - anchors
     # For small arrays, `np.cross` takes ten times as long.
     speed = axes[:, [1, 2, 0]] * arms[..., [2, 0, 1]] - axes[:, [2, 0, 1]] * arms[..., [1, 2, 0]]
@@ -90,18 +89,21 @@ def hand_jacobian(hand: Hand, q: FloatArray, contacts: ContactSet, dofs: Degrees
     return result
 
 
-def _moved_by(hand: Hand) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _moved_by(hand: Hand) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray]:
     """Return the joints that move links relative to the palm, the links that they carry, and which links each moves.
 
     Returns:
-        joints and their links, shape (K,) each, and 1 for every link (row) that a joint moves, else 0, shape (L, K).
+        joints and their links, shape (K,) each; 1 for every link (row) that a joint moves, else 0, shape (L, K); and
+        axes and anchors of the joints in the frames of their links, shape (2, K, 3).
     """
     upstream = _ancestors(hand, hand.palm)
     carriers = [i for i, link in enumerate(hand.links) if link.joint >= 0 and i not in upstream]
     above = [_ancestors(hand, i) for i in range(len(hand.links))]
     moved = np.array([[1.0 if k in mine else 0.0 for k in carriers] for mine in above])
     joints = np.array([hand.links[k].joint for k in carriers], dtype=np.int64)
-    return joints, np.array(carriers, dtype=np.int64), moved.reshape(len(hand.links), len(carriers))
+    lines = np.array([[hand.joints[j].axis for j in joints], [hand.joints[j].anchor for j in joints]])
+    moved = moved.reshape(len(hand.links), len(carriers))
+    return joints, np.array(carriers, dtype=np.int64), moved, lines.reshape(2, len(carriers), 3)
 
 
 def _ancestors(hand: Hand, link: int) -> set[int]:
