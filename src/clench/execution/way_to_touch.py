@@ -103,6 +103,9 @@ class WayFinder:
         self.around = None if obj is None else placed_object(solution, obj)
         self.start = posture(solution.open_angles, hand, "open_angles")
         self.end = posture(solution.joint_angles, hand, "joint_angles")
+        #: What overlapped on paths that were tried, on the way and from the touch back.
+        self._met: list[PathOverlap] = []
+        self._lifted_met: list[PathOverlap] = []
 
     def find(self, clearance: float) -> Way:
         """Return the first free path; without one, the first tried path with its overlap.
@@ -150,10 +153,10 @@ class WayFinder:
         goal = self._landings.start(clearance)
         if goal is None:
             return None
-        overlap, begun = check_path(self.hand, self._lifted(goal), self.source, self.around)
+        overlap, begun = check_path(self.hand, self._lifted(goal), self.source, self.around, self._lifted_met)
         if overlap is None:
             return goal, not begun
-        suspects = [overlap]
+        suspects = self._lifted_met = [overlap]
         for j in (j for f in self._fingers_of(overlap) for j in self.hand.fingers[f].joints):
             goal = self._landings.start(clearance, (j,))
             if goal is not None and is_path_free(self.hand, self._lifted(goal), self.source, self.around, suspects):
@@ -233,7 +236,9 @@ class WayFinder:
             checked = checked if last.proven else positions
             # Without a contact, there is nothing to keep a clearance from.
             pregrasp = pregrasp if pregrasp < len(times) - 1 else None
-        overlap = self.overlap(checked)
+        overlap = check_path(self.hand, checked, self.source, self.around, self._met)[0]
+        if overlap is not None:
+            self._met.append(overlap)
         names = [f.name for f in self.hand.fingers]
         moved = [bool((self.start[f.own] != goal[f.own]).any()) for f in self.hand.fingers]
         turns = (

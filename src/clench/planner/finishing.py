@@ -16,7 +16,6 @@ from clench.mechanics.grasp.contacts import ContactModel
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
-from clench.solver.analysis.holding import hold
 from clench.solver.analysis.squeezing import SqueezePlan, plan_squeeze
 from clench.solver.solution import GraspSolution
 from clench.solver.solve import solve
@@ -74,7 +73,7 @@ class Finisher:
                 return None
             row = trajectory.positions[trajectory.pregrasp if trajectory.pregrasp is not None else 0]
             pregrasp = dict(zip(self.hand.joint_names, row.tolist(), strict=True))
-        held = hold(solution, self.hand, self.obj, friction=self.asked.friction, **self._model).held
+        held = squeeze.grasp.held
         friction: FloatArray = held.contacts.friction
         found = [epsilon(held.with_friction(share * friction)).radius for share in FRICTION_SHARES]
         score = float(np.mean(found))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -103,16 +104,28 @@ def find_path_overlap(
 
 
 def check_path(
-    hand: Hand, path: FloatArray, source: CollisionSource, around: PlacedObject | None = None
+    hand: Hand,
+    path: FloatArray,
+    source: CollisionSource,
+    around: PlacedObject | None = None,
+    suspects: Sequence[PathOverlap] = (),
 ) -> tuple[PathOverlap | None, bool]:
     """Return what `find_path_overlap` returns, and whether any pair overlaps where the path begins.
 
     A path that is free, and on which no pair overlaps where it begins, is free in the other direction, too.
+
+    Args:
+        hand, path, source, around: see there.
+        suspects: overlaps on similar paths. Their pairs are checked first: what comes later is of no interest.
     """
     found, begun = list[PathOverlap](), False
     # Body by body: a link that is in one of them where the path begins must still stay out of the others.
     for number in range(len(around.bodies)) if around is not None else (None,):
-        overlap, overlaps = _first(hand, _problem(hand, path, source, number, around), source, number, around)
+        problem = _problem(hand, path, source, number, around)
+        if suspects:
+            order = np.argsort(~_are_suspect(hand, problem, number, around, suspects), kind="stable")
+            problem = problem._replace(pairs=problem.pairs[order], allowed=problem.allowed[order])
+        overlap, overlaps = _first(hand, problem, source, number, around)
         begun = begun or overlaps
         if overlap is not None:
             found.append(overlap)
@@ -124,23 +137,15 @@ def is_path_free(
 ) -> bool:
     """Say whether `find_path_overlap` finds nothing on a path.
 
-    Pairs that overlapped on similar paths are checked first, because they probably overlap again.
-
     Args:
-        hand, path, source, around: see there. suspects: overlaps of such pairs; another one that is found is added.
+        hand, path, source, around: see there. suspects: overlaps on similar paths. Their pairs are checked first,
+            because one that overlaps is enough. An overlap of another pair that is found is added.
     """
     from clench.kernels.toi.path_overlap import first_overlap
 
     for number in range(len(around.bodies)) if around is not None else (None,):
         problem = _problem(hand, path, source, number, around)
-        name = None if around is None or number is None else _body_name(around.bodies[number])
-        asked = np.zeros(len(problem.pairs), dtype=np.bool_)
-        for met in suspects:
-            if not met.with_object:
-                one, other = hand.link_index(met.link), hand.link_index(met.other)
-                asked |= (problem.pairs == [one, other]).all(axis=1)
-            elif met.other == name:
-                asked |= (problem.pairs == [hand.link_index(met.link), -1]).all(axis=1)
+        asked = _are_suspect(hand, problem, number, around, suspects)
         some = problem._replace(pairs=problem.pairs[asked], allowed=problem.allowed[asked])
         if asked.any() and first_overlap(some, np.empty(3)) >= 0:
             return False
@@ -148,6 +153,23 @@ def is_path_free(
     if found is not None:
         suspects.append(found)
     return found is None
+
+
+def _are_suspect(
+    hand: Hand,
+    problem: PathProblem,
+    number: int | None,
+    around: PlacedObject | None,
+    suspects: Sequence[PathOverlap],
+) -> NDArray[np.bool_]:
+    """Say which pairs overlapped on similar paths, shape (P,)."""
+    name = None if around is None or number is None else _body_name(around.bodies[number])
+    asked = np.zeros(len(problem.pairs), dtype=np.bool_)
+    for met in suspects:
+        if not met.with_object or met.other == name:
+            other = -1 if met.with_object else hand.link_index(met.other)
+            asked |= (problem.pairs == [hand.link_index(met.link), other]).all(axis=1)
+    return asked
 
 
 def _body_name(packed: PackedObject) -> str:

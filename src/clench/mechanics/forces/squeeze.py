@@ -8,7 +8,7 @@ enough, torques are minimised. A load that is known only as `load ± spread` mus
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -30,6 +30,10 @@ from .joint_friction import loss_of_torques, pressed_harder
 _GIVEN_UP: Final = 1e-6
 #: Disturbances of which more than this part cannot be exerted by any contact forces count as not resisted [-].
 _UNRESISTED: Final = 1e-9
+#: Edges of the polyhedra around the friction cones by which loads are refused [-].
+_EDGES: Final = 8
+#: Part of a load that may be missing in a balance of forces [-].
+_UNBALANCED: Final = 1e-8
 #: Weight of the sum of normal forces beside the worst torque: no finger presses without need [-].
 _TOTAL_FORCE: Final = 0.02
 
@@ -123,7 +127,7 @@ def squeeze_forces(
     ends = np.zeros((1, len(change))) if spread is None else np.outer([1.0, -1.0], K @ check_loads(spread)[0])
     task = SqueezeTask(held, nominal, unit, ends, change.T[~lost], enough, most_force)
     careful = _with_friction(task, reserve)
-    found, counted = _squeeze_of(task, careful, needed)
+    found, counted = _squeeze_of(task, careful, needed) if _may_be_held(held, nominal) else (None, task)
     if found is None:
         reason = once(lambda: why_not(held, nominal))
         return SqueezeForces.with_late(
@@ -134,6 +138,24 @@ def squeeze_forces(
     )
     used = reserve if counted is careful else 1.0
     return SqueezeForces(plan, found[1], unresisted, "", used, loss_of_torques(held, plan))
+
+
+def _may_be_held(held: HeldObject, load: FloatArray) -> bool:
+    """Say whether polyhedra around the friction cones hold a load, limits left aside; a linear program tells."""
+    from clench.kernels.mechanics.least_cost import least_cost
+
+    if not load.any():
+        return True
+    contacts, wider = held.contacts, 1.0 / np.cos(np.pi / _EDGES)
+    torsion = contacts.torsion
+    if torsion is not None:
+        # The hull of a circle and two points around an ellipsoid.
+        wider, torsion = np.sqrt(2.0) * wider, np.sqrt(2.0) * torsion
+    around = replace(held, contacts=replace(contacts, friction=wider * contacts.friction, torsion=torsion))
+    edges = around.edge_wrenches(_EDGES).reshape(-1, 6).T
+    wanted = -load / np.linalg.norm(load)
+    rows, most = np.vstack([edges, -edges]), np.concatenate([wanted, -wanted]) + _UNBALANCED
+    return bool(least_cost(rows, most, np.ones(rows.shape[1]), np.empty(rows.shape[1])))
 
 
 def _with_friction(task: SqueezeTask, reserve: float) -> SqueezeTask:
@@ -152,15 +174,16 @@ def _squeeze_of(
     found = _least_torque(careful, careful.enough * (1.0 if needed else 1.0 - _GIVEN_UP))
     if found is not None:
         return found, careful
+    if needed == 0.0:
+        best = _largest_margin(careful)
+        if best is not None:
+            return _gentle(careful, best), careful
     # Most grasps that hold nothing do not even hold the load itself, which a small program tells.
     if task.load.any() and least_effort(task.held, task.load) is None:
         return None, task
     if needed == 0.0:
-        for each in (careful, task):
-            best = _largest_margin(each)
-            if best is not None:
-                return _gentle(each, best), each
-        return None, task
+        best = None if careful is task else _largest_margin(task)
+        return None if best is None else _gentle(task, best), task
     # For the others, only loads that full friction can hold are feasible.
     best = _largest_margin(task)
     if best is None:
