@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import clench
 from chain_hands import HandBuilder, along_x, mount, turned
-from clench.closing.collision.path_check import find_path_overlap, place_object
+from clench.closing.collision.path_check import check_path, find_path_overlap, is_path_free, place_object
 from clench.core.pose import FloatArray, Pose
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes, overlap_depth
+from clench.models.objects.grasp_object import Body, BodyRole
 from clench.models.shapes import CollisionSource, Shape, ShapeKind
 
 SOURCE = CollisionSource.ENGINE
@@ -72,6 +75,7 @@ def along(path: FloatArray, place: float) -> FloatArray:
 @pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
 @settings(max_examples=40, deadline=None)
 @given(points=st.lists(angles, min_size=2, max_size=4))
+@example(points=[[0.0, 0.0, -1.0, 0.0], [-1.0, 0.0, 0.0, 0.0]])  # edges cross, and are farther apart than they are deep
 def test_a_free_path_has_no_overlap_and_the_first_one_is_found(box: bool, points: list[list[float]]) -> None:
     hand, path = two_chains(box), np.array(points)
     depth = box_depth if box else capsule_depth
@@ -168,3 +172,82 @@ def test_links_that_rub_against_each_other_for_long_end_the_proof() -> None:
     assert np.isnan(found.depth)
     assert 0.0 < found.place < 1.0
     assert "cannot be proven that they stay apart" in found.sentence
+
+
+def crowded() -> clench.GraspObject:
+    """Return a box beside a finger, and a needle in its way."""
+    box = clench.GraspObject.from_shape(Shape(ShapeKind.BOX, (0.01, 0.01, 0.01), Pose([0.05, 0.0, 0.03])), name="box")
+    needle = Shape(ShapeKind.BOX, (5e-5, 0.1, 5e-5), Pose([0.03, 0.0, -0.02]))
+    return replace(box, bodies=(*box.bodies, Body("needle", (needle,), BodyRole.OBSTACLE)))
+
+
+@pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
+@pytest.mark.parametrize("with_object", [False, True], ids=["alone", "object"])
+def test_a_path_is_free_where_no_overlap_is_found_whatever_is_suspected(box: bool, with_object: bool) -> None:
+    hand, rng = two_chains(box), np.random.default_rng(7)
+    around = place_object(crowded(), np.eye(4)) if with_object else None
+    paths = [rng.uniform(-0.6, 0.6, (3, len(hand.joints))) for _ in range(40)]
+    found = [find_path_overlap(hand, path, SOURCE, around) for path in paths]
+    assert any(found)
+    assert not all(found)
+    suspects = [overlap for overlap in found[:5] if overlap is not None]
+    for path, overlap in zip(paths, found, strict=True):
+        known = list(suspects)
+        assert is_path_free(hand, path, SOURCE, around, known) == (overlap is None)
+        # A suspect that overlaps is known; another one is added.
+        assert known in (suspects, [*suspects, overlap])
+        assert is_path_free(hand, path, SOURCE, around, []) == (overlap is None)
+        assert check_path(hand, path, SOURCE, around, suspects)[0] == overlap
+        assert check_path(hand, path, SOURCE, around)[0] == overlap
+
+
+@pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
+def test_a_free_path_that_begins_without_an_overlap_is_free_backwards(box: bool) -> None:
+    hand, rng, free = two_chains(box), np.random.default_rng(11), 0
+    around = place_object(crowded(), np.eye(4))
+    for path in rng.uniform(-0.6, 0.6, (60, 2, len(hand.joints))):
+        overlap, begun = check_path(hand, path, SOURCE, around)
+        if overlap is None and not begun:
+            free += 1
+            assert find_path_overlap(hand, path[::-1], SOURCE, around) is None
+    assert free > 5
+
+
+def test_an_overlap_where_the_path_begins_is_told() -> None:
+    builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH])
+    leaning = mount((0.0, 2.5 * RADIUS, 0.0), turned(Z, -np.arcsin(RADIUS / LENGTH)))
+    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=leaning, axes=[-Z]).hand()
+    assert check_path(hand, np.array([[0.0, 0.0], [0.0, -0.5]]), SOURCE) == (None, True)
+    assert check_path(hand, np.array([[0.0, -0.5], [0.0, -0.6]]), SOURCE) == (None, False)
+    # Backwards, the links would meet.
+    assert find_path_overlap(hand, np.array([[0.0, -0.5], [0.0, 0.0]]), SOURCE) is not None
+
+
+def test_joints_that_move_neither_body_change_no_place() -> None:
+    """A finger goes straight to a box, another one far away goes there and back: way-points of its own."""
+    builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH], lower=-2.0)
+    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=mount((0.0, 0.5, 0.0)), lower=-2.0).hand()
+    around = place_object(crowded(), np.eye(4))
+    straight = np.array([[0.0, 0.0], [1.5, 0.0]])
+    shares = np.array([0.0, 0.1, 0.35, 0.5, 0.8, 1.0])
+    busy = np.stack([1.5 * shares, [0.0, 0.3, -0.2, 0.4, 0.1, 0.0]], axis=1)
+    one, other = (find_path_overlap(hand, path, SOURCE, around) for path in (straight, busy))
+    assert one is not None
+    assert other is not None
+    assert (one.link, one.other) == (other.link, other.other) == ("a_link_0", "box")
+    assert np.interp(other.place, np.arange(6), shares) == pytest.approx(one.place, abs=1e-12)
+    assert other.depth == pytest.approx(one.depth, abs=1e-12)
+
+
+def test_a_finger_that_slides_over_a_corner_is_followed_plane_by_plane() -> None:
+    """A box link slides on the rim of a box: at every posture a depth judges, and 0.02 rad farther down it is in it."""
+    link = Shape(ShapeKind.BOX, (LENGTH / 2, RADIUS, RADIUS / 2), Pose([LENGTH / 2, 0.0, 0.0]))
+    hand = HandBuilder().finger("a", [link, link], [LENGTH, LENGTH], axes=[Y, Z], lower=-2.0).hand()
+    rim = clench.GraspObject.from_shape(
+        Shape(ShapeKind.BOX, (0.01, 0.1, 0.01), Pose([0.07, 0.0, 0.01 + RADIUS / 2])), name="rim"
+    )
+    around = place_object(rim, np.eye(4))
+    slide = np.array([[0.0, -0.5], [0.0, 0.5]])
+    assert find_path_overlap(hand, slide, SOURCE, around) is None
+    found = [find_path_overlap(hand, slide + np.array([turn, 0.0]), SOURCE, around) for turn in (-0.02, 0.02)]
+    assert sum(overlap is None for overlap in found) == 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Final
 
@@ -13,6 +13,8 @@ from clench.models.hand.hand import Hand
 
 #: Places of a path that differ by less than this share of its length are one [-].
 ROUNDING: Final = 1e-12
+#: Way-points per stage of a finger; speed rises from zero and falls to zero within each.
+STAGE_STEPS: Final = 8
 #: Joints that move less than this stand still [rad].
 STILL: Final = 1e-9
 
@@ -65,3 +67,26 @@ def _shares(steps: int) -> FloatArray:
     shares = np.linspace(0.0, 1.0, steps + 1)
     shares.flags.writeable = False
     return shares
+
+
+def closing_stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatArray) -> Iterator[FloatArray]:
+    """Yield the stages of a finger: way-points of all joints, shape (n, J), of which only the finger's move."""
+    q = start.copy()
+    yield q[None].copy()
+    followers = {c.follower for c in hand.couplings}
+    for leader in joints:
+        if leader in followers:
+            continue
+        group = [leader, *(j for j in hand.followers_of(leader) if j in joints)]
+        path = closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
+        yield path
+        q = path[-1].copy()
+    yield eased(q, end)
+
+
+def eased(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return way-points, evenly spaced in time, that leave and arrive slowly, shape (n, J)."""
+    s = np.linspace(0.0, 1.0, STAGE_STEPS + 1)[:, None]
+    path: FloatArray = start + (s * s * (3.0 - 2.0 * s)) * (end - start)
+    path[-1] = end
+    return path

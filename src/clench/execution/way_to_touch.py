@@ -25,13 +25,11 @@ from clench.models.shapes import CollisionSource
 from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
-from .closing_path import STILL, closing_path, distinct
+from .closing_path import STILL, closing_path, closing_stages, distinct, eased
 from .landing import LANDING_SPEED, Landing
 from .step_check import placed_object
 from .timing import TimedPath, time_path
 
-#: Way-points per stage; speed rises from zero and falls to zero within each.
-STAGE_STEPS: Final = 8
 #: Way-points of a path on which all joints move simultaneously, besides those at which a joint stops.
 AT_ONCE_STEPS: Final = 32
 #: If no way to a pregrasp is free, a pregrasp nearer to the touch is tried: shares of the clearance [-].
@@ -323,7 +321,7 @@ class WayFinder:
             return self._line(joints, start, goal)
         if _closed_at_once(self.solution):
             return _path_at_once(self.solution, self.hand, joints, start, goal)
-        return list(_closing_stages(self.hand, joints, start, goal))
+        return list(closing_stages(self.hand, joints, start, goal))
 
 
 def in_turn(turns: Sequence[Sequence[str]]) -> str:
@@ -391,27 +389,4 @@ def _path_at_once(
     """Return the path on which joints move together, each at its speed and until its end, as stages."""
     speed = np.array([solution.speeds.get(name, 1.0) for name in hand.joint_names])
     path = closing_path(hand, joints, start, end, speed, AT_ONCE_STEPS)
-    return [path, _eased(path[-1], end)] if np.abs(end - path[-1]).max(initial=0.0) > STILL else [path]
-
-
-def _closing_stages(hand: Hand, joints: tuple[int, ...], start: FloatArray, end: FloatArray) -> Iterator[FloatArray]:
-    """Yield the stages of a finger: way-points of all joints, shape (n, J), of which only the finger's move."""
-    q = start.copy()
-    yield q[None].copy()
-    followers = {c.follower for c in hand.couplings}
-    for leader in joints:
-        if leader in followers:
-            continue
-        group = [leader, *(j for j in hand.followers_of(leader) if j in joints)]
-        path = closing_path(hand, group, q, end, np.ones(len(q)), STAGE_STEPS)
-        yield path
-        q = path[-1].copy()
-    yield _eased(q, end)
-
-
-def _eased(start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return way-points, evenly spaced in time, that leave and arrive slowly, shape (n, J)."""
-    s = np.linspace(0.0, 1.0, STAGE_STEPS + 1)[:, None]
-    path: FloatArray = start + (s * s * (3.0 - 2.0 * s)) * (end - start)
-    path[-1] = end
-    return path
+    return [path, eased(path[-1], end)] if np.abs(end - path[-1]).max(initial=0.0) > STILL else [path]

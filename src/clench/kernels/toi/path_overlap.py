@@ -75,7 +75,7 @@ def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -
         work.normal[axis] = 0.0
     if work.sweep.pair[0] >= 0:
         keep_normal(problem, r, work)
-    crossing = not are_closed(problem, m, r) or cross(problem, p, listed, gap, work)
+    crossing = not are_closed(problem, m, r) or cross(problem, p, listed, work)
     if not crossing and (was_apart or not holds_part(problem, m, r, work)):
         return gap
     depth = depth_between(problem, m, r, work)
@@ -90,13 +90,15 @@ def are_closed(problem: PathProblem, m: int, r: int) -> bool:
 
 
 @kernel
-def cross(problem: PathProblem, p: int, listed: int, gap: float, work: PathWork) -> bool:
-    """Say whether elements of a pair cross, by more than `TOUCH` if they are round; see `gap_between`.
+def cross(problem: PathProblem, p: int, listed: int, work: PathWork) -> bool:
+    """Say whether elements of a pair cross, by more than `TOUCH` if they are round.
 
-    The gap of elements that cross is that of their corners and edges, so no larger than how far they have moved since
-    they touched.
+    The gap of elements that cross, which is that of their corners and edges, does not tell.
+
+    Args:
+        listed: so many elements of the second body are near the first one, see `list_touching`.
     """
-    if gap > OVERLAP + problem.allowed[p]:
+    if listed == 0:
         return False
     m, (target, b) = problem.pairs[p, 0], target_of(problem, problem.pairs[p, 1])
     return bool(bodies_overlap(problem.links, m, target, b, TOUCH, False, listed, work.sweep))
