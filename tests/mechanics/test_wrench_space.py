@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from clench.core.pose import FloatArray, rotation_about
+from clench.mechanics.epsilon import wrench_space
 from clench.mechanics.epsilon.wrench_space import epsilon_l1, epsilon_linf, volume_l1
 from clench.mechanics.grasp.contacts import make_contacts
 from clench.mechanics.grasp.grasp_map import edge_wrenches
@@ -248,3 +249,32 @@ def test_volume_of_a_cross_polytope() -> None:
 def test_same_input_same_output() -> None:
     wrenches = edge_wrenches(random_contacts(np.random.default_rng(6), 12), np.zeros(3), 1.0, 8)
     assert epsilon_l1(wrenches).radius == epsilon_l1(wrenches.copy()).radius
+
+
+@pytest.mark.parametrize("size", [3, 6])
+def test_a_cube_of_any_dimension_reaches_1_to_all_sides(size: int) -> None:
+    """Many corners lie in one facet, so rounding decides how Qhull parts it."""
+    corners = np.array(list(itertools.product([-1.0, 1.0], repeat=size)))
+    turned = np.linalg.qr(np.random.default_rng(3).normal(size=(size, size)))[0]
+    for points in (corners, corners @ turned):
+        normals, offsets = wrench_space._facets(points)
+        assert offsets.min() == pytest.approx(1.0, abs=1e-9)
+        assert (points @ normals.T).max(axis=0) == pytest.approx(offsets, abs=1e-9)
+    assert volume_l1(corners) == pytest.approx(2.0**size, rel=1e-9)
+
+
+def test_facets_that_leave_a_point_outside_are_not_taken(monkeypatch) -> None:
+    """Qhull's fast way may miss points; then the careful one decides."""
+    from scipy import spatial
+
+    points, asked = np.random.default_rng(6).normal(size=(30, 4)), []
+    whole = spatial.ConvexHull
+
+    def missing(given: FloatArray, qhull_options: str):
+        asked.append(qhull_options)
+        return whole(given[:-5] if "Q0" in qhull_options else given, qhull_options=qhull_options)
+
+    expected = wrench_space._hull(points).volume
+    monkeypatch.setattr(spatial, "ConvexHull", missing)
+    assert wrench_space._hull(points).volume == pytest.approx(expected, rel=1e-12)
+    assert asked == ["Qt Q0", "Qt Qx"]
