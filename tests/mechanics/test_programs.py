@@ -18,13 +18,16 @@ from .held_cases import random_contacts, random_held
 def test_forces_that_survive_the_hardest_changes_survive_all(model: str) -> None:
     rng = np.random.default_rng(5)
     contacts = random_contacts(rng, 4, model)
-    changes = np.vstack([np.zeros((1, 4 * contacts.width)), 0.3 * rng.normal(size=(12, 4 * contacts.width))])
+    size = np.array([0.5, 0.5, 1.0, 0.1])[: contacts.width]  # about as far as cones reach
+    changes = np.vstack(
+        [np.zeros(4 * contacts.width), 0.3 * rng.normal(size=(12, 4 * contacts.width)) * np.tile(size, 4)]
+    )
     needed = hardest_changes(contacts, changes)
     assert needed.any(axis=0).all()
-    assert 0.2 < needed.mean() < 1.0  # some are left out
+    assert 0.2 < needed.mean() < 0.9  # some are left out
     survivors = 0
     pressing = np.eye(contacts.width)[2] * 2.5
-    for forces in rng.normal(size=(4000, 4, contacts.width)) + pressing:
+    for forces in rng.normal(size=(4000, 4, contacts.width)) * size + pressing:
         slack = np.array([contacts.cone_slack(forces + c.reshape(4, -1)) for c in changes])
         for c in range(4):
             if slack[needed[:, c], c].min() >= 0.0:
