@@ -44,7 +44,7 @@ def test_one_way_point_is_no_line():
 def test_a_share_of_a_line_is_a_place_among_its_way_points(share, expected):
     kept = np.zeros((2, len(PATH)), dtype=np.int64)
     kept[PAIR, :2] = 0, 4
-    count = np.zeros(2, dtype=np.int64)
-    count[ALL], count[PAIR] = 3, 1
-    lines = PathLines(kept, count, PATH.copy(), np.zeros((5, 1, 3, 4)), np.zeros((2, 3, 4)))
+    last = np.zeros(2, dtype=np.int64)
+    last[ALL], last[PAIR] = 3, 1
+    lines = PathLines(kept, last, PATH.copy(), np.zeros((5, 1, 3, 4)), np.zeros((2, 3, 4)))
     assert place_on_path(PATH, 0, share, np.array([0]), 1, lines) == pytest.approx(expected, abs=1e-12)

@@ -102,7 +102,7 @@ def put_left(problem: PathProblem, m: int, r: int, work: PathWork) -> None:
     """Write the lines that a pair sees, and how far its points can move relative to each other until their end."""
     lines, left, count = work.lines, work.left, put_turning(problem, m, r, work)
     keep_pair_lines(problem.path, work.turning, count, lines)
-    path, last = lines.path, lines.count[PAIR]
+    path, last = lines.path, lines.last[PAIR]
     left[last] = 0.0
     for n in range(last):
         k, motion = last - 1 - n, 0.0

@@ -25,14 +25,14 @@ class PathLines(NamedTuple):
 
     Args:
         kept: numbers of the way-points that are ends of lines, for all joints and for those of a pair, (2, N).
-        count: how many lines there are, for both, (2,).
+        last: number of the last of these ends, for both, (2,).
         path: postures at the ends of the pair's lines [rad], (N, J).
         stations: poses of the links from the root at the way-points that are ends for all joints, (N, L, 3, 4).
         poses: scratch space, (2, 3, 4).
     """
 
     kept: Ints
-    count: Ints
+    last: Ints
     path: Floats
     stations: Floats
     poses: Floats
@@ -58,8 +58,8 @@ def keep_lines(path: Floats, frames: FrameArrays, turning: Ints, lines: PathLine
         turning[j] = j
     for k in range(points):
         lines.kept[PAIR, k] = k
-    lines.count[ALL] = find_corners(path, lines.kept[PAIR], points, turning, joints, lines.kept[ALL])
-    for n in range(lines.count[ALL] + 1):
+    lines.last[ALL] = find_corners(path, lines.kept[PAIR], points, turning, joints, lines.kept[ALL])
+    for n in range(lines.last[ALL] + 1):
         k = lines.kept[ALL, n]
         for i in range(frames.parent.shape[0]):
             put_link(frames, i, path[k], lines.poses[0], lines.poses[1], lines.stations[k])
@@ -68,9 +68,9 @@ def keep_lines(path: Floats, frames: FrameArrays, turning: Ints, lines: PathLine
 @kernel
 def keep_pair_lines(path: Floats, turning: Ints, count: int, lines: PathLines) -> None:
     """Write the lines of a path that a pair sees; `count` joints of `turning` move one of its bodies."""
-    ends = lines.count[ALL] + 1
-    lines.count[PAIR] = find_corners(path, lines.kept[ALL], ends, turning, count, lines.kept[PAIR])
-    for n in range(lines.count[PAIR] + 1):
+    ends = lines.last[ALL] + 1
+    lines.last[PAIR] = find_corners(path, lines.kept[ALL], ends, turning, count, lines.kept[PAIR])
+    for n in range(lines.last[PAIR] + 1):
         for j in range(path.shape[1]):
             lines.path[n, j] = path[lines.kept[PAIR, n], j]
 
@@ -127,7 +127,7 @@ def place_on_path(path: Floats, k: int, t: float, turning: Ints, count: int, lin
     Args:
         k, t: the line, and the share of it. turning: the pair's joints; `count` of them.
     """
-    a, c, before = lines.kept[PAIR, k], lines.kept[PAIR, min(k + 1, lines.count[PAIR])], 0.0
+    a, c, before = lines.kept[PAIR, k], lines.kept[PAIR, min(k + 1, lines.last[PAIR])], 0.0
     for b in range(a + 1, c + 1):
         share = 1.0 if b == c else share_between(path, a, b, c, turning, count)[0]
         if share > t:

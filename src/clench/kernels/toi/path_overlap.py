@@ -159,7 +159,7 @@ def step_on(left: Floats, last: int, k: int, t: float, motion: float) -> tuple[i
 @kernel
 def next_touch(problem: PathProblem, m: int, r: int, k: int, t: float, work: PathWork) -> tuple[int, float]:
     """Return the place at which a pair that is apart touches next; the last way-point where it does not."""
-    left, last = work.left, work.lines.count[PAIR]
+    left, last = work.left, work.lines.last[PAIR]
     while k < last:
         place_pair(problem, m, r, k, t, work)
         balls = balls_gap(problem, m, r, work)
@@ -200,7 +200,7 @@ def overlap_of(problem: PathProblem, p: int, until: float, work: PathWork) -> tu
     """
     m, r, pad = problem.pairs[p, 0], problem.pairs[p, 1], problem.allowed[p]
     put_left(problem, m, r, work)
-    left, last, k, t, exempt, looks, gap, begun = work.left, work.lines.count[PAIR], 0, 0.0, 0.0, 0, -1.0, False
+    left, last, k, t, exempt, looks, gap, begun = work.left, work.lines.last[PAIR], 0, 0.0, 0.0, 0, -1.0, False
     for axis in range(3):
         work.normal[axis] = 0.0
     while until == math.inf or place_of(problem, m, r, k, t, work) <= until:
