@@ -1,4 +1,4 @@
-"""An object far larger than the hand is told at once, and solved all the same."""
+"""Sizes and distances that suggest millimetres are told at once, and solved all the same."""
 
 import re
 import warnings
@@ -69,3 +69,40 @@ def test_the_command_line_says_it_once(tmp_path, capsys):
     told = heard.err.splitlines()
     assert [line for line in told if "times the size of the hand" in line] == told[:1]
     assert told[0].startswith("clench: warning: sphere:r=3 is 6 m across, ")
+
+
+@pytest.mark.parametrize(
+    ("model", "scale", "advised"),
+    [
+        ("mug", 0.001, "if the scale of 0.001 makes it a thousand times too small, load it with a scale of 1"),
+        ("sphere:r=0.0004", 1.0, "if its units are not metres, load it with another scale"),
+    ],
+)
+def test_a_speck(model, scale, advised, hand):
+    obj = clench.GraspObject.load(model, scale=scale)
+    told = rf"^{model} is .* m across, 1/\d+ of the size of the hand {hand.name} .*: {re.escape(advised)}\.$"
+    with pytest.warns(UserWarning, match=told):
+        clench.solve(hand, obj, INSIDE)
+    assert any(warning.endswith(f": {advised}.") for warning in obj.warnings)
+
+
+def test_a_small_thing_is_no_mistake(hand):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        clench.solve(hand, clench.GraspObject.load("sphere:r=0.003"), INSIDE)
+
+
+def test_a_pose_in_millimetres(hand, tmp_path, capsys):
+    mug, far = clench.GraspObject.load("mug"), clench.Pose([200.0, -100.0, 60.0])
+    asked = "m away from mug: are the lengths of its pose in millimetres?"
+    solution = clench.solve(hand, mug, clench.GraspCommand(hand_pose=far))
+    assert solution.status == "no_contact"
+    assert solution.reason["text"].startswith(f"The hand is 231 {asked} No finger touches")
+    near = clench.Pose([0.0, 0.0, 0.6])
+    with pytest.warns(UserWarning, match=r"^1 of 2 poses place the hand 231 m or more away from mug: are their"):
+        batch = clench.solve_batch(hand, mug, [near, far])
+    assert asked in batch.solution(1).reason["text"]
+    assert asked not in batch.solution(0).reason["text"]
+    (tmp_path / "c.json").write_text('{"hand_pose": {"position": [200, -100, 60], "wxyz": [1, 0, 0, 0]}}')
+    assert main(["solve", "--hand", "robonaut2", "--object", "mug", "--command", str(tmp_path / "c.json")]) == 1
+    assert asked in " ".join(capsys.readouterr().out.split())

@@ -13,6 +13,7 @@ from clench.closing.candidates import FingerCandidate, LinkContact
 from clench.closing.collision.depths import LinkDepth, retreat_distance
 from clench.closing.collision.object_surface import nearest_body
 from clench.closing.collision.packed_object import hash_hand
+from clench.closing.collision.sizes import far_away
 from clench.closing.motion import asked_fingers, decompose
 from clench.core.caching.deferring import DeferredMapping
 from clench.core.pose import FloatArray, Pose
@@ -245,7 +246,7 @@ def _status(
     touching = [r.name for r in results.values() if r.status is FingerStatus.TOUCH]
     if not touching:
         text = "No finger touches: " + " ".join(r.reason for r in results.values())
-        return SolutionStatus.NO_CONTACT, _with_causes("no_contact", text, results)
+        return SolutionStatus.NO_CONTACT, _with_causes("no_contact", _far_text(problem) + text, results)
     listed = ", ".join(touching)
     if len(touching) == len(results):
         return SolutionStatus.GRASP, {"code": "all_touch", "text": f"Every finger touches: {listed}."}
@@ -255,6 +256,14 @@ def _status(
         return SolutionStatus.GRASP, _with_causes("opposed", text, results)
     text = f"Only some fingers touch: {listed}."
     return SolutionStatus.PARTIAL, _with_causes("some_touch", text, results)
+
+
+def _far_text(problem: Problem) -> str:
+    """Return a question where the hand is so far from the object that lengths are probably in millimetres."""
+    away = float(far_away(problem.hand, problem.packed, problem.T_palm_object[None])[0])
+    if not away:
+        return ""
+    return f"The hand is {away:.3g} m away from {problem.obj.name}: are the lengths of its pose in millimetres? "
 
 
 def _with_causes(code: str, text: str, results: Mapping[str, FingerResult]) -> Mapping[str, Any]:

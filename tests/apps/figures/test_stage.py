@@ -221,3 +221,13 @@ def test_both_libraries_draw_without_being_asked_for(library: str) -> None:
     if "OpenGLError" in run.stderr:
         pytest.skip(f"no {library} here")
     assert run.stdout == f"mujoco.{library}\n"
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-4, 1.0, 100.0])
+def test_things_of_any_size_have_a_picture(way: str, size: float) -> None:
+    """MuJoCo ends the process where a scene has no extent, as a speck had that one point stood for."""
+    near = camera(scale=20.0 / size)
+    with Stage([block((0.5 * size,) * 3)], np.eye(4)[None]) as stage:
+        assert np.ptp(stage.points(SolidKind.OBJECT), axis=0) == pytest.approx(np.full(3, size))
+        picture = stage.picture(near)
+    assert (picture.solid >= 0).sum() == pytest.approx(400, abs=80)

@@ -76,7 +76,7 @@ def unit_warnings(vertices: FloatArray, name: str, scale: float = 1.0) -> tuple[
     if extent > LARGE:
         return (f"{name} is {extent:.4g} m across: {smaller(scale)}.",)
     if extent < SMALL:
-        return (f"{name} is only {extent:.4g} m across: if its units are not metres, load it with another scale.",)
+        return (f"{name} is only {extent:.4g} m across: {larger(scale)}.",)
     return ()
 
 
@@ -86,6 +86,14 @@ def smaller(scale: float) -> str:
     if scale == 1.0:
         return f"if its lengths are in millimetres, {advised}"
     return f"if the scale of {scale:g} makes it a thousand times too large, {advised}"
+
+
+def larger(scale: float) -> str:
+    """Return the advice for an object that is too small, by the scale that it was loaded with [-]."""
+    if scale == 1.0:
+        return "if its units are not metres, load it with another scale"
+    advised = f"load it with a scale of {scale / MILLIMETRE:g}"
+    return f"if the scale of {scale:g} makes it a thousand times too small, {advised}"
 
 
 def check_size(shape: Shape, name: str) -> None:

@@ -109,7 +109,7 @@ class BatchSolver:
 
         return solve_packed(
             candidates.problem,
-            _related(palms, object_rows),
+            related(palms, object_rows),
             choose=None if candidates.by_kernel else choose,
             threads=threads,
             on_device=on_device,
@@ -212,7 +212,7 @@ class BatchSolver:
         )
 
 
-def _related(palms: FloatArray, object_rows: FloatArray) -> FloatArray:
+def related(palms: FloatArray, object_rows: FloatArray) -> FloatArray:
     """Return `T_palm_object` of poses of both, (N, 7) each, as (N, 3, 4)."""
     from clench.kernels.geometry.link_frames import relate_poses
 

@@ -14,6 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.closing.collision.packed_object import pack_object
+from clench.closing.collision.sizes import far_away
 from clench.core.argument_types import check_type
 from clench.core.exceptions import CommandError
 from clench.core.pose import FloatArray, Pose
@@ -24,11 +26,13 @@ from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 from clench.solver.preshapes.posture_choice import posture_solver
 from clench.solver.preshapes.postures import preshape_angles
+from clench.solver.solution import SolutionStatus
 
 from .batch_parts import BatchParts
 from .batch_progress import shown
+from .batch_solver import related
 from .devices import CPU, why_not
-from .grasp_batch import GraspBatch, Question, append_part
+from .grasp_batch import STATUSES, GraspBatch, Question, append_part
 
 #: Poses that are solved at a time: a few ten megabytes.
 CHUNK: Final = 1024
@@ -100,6 +104,7 @@ def solve_batch(
     batch = GraspBatch.joined(solved)
     if len(groups) > 1:
         batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
+    _warn_of_distance(hand, obj, batch)
     batch = batch.with_known(question=replace(question, options=batch.question.options))
     if parts is not None:
         parts.finish(batch)
@@ -171,6 +176,19 @@ def _usable(device: str) -> str:
         return device
     warnings.warn(f"{reason} Solving on the CPU.", stacklevel=3)
     return CPU
+
+
+def _warn_of_distance(hand: Hand, obj: GraspObject, batch: GraspBatch) -> None:
+    """Warn of poses without a contact whose lengths are probably in millimetres."""
+    rows = np.flatnonzero(batch.status_codes == STATUSES.index(SolutionStatus.NO_CONTACT))
+    far = far_away(hand, pack_object(obj), related(batch.hand_poses[rows], batch.object_poses[rows]))
+    far = far[far > 0.0]
+    if len(far):
+        warnings.warn(
+            f"{len(far)} of {len(batch)} poses place the hand {far.min():.3g} m or more away from {obj.name}: are "
+            "their lengths in millimetres?",
+            stacklevel=3,
+        )
 
 
 def _threads(threads: int | None) -> int:

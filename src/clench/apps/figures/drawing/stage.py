@@ -42,8 +42,11 @@ _SIZE: Final = (640, 640)
 _SHININESS: Final = 0.35
 #: The camera sees farther than the shown solids by this [m].
 _ROOM: Final = 0.02
-#: Points that stand for a solid lie on a grid of this width [m].
+#: Points that stand for a solid lie on a grid of this width [m]; on a small solid, on a grid of so many cells.
 _GRID: Final = 3e-3
+_CELLS: Final = 4.0
+#: The shadow map of a scene spans this at least [m]: MuJoCo ends the process where it spans nothing.
+_LEAST_EXTENT: Final = 1e-6
 
 #: Triangles of a plain picture, about, and of one in which only contacts are looked for.
 _PLAIN_TRIANGLES: Final = 40_000
@@ -116,7 +119,7 @@ class Stage:
         low, high = (near.min(axis=0), near.max(axis=0)) if len(near) else (np.zeros(3), np.ones(3))
         self._middle = 0.5 * (low + high)
         # The shadow map spans this extent.
-        self._model.model.stat.extent = float(np.linalg.norm(high - low))
+        self._model.model.stat.extent = max(float(np.linalg.norm(high - low)), _LEAST_EXTENT)
 
     def points(self, *kinds: SolidKind) -> FloatArray:
         """Return points of the solids of some kinds in the world [m], one of every few millimetres, shape (N, 3)."""
@@ -238,7 +241,8 @@ def _compiled(solids: Sequence[Solid]) -> _Model:
 
 def _sampled(vertices: FloatArray) -> FloatArray:
     """Return one vertex of every cell of a grid, shape (n, 3)."""
-    _, kept = np.unique(np.round(vertices / _GRID).astype(np.int64), axis=0, return_index=True)
+    width = min(_GRID, float(np.ptp(vertices, axis=0).max()) / _CELLS) or _GRID
+    _, kept = np.unique(np.round(vertices / width).astype(np.int64), axis=0, return_index=True)
     found: FloatArray = vertices[kept]
     return found
 
