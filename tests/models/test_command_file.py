@@ -143,7 +143,7 @@ def test_a_name_without_an_ending_is_a_preset(tmp_path):
         ("task_wrenches", [{"force": [0, 0, 0]}], "task_wrenches[0]: expected a force or torque that is not 0"),
         ("opposition_grid", [], "opposition_grid: expected a list of at least one number"),
         ("seed", "one", "seed: expected a whole number"),
-        ("plane", 3, "plane: unknown key; did you mean 'planes'?"),
+        ("plane", 3, "plane: unknown key; expected one of hand_pose"),
     ],
 )
 def test_every_malformed_value_is_named_by_its_path(key, value, words):
@@ -267,3 +267,7 @@ def test_a_limit_itself_is_inside_and_numpy_numbers_are_numbers():
         Pose(), preshape={"index_yaw": np.float64(0.3)}, planes=np.int64(2), yaw_grid=(np.float32(0.5),)
     )
     check_command(small_hand(), command)
+
+
+def test_a_misspelt_key_is_guessed():
+    assert refused({"hand_pose": POSE, "plane": 3}).endswith(". Did you mean 'planes'?")

@@ -31,6 +31,13 @@ def _printable(text: str) -> str:
     return line if len(line) <= _LONGEST else f"{line[:half]} ... {line[-half:]}"
 
 
+def guessed(name: object, names: Iterable[str]) -> str:
+    """Return the question whether the nearest of some names was meant, with a space before it; empty without one."""
+    # A mapping given from Python may have keys of any kind.
+    close = difflib.get_close_matches(str(name), list(names), n=1)
+    return f" Did you mean '{close[0]}'?" if close else ""
+
+
 class FileError(ClenchError):
     """Say that a file is missing, unreadable or malformed.
 
@@ -72,9 +79,7 @@ class UnknownNameError(ClenchError):
 
     def __init__(self, kind: str, name: str, owner: str, names: Iterable[str]) -> None:
         known = list(names)
-        # A mapping given from Python may have keys of any kind.
-        close = difflib.get_close_matches(str(name), known, n=1)
-        guess = f" Did you mean '{close[0]}'?" if close else ""
+        guess = guessed(name, known)
         many = {"criterion": "criteria"}.get(kind, f"{kind}s")
         listed = f" {many.capitalize()}: {', '.join(known)}." if known else f" It has no {many}."
         super().__init__(f"{kind.capitalize()} '{name}' is not in {owner}.{guess}{listed}")

@@ -12,6 +12,7 @@ from clench.core.argument_types import check_type
 from clench.core.exceptions import CommandError, MotionError, UnknownNameError
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
+from clench.models.objects.obstacles import TABLE
 from clench.models.shapes import CollisionSource
 from clench.solver.solution import GraspSolution
 
@@ -105,8 +106,25 @@ def check_geometry(solution: GraspSolution, hand: Hand, obj: GraspObject | None)
     if obj is not None and for_object != hash_bodies(obj.bodies, CollisionSource(obj.collision_source)):
         raise CommandError(
             f"geometry_hash: the solution was computed for another geometry of object '{obj.name}'; load the object "
-            f"from the same model, with the same scale and obstacles, or solve again."
+            f"from the same model, with the same scale and obstacles{_obstacles_told(solution, obj)}, or solve again."
         )
+
+
+def missing_obstacles(solution: GraspSolution, obj: GraspObject) -> str:
+    """Return the options that would add the obstacles of a solution that an object lacks; empty if it has all."""
+    missing = [name for name in solution.obstacles if name not in obj.obstacles]
+    named = ", ".join(f"'{name}'" for name in missing)
+    options = dict.fromkeys("--table HEIGHT" if name == TABLE else "--obstacle SHAPE@x,y,z" for name in missing)
+    many = "s" if len(missing) > 1 else ""
+    return f"with obstacle{many} {named}: add {' and '.join(options)}" if missing else ""
+
+
+def _obstacles_told(solution: GraspSolution, obj: GraspObject) -> str:
+    """Return what is known of the obstacles that a solution was computed with, in brackets."""
+    missing = missing_obstacles(solution, obj)
+    if missing:
+        return f" (it was computed {missing})"
+    return " (--scale, --table, --obstacle)"
 
 
 def check_angles(solution: GraspSolution, hand: Hand | None) -> None:

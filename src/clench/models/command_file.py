@@ -5,7 +5,6 @@ Every complaint names the key by its path, as in ``c.json: preshape.index_yaw: e
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from clench.core.argument_types import checked_choice, shortened
-from clench.core.exceptions import CommandError, FileError
+from clench.core.exceptions import CommandError, FileError, guessed
 from clench.core.files.file_bytes import expanded, read_file
 from clench.core.files.file_limits import COMMAND_CANDIDATES, COMMAND_ITEMS, JSON_BYTES
 from clench.core.files.json_files import not_json
@@ -182,9 +181,7 @@ def _command(data: Any, folder: Path | None) -> GraspCommand:
         raise CommandError(f"expected an object with at least 'hand_pose', got {shortened(data)}.")
     for key in data:
         if key not in KEYS:
-            close = difflib.get_close_matches(key, KEYS, n=1)
-            guess = f" did you mean '{close[0]}'?" if close else ""
-            raise CommandError(f"{key}: unknown key;{guess} expected one of {', '.join(KEYS)}.")
+            raise CommandError(f"{key}: unknown key; expected one of {', '.join(KEYS)}.{guessed(key, KEYS)}")
     if "hand_pose" not in data:
         raise CommandError("hand_pose: missing; expected {'position': [x, y, z], 'wxyz': [w, x, y, z]}.")
     readers: dict[str, Callable[[Any, str], Any]] = {

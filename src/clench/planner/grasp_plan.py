@@ -13,7 +13,7 @@ from clench.core.showing.display import Displayed
 from clench.execution.trajectory import Trajectory
 from clench.mechanics.grasp.contact_kinds import GraspKind
 from clench.models.command import GraspCommand
-from clench.solver.analysis.squeezing import SqueezePlan
+from clench.solver.analysis.squeezing import SqueezePlan, without_limits
 from clench.solver.solution import GraspSolution
 
 from .options import PlanOptions
@@ -160,7 +160,12 @@ class GraspPlan(Displayed):
 
     @property
     def text(self) -> str:
-        """One or two sentences: the result, and the reason if there are fewer grasps than asked for."""
+        """Sentences: the result, the reason if there are fewer grasps than asked for, and joints without limits."""
+        unlimited = dict.fromkeys(name for grasp in self.grasps for name in grasp.squeeze.unlimited)
+        return f"{self._result} {without_limits(tuple(unlimited))}".rstrip()
+
+    @property
+    def _result(self) -> str:
         found = f"{len(self)} of {self.asked.count} grasps from {self.proposed} proposals"
         if len(self) >= self.asked.count:
             return f"Found {found}."

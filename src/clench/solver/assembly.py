@@ -96,6 +96,7 @@ def assemble(answer: Answer, problem: Problem, timing: Mapping[str, float]) -> G
         hand_model=str(hand.path) if hand.path else hand.name,
         object_model=str(problem.obj.path) if problem.obj.path else problem.obj.name,
         object_scale=problem.obj.scale,
+        obstacles=problem.obj.obstacles,
         geometry_hash=geometry_hash,
         seed=command.seed,
         status=status,

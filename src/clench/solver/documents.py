@@ -119,6 +119,7 @@ class _SolutionForm(msgspec.Struct):
     rounds: int = 1
     next_steps: list[_Map] = []
     object_scale: float = 1.0
+    obstacles: tuple[str, ...] = ()
 
 
 def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
@@ -132,6 +133,7 @@ def solution_to_dict(solution: GraspSolution) -> dict[str, Any]:
         "hand_model": s.hand_model,
         "object_model": s.object_model,
         "object_scale": float(s.object_scale),
+        "obstacles": list(s.obstacles),
         "geometry_hash": s.geometry_hash,
         "seed": None if s.seed is None else int(s.seed),
         "status": s.status.value,
@@ -193,6 +195,7 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
         hand_model=form.hand_model,
         object_model=form.object_model,
         object_scale=form.object_scale,
+        obstacles=form.obstacles,
         geometry_hash=form.geometry_hash,
         seed=form.seed,
         status=form.status,

@@ -187,6 +187,7 @@ class GraspSolution(Displayed, LateFields):
     Args:
         hand, object: names. hand_model, object_model: models to load for another execution (path or built-in name).
         object_scale: factor on the lengths of the object's model [-].
+        obstacles: names of the obstacles that were around the object.
         status, reason: the answer; `reason` has at least ``"code"`` and ``"text"``.
         hand_pose: `T_world_palm`; object_pose: `T_world_object`.
         decomposition: ``{"posture": {...}, "closing": {...}}`` [rad].
@@ -233,6 +234,7 @@ class GraspSolution(Displayed, LateFields):
     rounds: int = 1
     next_steps: tuple[Mapping[str, float], ...] = ()
     object_scale: float = field(default_factory=lambda: 1.0)
+    obstacles: tuple[str, ...] = field(default_factory=tuple)
 
     def __repr__(self) -> str:
         return described(

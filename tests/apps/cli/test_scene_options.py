@@ -95,7 +95,51 @@ def test_solve_and_execute_see_the_same_scene(tmp_path: Path, capsys: pytest.Cap
     assert main(["execute", str(file), *around, "--json"]) in (0, 1)
     assert json.loads(capsys.readouterr().out)["schema"] == "clench.execution/1"
     assert main(["execute", str(file), "--json"]) == 2
-    assert "with the same scale and obstacles" in json.loads(capsys.readouterr().out)["error"]
+    told = json.loads(capsys.readouterr().out)["error"]
+    assert "the same scale and obstacles (it was computed with obstacles 'table', 'obstacle1', 'obstacle2': " in told
+    assert "add --table HEIGHT and --obstacle SHAPE@x,y,z)" in told
+    assert main(["execute", str(file), "--table", "--json"]) == 2
+    told = json.loads(capsys.readouterr().out)["error"]
+    assert "(it was computed with obstacles 'obstacle1', 'obstacle2': add --obstacle SHAPE@x,y,z)" in told
+    elsewhere = ["--table", "0.3", *around[1:]]
+    assert main(["execute", str(file), *elsewhere, "--json"]) == 2
+    assert "(--scale, --table, --obstacle)" in json.loads(capsys.readouterr().out)["error"]
+
+
+@pytest.fixture(scope="module")
+def on_a_table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the file of a grasp of a turned mug on a table."""
+    folder = tmp_path_factory.mktemp("table")
+    hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug", pose=clench.Pose([0.3, 0.0, 0.1]))
+    scene = with_scene(mug, None, (), ())
+    poses = clench.approach_poses(hand, scene, 20, 0)
+    solved = (clench.solve(hand, scene, clench.GraspCommand(hand_pose=pose, preshape="open")) for pose in poses)
+    next(solution for solution in solved if solution.is_valid()).save(folder / "solution.json")
+    return folder / "solution.json"
+
+
+def test_a_solution_on_a_table_is_exported_with_it(on_a_table: Path, tmp_path: Path, capsys) -> None:
+    solution = clench.GraspSolution.load(on_a_table)
+    assert solution.obstacles == ("table",)
+    out = ["--out", str(tmp_path / "grasp.yaml"), "--json"]
+    assert main(["export", str(on_a_table), *out]) == 0
+    (told,) = [n for n in json.loads(capsys.readouterr().out)["notes"] if "without the object" in n]
+    assert "it was computed with obstacle 'table': add --table HEIGHT" in told
+    assert main(["export", str(on_a_table), "--table", *out]) == 0
+    assert not [n for n in json.loads(capsys.readouterr().out)["notes"] if "without the object" in n]
+    assert main(["export", str(on_a_table), "--table", "0.7", *out]) == 2
+    assert "another geometry of object" in json.loads(capsys.readouterr().out)["error"]
+    assert main(["export", str(on_a_table), "--table", "--out", str(tmp_path / "scene.glb"), "--json"]) == 0
+    assert not json.loads(capsys.readouterr().out)["notes"]
+
+
+def test_a_batch_on_a_table_is_exported_with_it(tmp_path: Path, capsys) -> None:
+    scene = ["--table", "--obstacle", "ball@0.5,0.5,0.5"]
+    asked = ["batch", "--hand", "robonaut2", "--object", "mug", "--count", "12", "--json"]
+    assert main([*asked, *scene, "--out", str(tmp_path / "b.npz")]) == 0
+    capsys.readouterr()
+    assert main(["export", str(tmp_path / "b.npz"), *scene, "--out", str(tmp_path / "g.yaml"), "--json"]) == 0
+    assert not [n for n in json.loads(capsys.readouterr().out)["notes"] if "without the object" in n]
 
 
 def test_approach_poses_of_the_command_line_keep_off_the_table(capsys: pytest.CaptureFixture[str]) -> None:

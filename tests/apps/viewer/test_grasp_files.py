@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import clench
 from clench import ClenchError, FileError
+from clench.apps.cli.inputs.scene_options import with_scene
 from clench.apps.cli.main import main
 from clench.apps.viewer.grasps.grasp_files import GraspFiles, same_command
 from clench.apps.viewer.grasps.planned_list import plan_list
@@ -167,3 +169,22 @@ def test_a_search_lists_grasps_and_rejected_proposals_at_their_places() -> None:
     assert first.command().hand_pose == mug.pose @ first.T_object_palm
     assert first.posture is not None
     assert first.posture().shape == (len(hand.joints),)
+
+
+def test_a_grasp_on_a_table_is_listed_with_it(tmp_path: Path) -> None:
+    hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug", pose=clench.Pose([0.3, 0.0, 0.1]))
+    scene = with_scene(mug, None, (), ())
+    pose = clench.approach_poses(hand, scene, 1, 0)[0]
+    clench.solve(hand, scene, clench.GraspCommand(hand_pose=pose, preshape="open")).save(tmp_path / "s.json")
+    bare = reader()
+    with pytest.warns(UserWarning, match="the solution was computed with obstacle 'table': add --table HEIGHT"):
+        bare.read(tmp_path / "s.json")
+    assert [obj.obstacles for obj in bare.objects.values()] == [()]
+    told = reader()
+    told.around = lambda obj, pose: with_scene(obj, pose, (), ())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (listed,) = told.read(tmp_path / "s.json")
+    (obj,) = told.objects.values()
+    np.testing.assert_array_equal(obj.bodies[1].shapes[0].pose.position, scene.bodies[1].shapes[0].pose.position)
+    assert listed.object in told.objects

@@ -32,8 +32,34 @@ def mjcf(folder: Path, limit: str) -> Path:
     return written(folder, three_fingers().replace('range="0 1.6"', f'range="{limit}"', 1))
 
 
+def driven(text: str) -> str:
+    """Return MJCF whose joints have effort limits."""
+    return text.replace("<joint ", '<joint actuatorfrcrange="-1 1" ')
+
+
 def test_a_hand_without_faults_has_no_findings(tmp_path) -> None:
-    assert Hand.load(written(tmp_path, three_fingers())).findings == ()
+    assert Hand.load(written(tmp_path, driven(three_fingers()))).findings == ()
+
+
+def test_joints_without_effort_limits_are_said_and_can_be_given(tmp_path) -> None:
+    path = written(tmp_path, driven(three_fingers()).replace('<joint actuatorfrcrange="-1 1" ', "<joint ", 1))
+    finding = found(Hand.load(path), FindingCode.EFFORT_MISSING)
+    assert (finding.joints, finding.severity) == (("index_j0",), Severity.NOTE)
+    assert in_hand_file("joints", "index_j0", "effort = ") in finding.advice
+    given = written(tmp_path, "[joints.index_j0]\neffort = 0.5\n", "given.toml")
+    assert Hand.load(path, hand_file=given).findings == ()
+    pulled = "[tendons]\njoints = ['index_j0']\nmoment_arms = [[0.01, -0.01]]\n"
+    endless = written(tmp_path, pulled, "endless.toml")
+    assert found(Hand.load(path, hand_file=endless), FindingCode.EFFORT_MISSING).joints == ("index_j0",)
+    ending = written(tmp_path, f"{pulled}t_max = 90.0\n", "ending.toml")
+    assert Hand.load(path, hand_file=ending).findings == ()
+
+
+def test_a_given_effort_replaces_a_placeholder(tmp_path) -> None:
+    path = written(tmp_path, driven(three_fingers()).replace("-1 1", "-1e9 1e9", 1))
+    assert found(Hand.load(path), FindingCode.EFFORT_PLACEHOLDER).joints == ("index_j0",)
+    given = written(tmp_path, "[joints.index_j0]\neffort = 0.5\n", "given.toml")
+    assert Hand.load(path, hand_file=given).findings == ()
 
 
 @pytest.mark.parametrize("name", ["robonaut2", "patent15"])

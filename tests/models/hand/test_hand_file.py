@@ -33,6 +33,7 @@ def test_everything_can_be_overridden(tmp_path) -> None:
         [joints.index_j0]
         direction = -1
         open = 0.5
+        effort = 0.7
         [joints.thumb_j1]
         follows = "thumb_j0"
         ratio = 0.5
@@ -51,6 +52,9 @@ def test_everything_can_be_overridden(tmp_path) -> None:
     assert (joints["middle_j0"].role, joints["middle_j0"].role_reason) == ("posture", "hand file")
     assert (joints["index_j0"].direction, joints["index_j0"].open_value) == (-1, 0.5)
     assert joints["index_j0"].open_reason == joints["index_j0"].direction_reason == "hand file"
+    assert (joints["index_j0"].effort, joints["index_j1"].effort) == (0.7, None)
+    mirrored = loaded.mirrored()
+    assert mirrored.joints[mirrored.joint_index("index_j0")].effort == 0.7
     (coupling,) = loaded.couplings
     assert (coupling.ratio, coupling.offset, coupling.breakaway, coupling.reason) == (0.5, 0.1, True, "hand file")
     palm = loaded.links[loaded.palm]
@@ -100,6 +104,10 @@ def test_the_open_value_of_a_leader_moves_its_follower(tmp_path) -> None:
         ("[joints.index_j0]\ndirection = true", r"joints\.index_j0\.direction: expected a finite number, got True"),
         ("[joints.index_j0]\nopen = nan", r"joints\.index_j0\.open: expected a finite number"),
         ("[joints.index_j0]\nopen = 2.0", r"joints\.index_j0\.open: expected an angle inside \[0, 1\.6\] rad, got 2"),
+        ("[joints.index_j0]\neffort = 0.0", r"joints\.index_j0\.effort: expected a torque above 0 \[Nm\], got 0"),
+        ("[joints.index_j0]\neffort = inf", r"joints\.index_j0\.effort: expected a finite number"),
+        ("collision_sorce = 'raw'", r"unknown key; .* Did you mean 'collision_source'\?"),
+        ("[joints.index_j0]\nopne = 0.1", r"joints\.index_j0\.opne: unknown key; .* Did you mean 'open'\?"),
         ("[joints.index_j1]\nratio = 2.0", r"joints\.index_j1\.ratio: has a meaning only together with 'follows'"),
         ("[joints.index_j1]\nfollows = 'index_j0'\nratio = 0", r"ratio: expected a number other than 0"),
         ("[joints.index_j1]\nfollows = 'index_j1'", r"joints\.index_j1\.follows: a joint cannot follow itself"),

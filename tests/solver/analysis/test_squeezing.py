@@ -178,3 +178,23 @@ def test_the_servo_of_a_tendon_is_told_what_exerts_its_torques(tmp_path) -> None
     mujoco.mj_forward(model, data)
     at = [model.joint(name).dofadr[0] for name in ("near", "far")]
     np.testing.assert_allclose(data.qfrc_actuator[at], torques, rtol=1e-12)
+
+
+def test_torques_without_limits_are_said(grip: Grip) -> None:
+    hand, ball, solution = grip
+    assert "without limits" not in plan_squeeze(solution, hand, ball).text
+    free = replace(hand, tendons=None, joints=tuple(replace(j, effort=None) for j in hand.joints))
+    plan = plan_squeeze(solution, free, ball)
+    loaded = {name for name, torque in plan.torques.items() if torque}
+    assert loaded <= set(plan.unlimited)
+    others = len(plan.unlimited) - 2
+    named = f"of '{plan.unlimited[0]}', '{plan.unlimited[1]}' and {others} other joints."
+    assert plan.text.endswith(f" Torques are without limits, since the hand has no effort limits {named}")
+    assert plan.to_dict()["text"] == plan.text
+    found = clench.plan_grasps(free, ball, 1, effort=16, most=64, path=False)
+    assert "Torques are without limits, since the hand has no effort limits of" in found.text
+    assert "without limits" not in clench.plan_grasps(hand, ball, 1, effort=16, most=64, path=False).text
+    endless = replace(hand, tendons=replace(hand.tendons, t_max=(np.inf,) * hand.tendons.count), joints=free.joints)
+    assert plan_squeeze(solution, endless, ball).unlimited
+    pulled = replace(hand, joints=free.joints)
+    assert not set(plan_squeeze(solution, pulled, ball).unlimited) & set(hand.tendons.joints)

@@ -6,7 +6,6 @@ The option parser converts the arguments afterwards. Its own messages are boxes 
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import inspect
 import re
 import types
@@ -17,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from clench.core.exceptions import CommandError
+from clench.core.exceptions import CommandError, guessed
 
 #: An argument that is an option and no value: not a negative number, and not a lone dash.
 _OPTION: Final = re.compile(r"--?[A-Za-z]")
@@ -59,7 +58,7 @@ class Option:
             CommandError: it names the option, the value, and the expected value.
         """
         if self.choices and value not in self.choices:
-            raise CommandError(f"{self.name}: expected {self.expected}, got '{value}'.{_guess(value, self.choices)}")
+            raise CommandError(f"{self.name}: expected {self.expected}, got '{value}'.{guessed(value, self.choices)}")
         if self.kind in (int, float):
             try:
                 self.kind(value)
@@ -106,7 +105,7 @@ def _walk(waiting: deque[str], options: Sequence[Option]) -> set[str]:
         name, attached, value = word.partition("=")
         option = named.get(name.replace("_", "-"))
         if option is None:
-            raise CommandError(f"'{name}' is no option of this command.{_guess(name, named)}")
+            raise CommandError(f"'{name}' is no option of this command.{guessed(name, named)}")
         if option.kind is bool:
             if attached:
                 raise CommandError(f"{name}: expected no value, got '{value}'.")
@@ -169,9 +168,3 @@ def _option(name: str, hint: Any, default: Any, required: bool, placed: bool = F
         return Option(name.upper(), kind, count, required, True)
     flag = f"no-{name}" if kind is bool and default is True else name
     return Option(f"--{flag.replace('_', '-')}", kind, count, required, False)
-
-
-def _guess(name: str, names: Any) -> str:
-    """Return a question for the nearest of some names, empty if none is near."""
-    near = difflib.get_close_matches(name, list(names), n=1)
-    return f" Did you mean '{near[0]}'?" if near else ""

@@ -11,13 +11,13 @@ from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
 from clench.models.hand.link_mesh import link_meshes
 from clench.models.objects.grasp_object import GraspObject
-from clench.models.objects.mesh_checks import larger, smaller
+from clench.models.objects.mesh_checks import SMALL, larger, smaller
 
 from .packed_object import PackedObject, pack_object
 
 #: An object that is so many times as large as the hand is hardly meant to be.
 FAR_LARGER: Final = 10.0
-#: Nor is one that the hand is so many times as large as.
+#: Nor is one below `SMALL` that the hand is so many times as large as.
 FAR_SMALLER: Final = 100.0
 #: Nor is a hand that is so many times its size away from the object.
 FAR_AWAY: Final = 10.0
@@ -28,7 +28,7 @@ def warn_of_size(hand: Hand, obj: GraspObject) -> bool:
     across, size = 2.0 * pack_object(obj).size, hand_size(hand)
     if across > FAR_LARGER * size > 0.0:
         how, advice = f"{across / size:.0f} times the size of the hand {hand.name}", smaller(obj.scale)
-    elif 0.0 < FAR_SMALLER * across < size:
+    elif 0.0 < across < min(SMALL, size / FAR_SMALLER):
         how, advice = f"1/{size / across:.0f} of the size of the hand {hand.name}", larger(obj.scale)
     else:
         return False

@@ -45,6 +45,16 @@ class HeldObject:
         """The grasp map G, shape (6, C * width)."""
         return grasp_map(self.contacts, self.center, self.length)
 
+    @cached_property
+    def unlimited(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom that contacts load, and whose torque neither joint nor tendon limits."""
+        bounded = np.isfinite(self.dofs.limits)
+        if self.drive is not None:
+            pulling = np.where(self.drive.arms != 0.0, self.drive.t_max, 0.0)
+            bounded[list(self.drive.columns)] |= np.isfinite(pulling).all(axis=1)
+        loaded = (self.jacobian != 0.0).any(axis=0)
+        return tuple(self.dofs.names[d] for d in np.flatnonzero(loaded & ~bounded))
+
     def edge_wrenches(self, edges: int) -> FloatArray:
         """Return the wrenches of the cones' edges, shape (C, N, 6)."""
         return edge_wrenches(self.contacts, self.center, self.length, edges)

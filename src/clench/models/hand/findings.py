@@ -39,6 +39,8 @@ class FindingCode(StrEnum):
     """no joint may turn by more than a few degrees"""
     EFFORT_PLACEHOLDER = "effort_placeholder"
     """an effort limit that no finger has"""
+    EFFORT_MISSING = "effort_missing"
+    """neither model nor hand file limits the torque of a joint"""
     LENGTHS_TOO_LARGE = "lengths_too_large"
     """lengths as if millimetres were taken for metres"""
     LENGTHS_TOO_SMALL = "lengths_too_small"

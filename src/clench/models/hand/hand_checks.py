@@ -8,6 +8,7 @@ import numpy as np
 
 from clench.core.showing.visible_text import visible
 from clench.core.tolerances import CLOSING_ANGLE, PARALLEL_ANGLE
+from clench.models.hand.reading.limits import write_effort
 from clench.models.hand.understanding.finger_geometry import axis_angle, finger_line
 from clench.models.hand.understanding.known_couplings import check_couplings
 from clench.models.shapes import CollisionSource
@@ -25,7 +26,7 @@ _OUT_OF_SCALE = 50.0
 
 def check_understood(hand: Hand) -> list[Finding]:
     """Return findings about axes, lengths, shapes and thumb of a hand."""
-    found = [*_lengths(hand), *check_couplings(hand)]
+    found = [*_lengths(hand), *check_couplings(hand), *_without_effort(hand)]
     for finger in hand.fingers:
         found += _axes(hand, finger)
         found += _bare_joints(hand, finger)
@@ -101,6 +102,20 @@ def _large_mesh(hand: Hand, links: list[int], size: float, span: float) -> Findi
         links=names,
         numbers={"size_m": size, "joint_distance_m": span},
     )
+
+
+def _without_effort(hand: Hand) -> list[Finding]:
+    """Name the joints of fingers whose torque nothing limits: no effort limit, and no largest tension of tendons."""
+    pulled = hand.tendons.bounded if hand.tendons else ()
+    led = {coupling.follower for coupling in hand.couplings}
+    own = [j for finger in hand.fingers for j in finger.joints if j not in led and hand.joints[j].effort is None]
+    said = {n for f in hand.findings if f.code is FindingCode.EFFORT_PLACEHOLDER for n in f.joints}
+    names = tuple(name for name in (hand.joints[j].name for j in own) if name not in pulled and name not in said)
+    if not names:
+        return []
+    text = f"Joints {quoted(names)}: no effort limits in the model; forces are planned as if there were none."
+    advice = f"Nothing to do for contacts. {write_effort(names[0])}"
+    return [Finding(FindingCode.EFFORT_MISSING, text, advice, Severity.NOTE, joints=names)]
 
 
 def _size(hand: Hand, link: int) -> float:

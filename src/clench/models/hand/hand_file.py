@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from clench.core.exceptions import FileError, HandError
+from clench.core.exceptions import FileError, HandError, guessed
 from clench.core.files.toml_files import read_toml
 from clench.core.numbers import is_finite_number
 from clench.models.hand.reading.tendons import TendonMap
@@ -28,12 +28,13 @@ class FingerOverride:
 
 @dataclass(frozen=True)
 class JointOverride:
-    """Override a joint: role, direction, open value [rad], limits [rad], and the joint that it follows (`""`: none)."""
+    """Override a joint: role, direction, open value [rad], limits [rad], effort [Nm], and its leader (`""`: none)."""
 
     role: JointRole | None = None
     direction: int | None = None
     open_value: float | None = None
     limits: tuple[float, float] | None = None
+    effort: float | None = None
     follows: str | None = None
     ratio: float = 1.0
     offset: float = 0.0
@@ -111,7 +112,7 @@ def _finger(table: _Table) -> FingerOverride:
 
 
 def _joint(table: _Table) -> JointOverride:
-    table.allow("role", "direction", "open", "limits", "follows", "ratio", "offset", "breakaway")
+    table.allow("role", "direction", "open", "limits", "effort", "follows", "ratio", "offset", "breakaway")
     role = table.choice("role", ["closing", "posture"])
     direction = table.number("direction")
     if direction is not None and direction not in (1.0, -1.0):
@@ -120,6 +121,9 @@ def _joint(table: _Table) -> JointOverride:
     for key in ("ratio", "offset", "breakaway"):
         if key in table.data and not follows:
             raise FileError(table.path, f"{table.key(key)}: has a meaning only together with 'follows'.")
+    effort = table.number("effort")
+    if effort is not None and effort <= 0.0:
+        raise table.error("effort", "a torque above 0 [Nm]", effort)
     ratio = table.number("ratio")
     if ratio == 0.0:
         raise table.error("ratio", "a number other than 0", 0.0)
@@ -128,6 +132,7 @@ def _joint(table: _Table) -> JointOverride:
         direction=None if direction is None else int(direction),
         open_value=table.number("open"),
         limits=_limits(table),
+        effort=effort,
         follows=follows,
         ratio=1.0 if ratio is None else ratio,
         offset=table.number("offset") or 0.0,
@@ -217,7 +222,8 @@ class _Table:
     def allow(self, *names: str) -> None:
         for name in self.data:
             if name not in names:
-                raise FileError(self.path, f"{self.key(name)}: unknown key; expected one of {', '.join(names)}.")
+                guess = guessed(name, names)
+                raise FileError(self.path, f"{self.key(name)}: unknown key; expected one of {', '.join(names)}.{guess}")
 
     def tables(self, name: str) -> list[tuple[str, _Table]]:
         inner = _Table(self.path, name, self.data.get(name, {}))

@@ -53,8 +53,7 @@ def load_hand(
     source = _source(collision_source, overrides)
     compiled, palm_body, findings = _hand_alone(text, palm or overrides.palm)
     bodies = hand_bodies(compiled.model, palm_body)
-    given = {name: joint.limits for name, joint in overrides.joints.items() if joint.limits is not None}
-    skeleton = build_skeleton(compiled, bodies, palm_body, text.velocities, given)
+    skeleton = build_skeleton(compiled, bodies, palm_body, text.velocities, overrides.joints)
     found = _with_given_couplings(find_couplings(compiled, skeleton), skeleton, overrides, text.label)
     reader = ShapeReader(compiled)
     links = _links(skeleton, reader, overrides)

@@ -171,6 +171,11 @@ class GraspObject:
 
         return object_from_meshes(parts, name=name, pose=pose, collision_source=collision_source)
 
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """Names of the bodies that are obstacles."""
+        return tuple(body.name for body in self.bodies if body.role is BodyRole.OBSTACLE)
+
     def posed(self, pose: Pose) -> GraspObject:
         """Return the object at another `T_world_object`."""
         return replace(self, pose=pose)

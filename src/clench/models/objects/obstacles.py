@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 from clench.core.argument_types import check_type
 from clench.core.exceptions import ObjectError
@@ -13,9 +14,12 @@ from clench.models.shapes import Shape, ShapeKind
 from .grasp_object import Body, BodyRole
 from .shape_text import parse_shape
 
+#: Name of a table.
+TABLE: Final = "table"
+
 
 def table(
-    height: float = 0.0, *, size: tuple[float, float] = (1.0, 1.0), thickness: float = 0.04, name: str = "table"
+    height: float = 0.0, *, size: tuple[float, float] = (1.0, 1.0), thickness: float = 0.04, name: str = TABLE
 ) -> Body:
     """Return a table top under the object: a box whose upper face is at `height` in the object's frame [m].
 

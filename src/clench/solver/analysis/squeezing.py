@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +41,9 @@ DOWN = (0.0, 0.0, -1.0)
 _LEAST_DISTURBANCE = 1e-3
 #: Share of a mass that is worth a number: a smaller one is a rounded zero.
 _LEAST_SHARE = 0.001
+
+#: A sentence names so many joints; of more, it names two.
+_FEW_NAMES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,13 @@ class SqueezePlan:
     @property
     def text(self) -> str:
         """Sentences that say what is held, or which limit binds; that limit is looked for when it is first read."""
-        return _sentence(self.found, (self.lightest, self.mass), self.feasible, self.any_direction)
+        said = _sentence(self.found, (self.lightest, self.mass), self.feasible, self.any_direction)
+        return f"{said} {without_limits(self.unlimited)}".rstrip() if self.found.plan is not None else said
+
+    @property
+    def unlimited(self) -> tuple[str, ...]:
+        """Names of the loaded degrees of freedom whose torque neither an effort limit nor a tendon limits."""
+        return self.grasp.held.unlimited
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form, `squeeze` in schema `clench.solution/1`."""
@@ -204,6 +213,16 @@ def angle_offsets(hand: Hand, grasp: HeldSolution, torques: FloatArray) -> dict[
             moved = np.flatnonzero(dofs.motion[:, d])
             offsets |= {hand.joints[j].name: float(dofs.motion[j, d] * torques[d] / stiffness) for j in moved}
     return offsets
+
+
+def without_limits(names: Sequence[str]) -> str:
+    """Return a sentence about joints whose torque nothing limits; empty without any."""
+    if not names:
+        return ""
+    shown = 2 if len(names) > _FEW_NAMES else len(names)
+    others = f" and {len(names) - shown} other joints" if shown < len(names) else ""
+    listed = ", ".join(f"'{name}'" for name in names[:shown])
+    return f"Torques are without limits, since the hand has no effort limits of {listed}{others}."
 
 
 def _disturbances(grasp: HeldSolution, mass: float, gravity: ArrayLike | None, given: ArrayLike | None) -> FloatArray:

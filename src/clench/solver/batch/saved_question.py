@@ -11,6 +11,7 @@ import numpy as np
 from clench.core.exceptions import CommandError, FileError
 from clench.core.files.array_files import read_arrays
 from clench.core.files.json_files import parse_json
+from clench.core.pose import Pose
 from clench.core.pose_arrays import pose_of_row
 
 if TYPE_CHECKING:
@@ -88,6 +89,15 @@ class SavedBatch:
         self.object_model = str(self._arrays["object_model"])
         self.object_scale = float(self._arrays["object_scale"])
         self.object_collision_source = str(self._arrays["object_collision_source"])
+        self.object_pose = self._object_pose()
+
+    def _object_pose(self) -> Pose | None:
+        """Return the pose of the object in the command, which its obstacles are placed for; None: its own."""
+        given = self._document.get("object_pose")
+        try:
+            return None if given is None else Pose.from_dict(given, "command.object_pose")
+        except CommandError as error:
+            raise FileError(self.path, str(error)) from None
 
     def _check_shapes(self) -> None:
         """Check that the arrays fit each other, and that text is text."""
@@ -140,7 +150,7 @@ class SavedBatch:
                 raise FileError(
                     self.path,
                     f"pose {i}: solved again for hand '{hand.name}' and object '{obj.name}', it has other angles; "
-                    "give the hand and the object that the batch was solved for.",
+                    "give the hand and the object that the batch was solved for, with its table and obstacles.",
                 )
             yield solution
 

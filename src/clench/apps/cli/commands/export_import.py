@@ -29,6 +29,8 @@ def export(
     hand_file: Path | None = None,
     palm: str | None = None,
     scale: float | None = None,
+    table: tuple[float, ...] | None = None,
+    obstacle: tuple[str, ...] = (),
     root: str | None = None,
     name: str | None = None,
     hold: bool = False,
@@ -52,6 +54,8 @@ def export(
         hand_file: TOML file that was used to load the hand.
         palm: palm link that was used to load the hand.
         scale: of the object; by default the solutions' own.
+        table: table of the solutions, as for `clench solve`.
+        obstacle: obstacles of the solutions, as for `clench solve`; may be given several times.
         root: link whose pose is written, or world (of the hand's model file): dexgraspbench's default; else the palm.
         name: of the object in the file; its own by default.
         hold: test every grasp in simulation; a grasp that holds has confidence 1.
@@ -69,21 +73,22 @@ def export(
     from clench.execution.formats.scene_files import is_scene_file
 
     if len(solutions) == 1 and (solutions[0].is_dir() or solutions[0].suffix == ".parquet"):
-        unused = (hand, object, hand_file, palm, scale, root, name, stiffness)
-        return _export_dataset(solutions[0], out, format, any(unused) or hold or bool(mass or friction), json)
+        unused = (hand, object, hand_file, palm, scale, root, name, stiffness, hold, mass, friction, obstacle)
+        return _export_dataset(solutions[0], out, format, any(unused) or table is not None, json)
     if format == "hdf5" or out.suffix in DATASETS:
         raise CommandError("hdf5: is for datasets; expected the folder of one, or its grasps.parquet.")
     if format is None and is_scene_file(out):
         if any((root, name, stiffness, hold, mass, friction)):
             raise CommandError("export: a scene shows grasps as they are; leave out --root, --name, --hold and forces.")
         check_writable(out)
-        return _export_scene(read_grasps(solutions, hand, object, (hand_file, palm), scale), out, json)
+        read = read_grasps(solutions, hand, object, (hand_file, palm), scale, (table, obstacle))
+        return _export_scene(read, out, json)
     chosen = format_of(out, format, read=False)
     one_each = chosen == "dexgraspbench" and (out.is_dir() or not out.suffix)
     (check_folder if one_each else check_writable)(out)
     planned = {"mass": as_range(mass, "--mass"), "friction": as_range(friction, "--friction")}
     tested = make_test(**planned) if hold else None
-    read = read_grasps(solutions, hand, object, (hand_file, palm), scale)
+    read = read_grasps(solutions, hand, object, (hand_file, palm), scale, (table, obstacle))
     if chosen == "isaac_grasp":
         refuse_several(read, chosen)
     report = clench.export_grasps(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from clench.apps.cli.inputs.choices import Kind, Order, Source
 from clench.apps.cli.inputs.command_files import read_command
-from clench.apps.cli.inputs.scene_options import scene_code, with_scene
+from clench.apps.cli.inputs.scene_options import SceneOptions, scene_code, with_scene
 from clench.apps.cli.parsing import as_angle, as_range
 from clench.core.exceptions import CommandError
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from clench.apps.viewer.grasps.listed_grasp import ListedGrasp
     from clench.apps.viewer.opening import Given
     from clench.apps.viewer.session.live_session import LiveSession
+    from clench.core.pose import Pose
     from clench.models.objects.grasp_object import GraspObject
 
 HAND, OBJECT = "robonaut2", "mug"
@@ -117,11 +118,10 @@ def view(
     PlanOptions(**{name: value for name, value in forces["planning"].items() if value is not None})
     loaded = {"hand_file": hand_file, "palm": palm, "collision_source": collision_source}
     if files:
-        if command is not None or table is not None or obstacle:
-            raise CommandError(
-                "view: files of grasps have their own commands; leave out --command, --table, --obstacle."
-            )
-        session, grasps = _of_files(files, hand, object, loaded, None if scale == 1.0 else scale, forces)
+        if command is not None:
+            raise CommandError("view: files of grasps have their own commands; leave out --command.")
+        size = None if scale == 1.0 else scale
+        session, grasps = _of_files(files, (hand, object), loaded, size, (table, obstacle), forces)
     else:
         asked = {"order": order, "criteria": criteria, "collision_source": collision_source}
         around = command, table, obstacle
@@ -136,13 +136,13 @@ def view(
 
 def _of_files(
     files: Sequence[Path],
-    hand: str | None,
-    object: str | None,
+    models: tuple[str | None, str | None],
     loaded: dict[str, Any],
     scale: float | None,
+    scene: SceneOptions,
     forces: dict[str, Any],
 ) -> tuple[LiveSession, list[ListedGrasp]]:
-    """Return a session with the grasps of files."""
+    """Return a session with the grasps of files, of given models or of those that the files name."""
     import clench
     from clench.apps.cli.inputs.command_files import loadable
     from clench.apps.viewer.grasps.grasp_files import GraspFiles
@@ -151,8 +151,12 @@ def _of_files(
     def load_object(model: str, named: float, geometry: str) -> GraspObject:
         return clench.GraspObject.load(model, scale=named if scale is None else scale, collision_source=geometry)
 
-    given = None if hand is None else loadable(hand), None if object is None else loadable(object)
-    read = GraspFiles(lambda model: clench.Hand.load(model, **loaded), load_object, *given)
+    def around(obj: GraspObject, pose: Pose | None) -> GraspObject:
+        return with_scene(obj, pose, *scene)
+
+    given = (None if model is None else loadable(model) for model in models)
+    asked = None if scene == (None, ()) else around
+    read = GraspFiles(lambda model: clench.Hand.load(model, **loaded), load_object, *given, around=asked)
     return open_list(read, files, **forces)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from clench.apps.cli.inputs.scene_options import SceneOptions, with_scene
 from clench.core.exceptions import CommandError, FileError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -55,12 +56,14 @@ def read_grasps(
     object: str | None,
     loaded_with: tuple[Path | None, str | None],
     scale: float | None,
+    scene: SceneOptions = (None, ()),
 ) -> ReadGrasps:
     """Read files of grasps, and load the models that they name: one hand, and as many objects as there are.
 
     Args:
         files: solutions, JSON lists of solutions, batches. hand, object: models; None: the models that the files name.
         loaded_with: hand file and palm of the hand. scale: of the objects; None: the files' own.
+        scene: the table and the obstacles that the grasps were solved with.
 
     Raises:
         FileError: a file is missing or malformed; a model that was given cannot be read. CommandError: no grasp, or a
@@ -78,7 +81,7 @@ def read_grasps(
         read[0][1].hand_model,
         notes,
     )
-    objects = _Objects(object, scale, the_hand, notes)
+    objects = _Objects(object, scale, scene, the_hand, notes)
     found = ReadGrasps([], the_hand, [], [], ())
     for source, each in read:
         if isinstance(each, clench.GraspSolution):
@@ -117,12 +120,15 @@ class _Objects:
 
     Args:
         given: model of the object of all grasps; None: the models that the files name. scale: of it; None: the files'
-            own. hand: of the grasps, None when it is not known. notes: collects sentences about missing data.
+            own. scene: what is around it. hand: of the grasps, None when it is not known.
+        notes: collects sentences about missing data.
     """
 
-    def __init__(self, given: str | None, scale: float | None, hand: Hand | None, notes: list[str]) -> None:
-        self._given, self._scale, self._hand, self._notes = given, scale, hand, notes
-        self._loaded: dict[tuple[str, float, str], GraspObject | None] = {}
+    def __init__(
+        self, given: str | None, scale: float | None, scene: SceneOptions, hand: Hand | None, notes: list[str]
+    ) -> None:
+        self._given, self._scale, self._scene, self._hand, self._notes = given, scale, scene, hand, notes
+        self._loaded: dict[tuple[Any, ...], GraspObject | None] = {}
 
     def of(self, named: GraspSolution | SavedBatch) -> GraspObject | None:
         """Return the named object, or the given one; None, with a note, if it cannot be loaded."""
@@ -137,6 +143,12 @@ class _Objects:
                 named.object_model,
                 self._notes,
             )
+        loaded, pose = self._loaded[key], named.object_pose
+        if loaded is None or self._scene == (None, ()):
+            return loaded
+        key = (*key, None if pose is None else pose.wxyz_xyz.tobytes())
+        if key not in self._loaded:
+            self._loaded[key] = with_scene(loaded, pose, *self._scene)
         return self._loaded[key]
 
     def of_solution(self, solution: GraspSolution, source: str) -> GraspObject | None:
@@ -153,7 +165,7 @@ class _Objects:
         try:
             check_geometry(solution, self._hand, obj)
         except CommandError as error:
-            if self._given is not None or self._scale is not None:
+            if self._given is not None or self._scale is not None or self._scene != (None, ()):
                 raise CommandError(f"{source}: {error}") from None
             self._notes.append(f"Written without the object: {error}")
             return None

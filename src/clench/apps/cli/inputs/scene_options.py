@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from clench.core.pose import Pose
     from clench.models.objects.grasp_object import GraspObject
 
+#: The values of --table and --obstacle, see `with_scene`.
+SceneOptions = tuple[tuple[float, ...] | None, tuple[str, ...]]
 _FORM: Final = "MESH_OR_SHAPE@x,y,z or MESH_OR_SHAPE@x,y,z,qw,qx,qy,qz"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -15,6 +16,7 @@ import clench
 from clench.core.exceptions import CommandError, FileError
 from clench.core.files.json_files import read_json
 from clench.core.pose import FloatArray, Pose
+from clench.execution.executing import missing_obstacles
 from clench.execution.simulation.piece_hold import command_of
 from clench.models.command import GraspCommand
 from clench.models.hand.hand import Hand
@@ -38,6 +40,7 @@ class GraspFiles:
     Args:
         load_hand, load_object: load a model by its name; the object's scale and geometry are given, too.
         hand, object: models that were given, instead of those that files name.
+        around: adds what is around an object at its pose; None: nothing.
         hands, objects: the loaded models, by the name on the shelf. hand_models, object_models: their names in files.
     """
 
@@ -45,6 +48,7 @@ class GraspFiles:
     load_object: Callable[[str, float, str], GraspObject]
     hand: str | None = None
     object: str | None = None
+    around: Callable[[GraspObject, Pose | None], GraspObject] | None = None
     hands: dict[str, Hand] = field(default_factory=dict)
     objects: dict[str, GraspObject] = field(default_factory=dict)
     hand_models: dict[str, str] = field(default_factory=dict)
@@ -120,7 +124,8 @@ class GraspFiles:
 
         batch = SavedBatch(path)
         hand = self._hand(batch.hand_model, str(path))
-        obj = self._object(batch.object_model, batch.object_scale, batch.object_collision_source, str(path))
+        geometry = batch.object_scale, batch.object_collision_source
+        obj = self._object(batch.object_model, *geometry, str(path), batch.object_pose)
         for number, solution in enumerate(batch.solutions(self.hands[hand], self.objects[obj])):
             yield _listed(solution, f"pose {number + 1}", hand, obj, self.hands[hand], _epsilon(solution), None)
 
@@ -132,14 +137,15 @@ class GraspFiles:
         for number, row in enumerate(rows):
             source = f"{path}: row {number}"
             hand = self._hand(row["hand_model"], source)
-            obj = self._object(row["object_model"], row["scale"], row["object_collision_source"], source)
+            there = Pose(row["T_world_object"][4:], row["T_world_object"][:4])
+            obj = self._object(row["object_model"], row["scale"], row["object_collision_source"], source, there)
             reason = "" if row["ok"] else f"{row['stage'] or 'failed'}: {row['reason'] or 'no reason'}"
             yield ListedGrasp(
                 f"row {number}",
                 hand,
                 obj,
                 Pose(row["T_object_palm"][4:], row["T_object_palm"][:4]),
-                command=partial(_of_row, dataset, number, Pose(row["T_world_object"][4:], row["T_world_object"][:4])),
+                command=partial(_of_row, dataset, number, there),
                 status="grasp" if row["ok"] else "",
                 kind=row["kind"],
                 score=row["score"],
@@ -152,7 +158,7 @@ class GraspFiles:
         """Read the grasps of another program, which name neither a hand nor an object of ours."""
         for grasp in clench.import_grasps(path):
             hand = self._hand("", str(path))
-            obj = self._object("", 1.0, CollisionSource.RAW, str(path))
+            obj = self._object("", 1.0, CollisionSource.RAW, str(path), grasp.object_pose)
             command = grasp.command(self.hands[hand])
             T = grasp.object_pose.inverse() @ command.hand_pose
             yield ListedGrasp(grasp.name, hand, obj, T, command=partial(_same, command), score=grasp.confidence)
@@ -166,7 +172,11 @@ class GraspFiles:
             FileError: it names no models, and none were given. ClenchError: a model is missing, or another one.
         """
         hand = self._hand(solution.hand_model, source)
-        obj = self._object(solution.object_model, solution.object_scale, solution.object_collision_source, source)
+        geometry = solution.object_scale, solution.object_collision_source
+        obj = self._object(solution.object_model, *geometry, source, solution.object_pose)
+        missing = missing_obstacles(solution, self.objects[obj])
+        if missing:
+            warnings.warn(f"{source}: the solution was computed {missing}.", stacklevel=2)
         return _listed(solution, name, hand, obj, self.hands[hand], score, held)
 
     def _hand(self, model: str, source: str) -> str:
@@ -181,13 +191,15 @@ class GraspFiles:
             self.hand_models[self._known[key]] = model
         return self._known[key]
 
-    def _object(self, model: str, scale: float, geometry: str, source: str) -> str:
+    def _object(self, model: str, scale: float, geometry: str, source: str, pose: Pose | None) -> str:
         model = self.object or model
         if not model:
             raise FileError(source, "names no object; give --object.")
-        key = ("object", model, scale, str(geometry))
+        place = None if self.around is None or pose is None else pose.wxyz_xyz.tobytes()
+        key = ("object", model, scale, str(geometry), place)
         if key not in self._known:
             obj = self.load_object(model, scale, geometry)
+            obj = obj if self.around is None else self.around(obj, pose)
             self._known[key] = _free_name(obj.name, self.objects)
             self.objects[self._known[key]] = obj
             self.object_models[self._known[key]] = model

@@ -12,6 +12,7 @@ from clench.core.exceptions import HandError
 from clench.core.pose import FloatArray, Pose
 from clench.models.hand.findings import Finding, FindingCode, Severity
 from clench.models.hand.hand import Joint
+from clench.models.hand.hand_file import JointOverride
 
 from .compiled import CompiledModel
 from .limits import EFFORT_PLACEHOLDER, doubtful_joints, joint_limits
@@ -53,13 +54,13 @@ def build_skeleton(
     bodies: list[int],
     palm: int,
     velocities: Mapping[str, float],
-    given: Mapping[str, tuple[float, float]],
+    given: Mapping[str, JointOverride],
 ) -> Skeleton:
     """Read links and joints of the kept bodies.
 
     Args:
         compiled: the model. bodies: kept bodies, parents first. palm: the palm's body.
-        velocities: velocity limits [rad/s] by joint name. given: limits [rad] to take instead of the model's, by name.
+        velocities: velocity limits [rad/s] by joint name. given: what the hand file says instead of the model, by name.
 
     Raises:
         HandError: a finger has a joint that is not revolute.
@@ -132,11 +133,12 @@ def _joint(
     j: int,
     effort: float | None,
     velocities: Mapping[str, float],
-    given: Mapping[str, tuple[float, float]],
+    given: Mapping[str, JointOverride],
 ) -> Joint:
     m = compiled.model
     name = compiled.joint_name(j)
-    lower, upper = given[name] if name in given else joint_limits(compiled, j)
+    own = given.get(name, JointOverride())
+    lower, upper = own.limits or joint_limits(compiled, j)
     reference = float(m.qpos0[m.jnt_qposadr[j]])
     if effort is not None and effort > EFFORT_PLACEHOLDER:
         effort = None
@@ -150,7 +152,7 @@ def _joint(
         upper=upper,
         reference=reference,
         velocity=velocities.get(name),
-        effort=effort,
+        effort=own.effort or effort,
         stiffness=stiffness,
         servo_share=share,
         friction_loss=float(m.dof_frictionloss[m.jnt_dofadr[j]]),

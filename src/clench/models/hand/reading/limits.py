@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from clench.models.hand.findings import Finding, FindingCode, in_hand_file, quoted
 
 if TYPE_CHECKING:
+    from clench.models.hand.hand_file import JointOverride
+
     from .compiled import CompiledModel
 
 #: Ranges above a whole turn are placeholders, not limits [rad].
@@ -34,21 +36,23 @@ def joint_limits(compiled: CompiledModel, joint: int) -> tuple[float, float]:
 
 
 def doubtful_joints(
-    compiled: CompiledModel, joints: Iterable[int], efforts: Mapping[int, float], given: Collection[str]
+    compiled: CompiledModel, joints: Iterable[int], efforts: Mapping[int, float], overrides: Mapping[str, JointOverride]
 ) -> list[Finding]:
     """Return a finding for each kind of limit, axis or effort that is missing or looks wrong.
 
     Args:
         compiled: the model. joints: MuJoCo's indices of the kept ones. efforts: limits [Nm], by number.
-        given: names of those whose limits the hand file gives.
+        overrides: what the hand file says of joints, by name.
     """
     m = compiled.model
+    given = {name for name, joint in overrides.items() if joint.limits is not None}
+    driven = {name for name, joint in overrides.items() if joint.effort is not None}
     names = {j: compiled.joint_name(j) for j in joints}
     stated = compiled.stated
     free = [n for j, n in names.items() if not m.jnt_limited[j] and n not in stated.still and n not in given]
     ranges = {n: float(np.ptp(m.jnt_range[j])) for j, n in names.items() if m.jnt_limited[j] and n not in given}
     wide = {n: width for n, width in ranges.items() if width > _FULL_TURN}
-    strong = {n: efforts[j] for j, n in names.items() if efforts.get(j, 0.0) > EFFORT_PLACEHOLDER}
+    strong = {n: efforts[j] for j, n in names.items() if efforts.get(j, 0.0) > EFFORT_PLACEHOLDER and n not in driven}
     findings = [*_missing(free), *_too_wide(wide), *_strong(strong)]
     for n in names.values():
         if n in stated.reversed and n not in given:
@@ -65,6 +69,12 @@ def doubtful_joints(
 def _write(name: str) -> str:
     line = in_hand_file("joints", name, "limits = [lower, upper]")
     return f"Write the true limits [rad] in the model, or in the hand file, {line}."
+
+
+def write_effort(name: str) -> str:
+    """Return the advice to give a joint its effort limit."""
+    line = in_hand_file("joints", name, "effort = torque")
+    return f"If forces matter to you, write the true effort limits [Nm] in the model, or in the hand file, {line}."
 
 
 def _missing(names: list[str]) -> list[Finding]:
@@ -98,7 +108,7 @@ def _strong(efforts: Mapping[str, float]) -> list[Finding]:
         f"Joints {quoted(list(efforts))}: effort limits above {EFFORT_PLACEHOLDER:.0f} Nm look like placeholders; "
         "taken as none."
     )
-    advice = "Write the true effort limits in the model if forces matter to you; contacts do not depend on them."
+    advice = f"{write_effort(next(iter(efforts)))} Contacts do not depend on them."
     numbers = {"largest_Nm": max(efforts.values())}
     return [Finding(FindingCode.EFFORT_PLACEHOLDER, text, advice, joints=tuple(efforts), numbers=numbers)]
 

@@ -52,6 +52,12 @@ class TendonMap:
         """Number of tendons."""
         return len(self.t_min)
 
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of the joints whose tendons all have a largest tension."""
+        endless = np.isinf(self.t_max) & (np.array(self.moment_arms) != 0.0)
+        return tuple(name for name, row in zip(self.joints, endless, strict=True) if not row.any())
+
     def arms_of(self, joint_names: Sequence[str]) -> FloatArray:
         """Return the moment arms of all joints of a hand, zero where no tendon pulls, shape (J, T) [m]."""
         arms = np.zeros((len(joint_names), self.count))
