@@ -15,6 +15,7 @@ _MADE_BY: Final = {
     "GraspObject": "clench.GraspObject.load",
     "GraspCommand": "clench.GraspCommand(hand_pose=clench.Pose([x, y, z], wxyz=[w, x, y, z]))",
     "GraspSolution": "clench.solve(hand, obj, command)",
+    "GraspBatch": "clench.solve_batch(hand, obj, poses)",
     "Pose": "clench.Pose([x, y, z], wxyz=[w, x, y, z])",
     "Body": "clench.obstacle(shape, pose)",
 }

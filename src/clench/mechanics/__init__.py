@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from clench.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
+    from clench.solver.analysis.batch_quality import batch_epsilon
     from clench.solver.analysis.grasp_kinds import grasp_kind
     from clench.solver.analysis.pose_error import PoseErrorReport, pose_error
     from clench.solver.analysis.quality import GraspQuality, grasp_quality
@@ -18,6 +19,7 @@ _HOMES = {
     "PoseErrorReport": "clench.solver.analysis.pose_error",
     "Sensitivity": "clench.solver.analysis.sensitivity",
     "SqueezePlan": "clench.solver.analysis.squeezing",
+    "batch_epsilon": "clench.solver.analysis.batch_quality",
     "grasp_kind": "clench.solver.analysis.grasp_kinds",
     "grasp_quality": "clench.solver.analysis.quality",
     "plan_squeeze": "clench.solver.analysis.squeezing",
@@ -30,6 +32,7 @@ __all__ = [
     "PoseErrorReport",
     "Sensitivity",
     "SqueezePlan",
+    "batch_epsilon",
     "grasp_kind",
     "grasp_quality",
     "plan_squeeze",

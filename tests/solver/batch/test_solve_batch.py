@@ -14,7 +14,7 @@ from clench.core.exceptions import ClenchError, CommandError
 from clench.core.pose import Pose
 from clench.solver.batch import batch_progress
 from clench.solver.batch.batch_solver import BatchSolver
-from clench.solver.batch.grasp_batch import GraspBatch
+from clench.solver.batch.grasp_batch import PER_POSE, GraspBatch
 from clench.solver.preshapes import posture_choice
 from clench.solver.preshapes.posture_choice import PostureSolver
 
@@ -264,7 +264,7 @@ def test_a_solution_of_a_batch_needs_no_other_solve(monkeypatch, asked):
     batch = clench.solve_batch(hand, obj, poses, clench.GraspCommand(hand_pose=poses[0], **asked))
     expected = [plain(clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, **asked))) for pose in poses]
     assert all(("preshapes" in document["choice"]) == (not asked) for document in expected)
-    some = batch.taken(np.array([3, 1]))
+    some = batch[[3, 1]]
     copied = pickle.loads(pickle.dumps(batch))
     monkeypatch.setattr("clench.solver.solve.solve", lambda *args: pytest.fail("solved again"))
     assert [plain(batch.solution(i)) for i in range(5)] == expected
@@ -308,3 +308,87 @@ def test_a_batch_keeps_answers_up_to_a_limit(monkeypatch):
 def plain(solution):
     """Return a solution's document without the times."""
     return {**solution.to_dict(), "timing": {}}
+
+
+def arrays_of(batch):
+    """Return all arrays of a batch by name, and all names of its columns."""
+    own = {name: getattr(batch, name) for name in (*PER_POSE, "status", "finger_status", "preshape")}
+    names = {name: getattr(batch, name) for name in ("joint_names", "finger_names", "link_names", "body_names")}
+    return own | {f.name: getattr(batch.contacts, f.name) for f in fields(batch.contacts)} | names
+
+
+def assert_same_batch(a, b):
+    ours, theirs = arrays_of(a), arrays_of(b)
+    for name, values in ours.items():
+        assert np.array_equal(values, theirs[name]), name
+        if isinstance(values, np.ndarray):
+            assert values.dtype == theirs[name].dtype
+
+
+def test_a_batch_is_filtered_by_masks_rows_and_slices():
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
+    batch = clench.solve_batch(hand, obj, clench.approach_poses(hand, obj, 12, 0))
+    mask = batch.status == "grasp"
+    assert 1 < mask.sum() < len(batch)
+    grasps = batch[mask]
+    assert set(grasps.status) == {"grasp"}
+    assert_same_batch(grasps, batch[np.flatnonzero(mask)])
+    assert_same_batch(batch[3:9:2], batch[[3, 5, 7]])
+    assert_same_batch(batch[-2:], batch[[-2, -1]])
+    assert_same_batch(batch[::-1][::-1], batch)
+    k = int(np.flatnonzero(mask)[1])
+    first, last = batch.contacts.first[k : k + 2]
+    np.testing.assert_array_equal(grasps[[1]].contacts.position, batch.contacts.position[first:last])
+    assert plain(grasps.solution(1)) == plain(batch.solution(k))
+    assert len(batch[[]]) == len(batch[np.zeros(12, dtype=bool)]) == len(batch[[]].contacts) == 0
+    for wrong in (3, [12], [-13], [0.5], np.ones(11, dtype=bool), "grasp", [[1]], None):
+        with pytest.raises(CommandError, match=r"^batch: expected a mask of 12 values, numbers of poses up to 11"):
+            batch[wrong]
+
+
+@pytest.mark.parametrize("asked", [{}, {"preshape": "open"}, {"preshape": {"index_yaw": 0.05}, "order": "together"}])
+def test_a_saved_batch_is_loaded_with_its_bits(tmp_path, asked):
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("sphere:r=0.03", scale=1.1)
+    poses = clench.approach_poses(hand, obj, 6, 1)
+    batch = clench.solve_batch(hand, obj, poses, clench.GraspCommand(poses[0], **asked))
+    batch.save(tmp_path / "b.npz")
+    loaded = GraspBatch.load(tmp_path / "b.npz")
+    assert_same_batch(loaded, batch)
+    assert plain(loaded.solution(2)) == plain(batch.solution(2))
+    loaded[[2, 4]].save(tmp_path / "some.npz")
+    assert_same_batch(GraspBatch.load(tmp_path / "some.npz"), batch[[2, 4]])
+
+
+def test_a_saved_batch_with_given_postures_is_loaded(tmp_path):
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
+    poses, angles = clench.approach_poses(hand, obj, 4, 1), {"index_yaw": [0.0, 0.05, 0.0, -0.05]}
+    batch = clench.solve_batch(hand, obj, poses, preshapes=angles)
+    batch.save(tmp_path / "b.npz")
+    loaded = GraspBatch.load(tmp_path / "b.npz")
+    assert_same_batch(loaded, batch)
+    assert plain(loaded.solution(3)) == plain(batch.solution(3))
+
+
+def test_a_batch_is_loaded_for_what_was_solved_alone(tmp_path):
+    hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
+    scene = ball.with_body(clench.table(-0.04))
+    path = tmp_path / "b.npz"
+    clench.solve_batch(hand, scene, clench.approach_poses(hand, scene, 2, 1)).save(path)
+    with pytest.raises(ClenchError, match=r"another geometry of object 'ball': give obj=, the object with 'table'"):
+        GraspBatch.load(path)
+    assert len(GraspBatch.load(path, obj=scene)) == 2
+    with pytest.raises(ClenchError, match="another geometry of hand 'patent15': give hand="):
+        GraspBatch.load(path, clench.Hand.load("patent15"), scene)
+    found = dict(np.load(path))
+    np.savez(path, **found | {"contact_link": found["contact_link"] + 1000})
+    with pytest.raises(ClenchError, match="its arrays do not fit each other"):
+        GraspBatch.load(path, obj=scene)
+
+
+def test_internals_are_not_shown():
+    hand, ball = clench.Hand.load("robonaut2"), clench.GraspObject.load("ball")
+    batch = clench.solve_batch(hand, ball, clench.approach_poses(hand, ball, 1, 1))
+    for shown in (dir(batch), dir(batch.solution(0))):
+        assert not {"with_late", "with_known", "keeping", "question", "joined", "_make_field"} & set(shown)
+        assert "joint_angles" in shown
+    assert {"load", "save", "status", "contacts", "counts"} <= set(dir(batch))

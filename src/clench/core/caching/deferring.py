@@ -73,6 +73,8 @@ class LateFields:
     """A dataclass some of whose fields are made when they are first read; copies and pickles have them all."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
+    #: Names that are no part of the interface for users.
+    _internal: ClassVar[frozenset[str]] = frozenset({"with_late", "with_known"})
 
     @classmethod
     def with_late(cls, make: Callable[[str], Any], **known: Any) -> Self:
@@ -98,6 +100,11 @@ class LateFields:
             raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'", name=name, obj=self)
         value = self.__dict__[name] = make(name)
         return value
+
+    def __dir__(self) -> list[str]:
+        """Return the names of the interface for users."""
+        known = {*object.__dir__(self), *self.__dataclass_fields__}
+        return sorted(known - self._internal - {"_make_field"})
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all fields, and nothing of how they are made."""

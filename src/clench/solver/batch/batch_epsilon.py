@@ -30,17 +30,19 @@ class BatchEpsilon:
     Args:
         hand, obj: as solved. friction: of all contacts; None: that of each link and body. torsion: torsional
             coefficient of soft fingers [m]; None: point contacts.
+        center: centre of mass in the object's frame [m], shape (3,); None: that of a uniform density.
     """
 
     hand: Hand
     obj: GraspObject
     friction: float | None = None
     torsion: float | None = None
+    center: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Look up the data that every grasp needs."""
         mass = mass_properties(self.obj)
-        self._center, self._length = mass.center, mass.length
+        self._center, self._length = mass.center if self.center is None else self.center, mass.length
         links, bodies = range(len(self.hand.links)), self.obj.bodies
         self._mu = np.array([[self.friction or pair_friction(self.hand, k, body) for body in bodies] for k in links])
         self._graspable = np.array([body.role is BodyRole.GRASPABLE for body in bodies])

@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from clench.core.caching.fingerprint import fingerprint
 from clench.core.exceptions import FileError
@@ -19,10 +17,10 @@ from clench.core.files.json_files import check_folder, check_writable, read_json
 from clench.core.pose import FloatArray, Pose
 from clench.scoring.calibration import calibration_of
 
-from .grasp_batch import FINGER_STATUSES, PER_POSE, STATUSES, BatchContacts, GraspBatch, Question
+from .batch_loading import COLUMNS, batch_of, is_whole
+from .grasp_batch import GraspBatch, Question
 
 SCHEMA: Final = "clench.batch_parts/1"
-_OF_CONTACTS: Final = tuple(f"contact_{f.name}" for f in fields(BatchContacts))
 #: Attributes of a hand that do not affect a solve.
 _UNUSED: Final = frozenset({"path", "findings", "spec_xml", "assets"})
 
@@ -102,14 +100,12 @@ class BatchParts:
     def _read(self, number: int, names: Mapping[str, Any], rows: FloatArray) -> GraspBatch | None:
         """Return a part that is there and whole, or None."""
         try:
-            found = read_arrays(self._part(number), (*PER_POSE, *_OF_CONTACTS))
+            found = read_arrays(self._part(number), COLUMNS)
         except FileError:
             return None
-        if not _is_whole(found, names, rows):
+        if not is_whole(found, names, rows):
             return None
-        contacts = BatchContacts(**{f.name: found[f"contact_{f.name}"] for f in fields(BatchContacts)})
-        columns: dict[str, Any] = {name: found[name] for name in PER_POSE}
-        return GraspBatch(**names, **columns, contacts=contacts)
+        return batch_of(found, names)
 
     @property
     def _question(self) -> Path:
@@ -139,43 +135,6 @@ class BatchParts:
                 f"poses, command or version differ; {advice}",
             )
         return note
-
-
-def _is_whole(found: Mapping[str, NDArray[Any]], names: Mapping[str, Any], rows: FloatArray) -> bool:
-    """Return whether arrays are a complete part: all names, the right poses, and meaningful numbers."""
-    if found.keys() != {*PER_POSE, *_OF_CONTACTS} or not np.array_equal(found["hand_poses"], rows):
-        return False
-    poses, joints, fingers = len(rows), len(names["joint_names"]), len(names["finger_names"])
-    contacts = found["contact_finger"].size
-    shapes = {
-        **dict.fromkeys(_OF_CONTACTS, (contacts,)),
-        **dict.fromkeys(PER_POSE, (poses,)),
-        "contact_first": (poses + 1,),
-        "contact_position": (contacts, 3),
-        "contact_normal": (contacts, 3),
-        "hand_poses": (poses, 7),
-        "object_poses": (poses, 7),
-        "joint_angles": (poses, joints),
-        "finger_codes": (poses, fingers),
-        "planes": (poses, fingers),
-    }
-    if any(found[key].shape != shape or found[key].dtype.kind == "U" for key, shape in shapes.items()):
-        return False
-    counts = {
-        "status_codes": len(STATUSES),
-        "finger_codes": len(FINGER_STATUSES),
-        "preshape_codes": max(len(names["question"].options), 1),
-        "contact_finger": fingers,
-        "contact_link": len(names["link_names"]),
-        "contact_joint": joints,
-        "contact_body": len(names["body_names"]),
-    }
-    first = found["contact_first"]
-    return (
-        all(0 <= found[key].min(initial=0) <= found[key].max(initial=0) < count for key, count in counts.items())
-        and (first[0], first[-1]) == (0, contacts)
-        and bool((np.diff(first) >= 0).all())
-    )
 
 
 def parts_folder(path: str | Path) -> Path:

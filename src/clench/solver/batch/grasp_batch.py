@@ -6,10 +6,10 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clench.core.caching.deferring import LateFields
 from clench.core.exceptions import CommandError
@@ -83,6 +83,21 @@ class BatchContacts:
         return filled
 
     @classmethod
+    def load(cls, path: str | Path, hand: Hand | None = None, obj: GraspObject | None = None) -> GraspBatch:
+        """Read a file that `save` wrote; every array has the same bits.
+
+        Args:
+            path: the file. hand, obj: that were solved; None: loaded by the names in the file. An object with obstacles
+                has to be given.
+
+        Raises:
+            FileError: no batch, or one of another hand or object. ClenchError: a model cannot be loaded.
+        """
+        from .batch_loading import load_batch
+
+        return load_batch(path, hand, obj)
+
+    @classmethod
     def joined(cls, parts: Sequence[BatchContacts]) -> BatchContacts:
         """Return the contacts of several batches as one table."""
         counts = np.concatenate([np.diff(part.first) for part in parts])
@@ -123,6 +138,8 @@ class GraspBatch(LateFields):
         contacts: see `BatchContacts`.
         preshape_codes: index of the preshape that clench chose, shape (N,); `preshape` has their names.
     """
+
+    _internal: ClassVar[frozenset[str]] = LateFields._internal | {"question", "keeping", "joined"}
 
     question: Question
     joint_names: tuple[str, ...]
@@ -220,6 +237,8 @@ class GraspBatch(LateFields):
     def save(self, path: str | Path) -> None:
         """Write all arrays and the request to a NumPy file (.npz), atomically; the names are columns of text.
 
+        See `load`.
+
         Raises:
             FileError: the file cannot be written.
         """
@@ -232,6 +251,21 @@ class GraspBatch(LateFields):
         content = io.BytesIO()
         np.savez(content, **arrays)  # type: ignore[arg-type]
         write_atomically(path, content.getvalue())
+
+    @classmethod
+    def load(cls, path: str | Path, hand: Hand | None = None, obj: GraspObject | None = None) -> GraspBatch:
+        """Read a file that `save` wrote; every array has the same bits.
+
+        Args:
+            path: the file. hand, obj: that were solved; None: loaded by the names in the file. An object with obstacles
+                has to be given.
+
+        Raises:
+            FileError: no batch, or one of another hand or object. ClenchError: a model cannot be loaded.
+        """
+        from .batch_loading import load_batch
+
+        return load_batch(path, hand, obj)
 
     @classmethod
     def joined(cls, parts: Sequence[GraspBatch]) -> GraspBatch:
@@ -247,20 +281,41 @@ class GraspBatch(LateFields):
             **columns,
         ).keeping(kept)
 
-    def taken(self, order: Whole) -> GraspBatch:
-        """Return the poses of some rows, in their order."""
+    def __getitem__(self, rows: slice | ArrayLike) -> GraspBatch:
+        """Return the poses of a mask of shape (N,), of some numbers, or of a slice, in their order.
+
+        Raises:
+            CommandError: no such poses. For a single pose, see `solution`.
+        """
+        order = self._rows(rows)
         counts = np.diff(self.contacts.first)[order]
         first = np.concatenate([[0], np.cumsum(counts)])
-        rows = np.repeat(self.contacts.first[order] - first[:-1], counts) + np.arange(int(first[-1]))
-        columns = {f.name: getattr(self.contacts, f.name)[rows] for f in fields(self.contacts) if f.name != "first"}
+        of_contacts = np.repeat(self.contacts.first[order] - first[:-1], counts) + np.arange(int(first[-1]))
+        names = [f.name for f in fields(self.contacts) if f.name != "first"]
         asked = self.question
         taken: dict[str, Any] = {n: getattr(self, n)[order] for n in PER_POSE}
         return replace(
             self,
             question=replace(asked, preshapes={name: a[order] for name, a in asked.preshapes.items()}),
-            contacts=BatchContacts(first=first, **columns),
+            contacts=BatchContacts(first=first, **{n: getattr(self.contacts, n)[of_contacts] for n in names}),
             **taken,
         ).keeping(None if self._kept_answers is None else self._kept_answers.taken(order))
+
+    def _rows(self, rows: slice | ArrayLike) -> Whole:
+        """Return the numbers of poses, from 0; see `__getitem__`."""
+        every = np.arange(len(self))
+        if isinstance(rows, slice):
+            return every[rows]
+        chosen = np.asarray(rows)
+        fits = chosen.dtype.kind in "iu" and bool(((chosen >= -len(self)) & (chosen < len(self))).all())
+        fits = fits or chosen.shape == (0,) or (chosen.dtype == bool and chosen.shape == (len(self),))
+        if chosen.ndim != 1 or not fits:
+            raise CommandError(
+                f"batch: expected a mask of {len(self)} values, numbers of poses up to {len(self) - 1}, or a slice, in "
+                "square brackets; batch.solution(i) is a single pose."
+            )
+        found: Whole = every[chosen] if len(chosen) else every[:0]
+        return found
 
 
 def append_part(solved: list[GraspBatch], part: GraspBatch) -> None:

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from clench.closing.collision.packed_object import hash_bodies, hash_hand
 from clench.core.exceptions import CommandError, FileError
 from clench.core.files.array_files import read_arrays
 from clench.core.files.json_files import parse_json
 from clench.core.pose import Pose
 from clench.core.pose_arrays import pose_of_row
+from clench.models.shapes import CollisionSource
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from clench.models.command import GraspCommand
     from clench.models.hand.hand import Hand
     from clench.models.objects.grasp_object import GraspObject
     from clench.solver.solution import GraspSolution
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 _SAME: Final = 1e-6
 _KEYS: Final = (
     *("schema", "command", "hand_model", "object_model", "object_scale", "object_collision_source", "preshape_joints"),
+    "geometry_hash",
     *("preshape_angles", "status", "hand_poses", "object_poses", "joint_names", "joint_angles"),
 )
 _NUMBERS: Final = ("object_scale", "preshape_angles", "hand_poses", "object_poses", "joint_angles")
@@ -50,12 +54,19 @@ def question_arrays(question: Question, chosen: np.ndarray[Any, Any]) -> dict[st
     return {
         "command": np.array(json.dumps(command_to_dict(question.command))),
         "hand_model": np.array(str(hand.path or hand.name)),
+        "geometry_hash": np.array(geometry_hash(hand, obj, question.command)),
         "object_model": np.array(str(obj.path or obj.name)),
         "object_scale": np.array(obj.scale),
         "object_collision_source": np.array(str(obj.collision_source)),
         "preshape_joints": np.array(list(preshapes), dtype=np.str_),
         "preshape_angles": np.array(list(preshapes.values()), dtype=np.float64),
     }
+
+
+def geometry_hash(hand: Hand, obj: GraspObject, command: GraspCommand) -> str:
+    """Return the fingerprint of the geometry that a batch solves, as solutions have it."""
+    source = CollisionSource(command.collision_source or hand.default_source)
+    return f"{hash_hand(hand, source)}+{hash_bodies(obj.bodies, obj.collision_source)}"
 
 
 class SavedBatch:
@@ -90,6 +101,23 @@ class SavedBatch:
         self.object_scale = float(self._arrays["object_scale"])
         self.object_collision_source = str(self._arrays["object_collision_source"])
         self.object_pose = self._object_pose()
+        self.geometry_hash = str(self._arrays["geometry_hash"])
+
+    @property
+    def command(self) -> GraspCommand:
+        """The command of the batch.
+
+        Raises:
+            CommandError: it is malformed.
+        """
+        from clench.models.command_file import command_from_dict
+
+        return command_from_dict(self._document, f"{self.path}: command")
+
+    @property
+    def preshapes(self) -> dict[str, np.ndarray[Any, Any]]:
+        """Angles of posture joints by name [rad], shape (N,) each."""
+        return dict(zip(self._arrays["preshape_joints"].tolist(), self._arrays["preshape_angles"], strict=True))
 
     def _object_pose(self) -> Pose | None:
         """Return the pose of the object in the command, which its obstacles are placed for; None: its own."""
@@ -134,11 +162,10 @@ class SavedBatch:
         document = self._document
         for i in np.flatnonzero(arrays["status"] == SolutionStatus.GRASP.value):
             try:
-                postures = dict(zip(arrays["preshape_joints"].tolist(), arrays["preshape_angles"], strict=True))
                 asked = document | {
                     "hand_pose": pose_of_row(arrays["hand_poses"][i]).to_dict(),
                     "object_pose": pose_of_row(arrays["object_poses"][i]).to_dict(),
-                    "preshape": _preshape(document, {name: float(each[i]) for name, each in postures.items()}),
+                    "preshape": _preshape(document, {name: float(each[i]) for name, each in self.preshapes.items()}),
                 }
                 solution = solve(hand, obj, command_from_dict(asked, f"{self.path}: pose {i}"))
             except CommandError as error:

@@ -103,7 +103,7 @@ def solve_batch(
                 advance(len(some))
     batch = GraspBatch.joined(solved)
     if len(groups) > 1:
-        batch = batch.taken(np.argsort(np.concatenate(groups), kind="stable"))
+        batch = batch[np.argsort(np.concatenate(groups), kind="stable")]
     _warn_of_distance(hand, obj, batch)
     batch = batch.with_known(question=replace(question, options=batch.question.options))
     if parts is not None:

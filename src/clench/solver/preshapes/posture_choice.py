@@ -127,7 +127,7 @@ class PostureSolver:
             append_part(solved, solver.solve(hand_rows, object_rows, threads, device))
         answers = GraspBatch.joined(solved)
         _, order = self._compare(answers)
-        best = answers.taken(order[:, 0] * len(hand_rows) + np.arange(len(hand_rows)))
+        best = answers[order[:, 0] * len(hand_rows) + np.arange(len(hand_rows))]
         return best.with_known(question=self.names["question"], preshape_codes=order[:, 0].astype(np.int16))
 
     def choose_one(self) -> tuple[PostureOption, Mapping[str, Any]]:

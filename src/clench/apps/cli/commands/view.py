@@ -154,9 +154,9 @@ def _of_files(
     def around(obj: GraspObject, pose: Pose | None) -> GraspObject:
         return with_scene(obj, pose, *scene)
 
-    given = (None if model is None else loadable(model) for model in models)
+    hand, object = (None if model is None else loadable(model) for model in models)
     asked = None if scene == (None, ()) else around
-    read = GraspFiles(lambda model: clench.Hand.load(model, **loaded), load_object, *given, around=asked)
+    read = GraspFiles(lambda model: clench.Hand.load(model, **loaded), load_object, hand, object, asked)
     return open_list(read, files, **forces)
 
 

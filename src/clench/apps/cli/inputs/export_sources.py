@@ -135,7 +135,7 @@ class _Objects:
         import clench
 
         scale, source = named.object_scale if self._scale is None else self._scale, named.object_collision_source
-        key = (self._given or named.object_model, scale, source)
+        key: tuple[Any, ...] = (self._given or named.object_model, scale, source)
         if key not in self._loaded:
             self._loaded[key] = _load(
                 lambda model: clench.GraspObject.load(model, scale=scale, collision_source=source),
