@@ -11,7 +11,10 @@ if __name__ == "__main__":  # worker processes import this file
     job = clench.dataset.DatasetJob(
         hands=("robonaut2",), objects=("ball", "box:x=0.05,y=0.05,z=0.1"), count=4, effort=8
     )
-    report = clench.dataset.generate(job, folder, workers=0)  # in this process; all cores without it
+    try:
+        report = clench.dataset.generate(job, folder, workers=0)  # in this process; all cores without it
+    except clench.ClenchError as error:  # without pyarrow, for example
+        sys.exit(f"{error}")
     assert report.merged is not None
     size = report.merged.bytes / report.merged.rows
     print(f"{report.merged.ok} grasps in {report.merged.file.name}, {size:.0f} bytes each")

@@ -134,7 +134,7 @@ def test_without_pyarrow_there_is_a_sentence(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     assert main(["generate", "--merge", str(folder)]) == 2
-    assert "Datasets need pyarrow: pip install 'clench[data]'." in capsys.readouterr().err
+    assert "Datasets need pyarrow: pip install 'clench[data]' (in a checkout: uv sync" in capsys.readouterr().err
 
 
 def test_a_dataset_goes_to_other_processes(dataset: GraspDataset) -> None:

@@ -326,3 +326,10 @@ def test_every_rejected_proposal_is_told_with_its_place(hand, mug):
     assert stopped
     far = [np.linalg.norm(each.T_object_palm.position) for each in stopped]
     assert max(far) < 0.5, "the place is where the hand stopped, near the object"
+
+
+def test_a_misspelt_option_is_refused_with_a_guess(hand, mug):
+    with pytest.raises(CommandError, match=r"^plan_grasps: unknown option 'aproach'\. Did you mean 'approach'\?"):
+        clench.plan_grasps(hand, mug, 1, aproach=[0, 0, -1])
+    with pytest.raises(CommandError, match=r"^plan_grasps: unknown option 'zzz'\. See"):
+        clench.iter_grasps(hand, mug, 1, zzz=1)

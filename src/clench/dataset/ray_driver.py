@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from clench.core.exceptions import ClenchError, CommandError
+from clench.core.extras import how_to_install
 
 from .jobs.job import DatasetJob, job_from, read_job
 from .jobs.units import Unit
@@ -41,7 +42,7 @@ def generate_on_ray(
     try:
         import ray
     except ImportError:
-        raise ClenchError("Datasets on several machines need Ray: pip install 'clench[scale]'.") from None
+        raise ClenchError(f"Datasets on several machines need Ray: {how_to_install('scale')}.") from None
     own = not ray.is_initialized()
     if own:
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Unpack
 
 from clench.core.argument_types import check_type
+from clench.core.exceptions import CommandError, guessed
 from clench.models.hand.hand import Hand
 from clench.models.objects.grasp_object import GraspObject
 
@@ -68,4 +69,8 @@ def iter_grasps(hand: Hand, obj: GraspObject, count: int = 10, **options: Unpack
     """
     check_type(hand, Hand, "hand")
     check_type(obj, GraspObject, "obj")
+    known = PlanArguments.__annotations__
+    for name in options:
+        if name not in known:
+            raise CommandError(f"plan_grasps: unknown option '{name}'.{guessed(name, known)} See help(plan_grasps).")
     return GraspSearch(hand, obj, PlanOptions(count=count, **options))

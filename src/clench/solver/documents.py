@@ -171,7 +171,9 @@ def solution_from_dict(data: Any, source: str = "solution") -> GraspSolution:
     if not isinstance(data, dict):
         raise FileError(source, f"expected an object of schema '{SCHEMA}', got {type(data).__name__}.")
     if data.get("schema") != SCHEMA:
-        raise FileError(source, f"schema: expected '{SCHEMA}', got {data.get('schema')!r}.")
+        of_plan = str(data.get("schema")).startswith("clench.plan/")
+        advice = " Give the file of one of the plan's grasps, such as grasp-01.json." if of_plan else ""
+        raise FileError(source, f"schema: expected '{SCHEMA}', got {data.get('schema')!r}.{advice}")
     bad = non_finite_path(data)
     if bad is not None:
         raise FileError(source, f"{bad}: expected a finite number.")

@@ -364,3 +364,19 @@ def test_an_interrupt_before_anything_moves_leaves_no_report(
     assert main(["execute", str(tmp_path / "s.json"), *options]) == 130
     assert capsys.readouterr().err == "clench: error: interrupted.\n"
     assert not (tmp_path / "r.json").exists()
+
+
+def test_the_grasps_of_a_plan_are_exported(solution: GraspSolution, tmp_path: Path, capsys) -> None:
+    plan = {"schema": "clench.plan/1", "grasps": [{"solution": solution.to_dict()}] * 2}
+    file = tmp_path / "plan.json"
+    file.write_text(json.dumps(plan))
+    assert main(["export", str(file), "--out", str(tmp_path / "g.yaml"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["grasps"] == 2
+    assert main(["execute", str(file)]) == 2
+    told = (
+        "expected 'clench.solution/1', got 'clench.plan/1'. Give the file of one of the plan's grasps, such as grasp-01"
+    )
+    assert told in capsys.readouterr().err
+    file.write_text(json.dumps({"schema": "clench.plan/1"}))
+    assert main(["export", str(file), "--out", str(tmp_path / "g.yaml")]) == 2
+    assert "grasps: expected a list of planned grasps." in capsys.readouterr().err

@@ -582,3 +582,17 @@ def test_friction_or_mass_alone_print_the_forces(capsys):
     assert "any direction of gravity" in said or "every direction of gravity" in said
     assert main(["solve", "--hand", "robonaut2", "--object", "sphere:r=0.03", "--mass", "-1"]) == 2
     assert "--mass: expected a finite number of at least 0 kg" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("outcomes", "code"), [([True, True], 0), ([True, False], 1)])
+def test_a_plan_with_a_dropped_object_exits_with_1(monkeypatch, capsys, outcomes, code):
+    from types import SimpleNamespace
+
+    from clench.apps.cli.commands import plan_command
+
+    reports = iter([SimpleNamespace(held=held, to_dict=lambda held=held: {"held": held}) for held in outcomes])
+    monkeypatch.setattr(plan_command, "_held", lambda *_: next(reports))
+    call = ["plan", "--hand", "robonaut2", "--object", "ball", "--count", "2", "--effort", "16", "--without-path"]
+    assert main([*call, "--hold", "--json"]) == code
+    document = json.loads(capsys.readouterr().out)
+    assert [grasp["hold"]["held"] for grasp in document["grasps"]] == outcomes

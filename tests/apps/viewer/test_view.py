@@ -26,7 +26,10 @@ def test_without_viser_the_command_says_how_to_install_it(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "viser" else find_spec(name))
-    assert say(capsys) == "clench: error: clench view needs viser: pip install 'clench[viewer]'.\n"
+    assert say(capsys) == (
+        "clench: error: clench view needs viser: pip install 'clench[viewer]' "
+        "(in a checkout: uv sync --no-dev --inexact --extra viewer).\n"
+    )
 
 
 def test_bad_input_is_one_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -36,7 +39,7 @@ def test_bad_input_is_one_sentence(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "seed: expected a whole number of at least 0, got -1" in say(capsys, "--seed", "-1")
     assert "gravity: expected a direction" in say(capsys, "--gravity", "0", "0", "0")
     assert "--port is given more than once" in say(capsys, "--port", "0", "--port", "1")
-    assert "leave out --command" in say(capsys, str(tmp_path / "a.json"), "--table")
+    assert "leave out --command" in say(capsys, str(tmp_path / "a.json"), "--command", "c.json")
 
 
 def test_a_port_in_use_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from clench.apps.cli.inputs.actuators import make_film, make_hold
 from clench.core.exceptions import ClenchError, CommandError, FileError
 from clench.execution.executing import execute
-from clench.execution.simulation.filming import FRAME, Film
+from clench.execution.simulation.filming import FRAME, Film, covered_geoms, framed
 from clench.execution.simulation.hold import Hold
 from clench.execution.simulation.mujoco_scene import build_scene
 from clench.execution.simulation.simulated_hand import SimulatedHand
@@ -75,6 +75,41 @@ def test_the_whole_object_is_in_the_picture(pincer: Hand, pinch: GraspSolution, 
     assert orange.sum() > 1000
     assert not orange[[0, -1]].any()
     assert not orange[:, [0, -1]].any()
+
+
+def test_hand_and_object_fill_the_picture_and_stay_inside() -> None:
+    """Seen by a pinhole camera as MuJoCo has it, some place lies at the rim that is left free, and none beyond it."""
+    rng = np.random.default_rng(0)
+    azimuth, elevation = np.deg2rad([135.0, -20.0])
+    along = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    up = np.cross(right, along)
+    for size in (1e-3, 0.3, 100.0):
+        places = size * (rng.normal(size=(50, 3)) * [1.0, 0.2, 0.6] + [3.0, -2.0, 1.0])
+        lookat, distance = framed(places, 45.0)
+        seen = places - (lookat - distance * along)
+        half = np.tan(np.deg2rad(22.5))
+        x, y = (seen @ right) / (seen @ along) / (half * 4.0 / 3.0), (seen @ up) / (seen @ along) / half
+        assert (seen @ along > 0.0).all()
+        assert max(np.abs(x).max(), np.abs(y).max()) == pytest.approx(0.9)
+        # Both rims of one direction are reached.
+        wide = x if np.abs(x).max() > np.abs(y).max() else y
+        assert (wide.min(), wide.max()) == pytest.approx((-0.9, 0.9))
+
+
+def test_geoms_that_others_are_drawn_over_are_left_out() -> None:
+    import mujoco
+
+    def body(name: str, geoms: str) -> str:
+        return f'<body name="{name}">{geoms}</body>'
+
+    drawn, collides = '<geom size="1" contype="0" conaffinity="0"/>', '<geom size="1"/>'
+    xml = (
+        body("both", drawn + collides) + body("bare", collides) + body("shown", drawn) + body("else", drawn + collides)
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{xml}</worldbody></mujoco>")
+    links = [model.body(name).id for name in ("both", "bare", "shown")]
+    assert covered_geoms(model, links).tolist() == [False, True, False, False, False, False]
 
 
 def test_pictures_come_back_from_an_mp4_in_order(tmp_path: Path) -> None:

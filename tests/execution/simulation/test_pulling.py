@@ -225,7 +225,7 @@ def test_a_free_object_weighs_what_was_asked(pincer: Hand, pinch: GraspSolution,
         ({"mass": -0.1}, r"hold: mass: expected a finite number of at least 0.001 kg, got -0.1"),
         ({"mass": float("nan")}, r"hold: mass: expected a finite .* got nan"),
         ({"mass": 0.0}, r"hold: mass: .* got 0.0"),
-        ({"friction": -1.0}, r"hold: friction: expected a finite number above 0, got -1; nothing holds"),
+        ({"friction": -1.0}, r"hold: friction: expected a finite number above 0, got -1.0; nothing holds"),
         ({"friction": 0.0}, r"hold: friction: .* got 0"),
         ({"friction": float("nan")}, r"hold: friction: .* got nan"),
         ({"torsion": -0.1}, r"hold: torsion: expected a finite number of at least 0, got -0.1"),
@@ -241,3 +241,12 @@ def test_a_free_object_weighs_what_was_asked(pincer: Hand, pinch: GraspSolution,
 def test_settings_that_make_no_sense(given: dict[str, Any], message: str) -> None:
     with pytest.raises(CommandError, match=message):
         Hold(**given)
+
+
+@pytest.mark.parametrize("key", ["mass", "friction", "torsion", "squeeze", "pull", "duration", "max_angle", "height"])
+@pytest.mark.parametrize("value", ["x", None, True, [1.0, 2.0]], ids=str)
+def test_settings_that_are_no_numbers_are_refused_in_one_sentence(key, value):
+    with pytest.raises(
+        CommandError, match=rf"^hold: {key}: expected a finite number .*, got {re.escape(repr(value))}[.;]"
+    ):
+        Hold(**{key: value})

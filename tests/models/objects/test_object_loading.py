@@ -315,3 +315,25 @@ def test_scanned_objects_are_seen_to_be_closed():
         loaded = GraspObject.load(path)
         assert loaded.bodies[0].closed, loaded.warnings
         assert not any("millimetres" in warning for warning in loaded.warnings)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("bolt.stl", "bolt"),
+        ("ycb_mug/textured.obj", "ycb_mug"),
+        ("ycb_mug/Mesh.stl", "ycb_mug"),
+        ("002_can/google_16k/nontextured.stl", "002_can"),
+        ("cup/meshes/visual.stl", "cup_visual"),
+        ("cup/meshes/collision.stl", "cup_collision"),
+        ("cup/handle.stl", "handle"),
+    ],
+)
+def test_an_object_is_called_after_its_file_or_the_folder_that_says_more(tmp_path, file, name):
+    path = tmp_path / file
+    path.parent.mkdir(parents=True, exist_ok=True)
+    trimesh = pytest.importorskip("trimesh")
+    mesh = GraspObject.load("box:x=0.05,y=0.05,z=0.05").bodies[0].shapes[0].to_mesh()
+    trimesh.Trimesh(mesh.vertices, mesh.triangles).export(path)
+    obj = GraspObject.load(path)
+    assert (obj.name, obj.bodies[0].name) == (name, name)

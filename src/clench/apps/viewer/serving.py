@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from clench.core.exceptions import ClenchError
+from clench.core.extras import how_to_install
 
 from .gate import LOCAL, Gate, new_token
 from .grasps.listed_grasp import ListedGrasp
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import viser
 
 DEFAULT_PORT: Final = 8765
-_INSTALL: Final = "clench view needs viser: pip install 'clench[viewer]'."
+_INSTALL: Final = f"clench view needs viser: {how_to_install('viewer')}."
 
 
 @dataclass(frozen=True, eq=False)

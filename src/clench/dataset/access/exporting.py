@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from clench.core.exceptions import ClenchError, FileError, UnknownNameError
+from clench.core.extras import how_to_install
 from clench.core.files.json_files import check_folder, check_writable
 from clench.dataset.jobs.sources import load_hand, load_object
 from clench.dataset.storage.columns import COLUMNS, SCHEMA
@@ -127,7 +128,7 @@ def _write_hdf5(dataset: GraspDataset, path: Path) -> None:
     try:
         import h5py
     except ImportError:
-        raise ClenchError("HDF5 files need h5py: pip install 'clench[data]'.") from None
+        raise ClenchError(f"HDF5 files need h5py: {how_to_install('data')}.") from None
     with whole_file(path) as temporary, h5py.File(temporary, "w", track_order=True) as file:
         file.attrs["schema"] = SCHEMA
         for number, (model, about) in enumerate(dataset.hands.items()):

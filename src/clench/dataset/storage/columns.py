@@ -6,6 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from clench.core.exceptions import ClenchError
+from clench.core.extras import how_to_install
 
 if TYPE_CHECKING:
     import pyarrow
@@ -85,7 +86,7 @@ def need_pyarrow() -> None:
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
-        raise ClenchError("Datasets need pyarrow: pip install 'clench[data]'.") from None
+        raise ClenchError(f"Datasets need pyarrow: {how_to_install('data')}.") from None
 
 
 @cache

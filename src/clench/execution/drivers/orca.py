@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from clench.core.exceptions import CommandError, FileError
+from clench.core.extras import how_to_install
 from clench.core.showing.short_repr import described
 from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
@@ -32,7 +33,7 @@ class OrcaDriver:
 
     def __init__(self, config: str | Path | None = None, *, mock: bool = False, version: str | None = None) -> None:
         if importlib.util.find_spec("orca_core") is None:
-            raise CommandError("orca-core is not installed; pip install 'clench[drivers]'.")
+            raise CommandError(f"orca-core is not installed; {how_to_install('drivers')}.")
         if config is not None and not Path(config).is_file():
             raise FileError(config, "no such file.")
         import orca_core

@@ -20,6 +20,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from clench.core.exceptions import CommandError, UnknownNameError
+from clench.core.extras import how_to_install
 from clench.core.showing.short_repr import described
 from clench.execution.hardware.driver import DriverError, DriverLimits, HandState, JointPath
 
@@ -280,8 +281,8 @@ _MODULES: Final = {
     RosInterface.ACTION: "control_msgs",
 }
 _ADVICE: Final = {
-    RosInterface.AUTO: "source a ROS installation, or: pip install 'clench[ros2]'",
-    RosInterface.RCLPY: "source a ROS installation, or: pip install 'clench[ros2]'",
+    RosInterface.AUTO: f"source a ROS installation, or: {how_to_install('ros2')}",
+    RosInterface.RCLPY: f"source a ROS installation, or: {how_to_install('ros2')}",
     RosInterface.CYCLONEDDS: "pip install cyclonedds",
     RosInterface.ACTION: "source a ROS installation that has it (no package index does)",
 }

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from clench.core.exceptions import CommandError
+from clench.core.extras import how_to_install
 from clench.core.files.json_files import encode_document, write_atomically
 from clench.execution.execution_report import ExecutionReport
 from clench.solver.solution import GraspSolution
@@ -47,7 +48,7 @@ def write_log(path: str | Path, report: ExecutionReport, solution: GraspSolution
     if report.history is None:
         raise CommandError(f"Nothing was kept of the execution by '{report.actuator}': there is nothing to log.")
     if importlib.util.find_spec("mcap_ros2") is None:
-        raise CommandError("mcap-ros2-support is not installed; pip install 'clench[logs]'.")
+        raise CommandError(f"mcap-ros2-support is not installed; {how_to_install('logs')}.")
     from mcap_ros2.writer import Writer
 
     content = io.BytesIO()

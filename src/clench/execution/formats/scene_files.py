@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from clench.core.exceptions import CommandError, FileError
+from clench.core.extras import how_to_install
 from clench.core.files.json_files import check_writable, write_atomically
 from clench.core.pose import FloatArray
 from clench.execution.executing import check_geometry
@@ -86,7 +87,7 @@ def export_scene(
         content = glb_bytes(scene)
     else:
         if importlib.util.find_spec("pxr") is None:
-            raise CommandError("usd: needs usd-core: pip install 'clench[usd]', or choose a .glb file.")
+            raise CommandError(f"usd: needs usd-core: {how_to_install('usd')}, or choose a .glb file.")
         from .scene_usd import usd_bytes
 
         content = usd_bytes(scene, file.suffix.lower())

@@ -10,9 +10,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.core.exceptions import ClenchError, FileError
+from clench.core.extras import how_to_install
 from clench.core.files.json_files import check_folder, check_writable, write_atomically
+from clench.core.pose import FloatArray
 from clench.core.rendering.offscreen import Offscreen
 from clench.core.rendering.opengl import OpenGLError, import_mujoco, open_context
 from clench.core.showing.short_repr import short_repr
@@ -23,10 +26,16 @@ from .mujoco_scene import Scene
 FRAME: Final = 0.04
 _WIDTH, _HEIGHT = 640, 480
 _NO_OPENGL: Final = "No video: OpenGL cannot draw here ({}). Without a screen, install Mesa's libegl1."
-#: How far the camera is off, as a multiple of what it looks at, and from where [degrees].
-_DISTANCE, _AZIMUTH, _ELEVATION = 2.2, 135.0, -20.0
-#: Rise of the camera's target if the palm moves up [m].
-_UP: Final = 0.05
+#: From where the camera looks [degrees].
+_AZIMUTH, _ELEVATION = 135.0, -20.0
+#: Share of the picture that hand and object fill at the start [-].
+_FILLED: Final = 0.9
+#: Rise of hand and object that the picture has room for if the palm moves up [m].
+_UP: Final = 0.1
+#: The camera sees nothing nearer, as a share of its distance [-].
+_NEAR: Final = 0.01
+#: Group of geoms that are not drawn.
+_COVERED: Final = 1
 
 
 @dataclass
@@ -60,7 +69,7 @@ class Film:
         if self.video is not None and self.video.suffix.lower() not in (".gif", ".mp4"):
             raise FileError(self.video, "cannot be written: expected a file name that ends with .gif or .mp4.")
         if self._is_mp4() and importlib.util.find_spec("imageio_ffmpeg") is None:
-            raise ClenchError("MP4 needs imageio-ffmpeg: pip install 'clench[video]', or choose a .gif file.")
+            raise ClenchError(f"MP4 needs imageio-ffmpeg: {how_to_install('video')}, or choose a .gif file.")
         if self.video is not None:
             check_writable(self.video)
         if self.stills is not None:
@@ -82,15 +91,16 @@ class Film:
             self._renderer = Offscreen(scene.model, _WIDTH, _HEIGHT)
         except OpenGLError as error:
             raise ClenchError(_NO_OPENGL.format(error)) from None
-        links = [body for body in scene.link_bodies if body >= 0]
-        places = np.vstack([data.xipos[links], *(_corners(scene.model, data, geom) for geom in scene.object_geoms)])
-        self._camera = mujoco.MjvCamera()
-        self._camera.lookat[:] = 0.5 * (places.min(axis=0) + places.max(axis=0))
-        self._camera.distance = _DISTANCE * max(float(np.ptp(places, axis=0).max()), 0.1)
+        model, links = scene.model, [body for body in scene.link_bodies if body >= 0]
+        model.geom_group[:] = np.where(covered_geoms(model, links), _COVERED, 0)
+        shown = np.isin(model.geom_bodyid, [*links, scene.object_body]) & (model.geom_group != _COVERED)
+        places = np.vstack([_corners(model, data, int(geom)) for geom in np.flatnonzero(shown)])
         if scene.lift >= 0:
-            self._camera.lookat[2] += _UP
-            self._camera.distance += 2.0 * _UP
+            places = np.vstack([places, places + np.array([0.0, 0.0, _UP])])
+        self._camera = mujoco.MjvCamera()
         self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
+        self._camera.lookat[:], self._camera.distance = framed(places, float(model.vis.global_.fovy))
+        model.vis.map.znear = _NEAR * self._camera.distance / model.stat.extent
         self._frames, self._kept, self._due = [], {}, float(data.time)
         self.still("start", data)
 
@@ -135,8 +145,44 @@ class Film:
     def _drawn(self, data: Any) -> Any:
         from PIL import Image
 
-        self._renderer.update(data, self._camera)
+        self._renderer.update(data, self._camera, frozenset({_COVERED}))
         return Image.fromarray(self._renderer.draw()[0])
+
+
+def covered_geoms(model: Any, bodies: list[int]) -> NDArray[np.bool_]:
+    """Return the geoms of some bodies that collide and that others of the body are drawn over, shape (G,).
+
+    Both in one place would flicker.
+    """
+    colliding = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    drawn = np.unique(model.geom_bodyid[~colliding])
+    covered: NDArray[np.bool_] = colliding & np.isin(model.geom_bodyid, np.intersect1d(drawn, bodies))
+    return covered
+
+
+def framed(places: FloatArray, fovy: float) -> tuple[FloatArray, float]:
+    """Return what the camera looks at, shape (3,), and from how far [m], so that places fill the picture.
+
+    A place p appears at `x / (distance + depth)`, where x is across the view and depth along it. So each side of the
+    picture bounds the distance and the middle linearly, and the best of both is known in closed form.
+
+    Args:
+        places: in the world [m], shape (N, 3). fovy: vertical field of view [degrees].
+    """
+    azimuth, elevation = np.deg2rad([_AZIMUTH, _ELEVATION])
+    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    along = np.cos(elevation) * level + np.array([0.0, 0.0, np.sin(elevation)])
+    right = np.array([level[1], -level[0], 0.0])
+    up = np.cross(right, along)
+    depth, half = places @ along, _FILLED * np.tan(0.5 * np.deg2rad(fovy))
+    middle, off = 0.0 * along, -np.inf
+    for axis, share in ((right, half * _WIDTH / _HEIGHT), (up, half)):
+        across = places @ axis / share
+        most, least = float((across - depth).max()), float((-across - depth).max())
+        middle = middle + 0.5 * share * (most - least) * axis
+        off = max(off, 0.5 * (most + least))
+    ahead = 0.5 * float(depth.min() + depth.max())
+    return middle + ahead * along, off + ahead
 
 
 def _corners(model: Any, data: Any, geom: int) -> Any:

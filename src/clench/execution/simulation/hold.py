@@ -11,8 +11,9 @@ import numpy as np
 
 from clench.core.defaults import FRICTION, MASS
 from clench.core.exceptions import CommandError
+from clench.core.numbers import is_finite_number
 from clench.core.showing.short_repr import described, short_repr
-from clench.mechanics.grasp.contacts import ContactModel, check_friction, friction_range
+from clench.mechanics.grasp.contacts import ContactModel, friction_range
 from clench.mechanics.grasp.loads import mass_range
 
 #: The lightest object that the simulation carries [kg].
@@ -68,9 +69,12 @@ class Hold:
 
     def __post_init__(self) -> None:
         """Refuse values that cannot be simulated."""
-        if not (np.isfinite(self.mass) and self.mass >= LIGHTEST):
+        if not (is_finite_number(self.mass) and self.mass >= LIGHTEST):
             raise CommandError(f"hold: mass: expected a finite number of at least {LIGHTEST:g} kg, got {self.mass!r}.")
-        check_friction(self.friction, "hold: friction")
+        if not (is_finite_number(self.friction) and self.friction > 0.0):
+            raise CommandError(
+                f"hold: friction: expected a finite number above 0, got {self.friction!r}; nothing holds without it."
+            )
         mass_range(self.planned_for[0], "hold: planned_mass")
         friction_range(self.planned_for[1], "hold: planned_friction")
         if self.contact_model not in list(ContactModel):
@@ -81,11 +85,11 @@ class Hold:
             raise CommandError(f"hold: test: expected one of {', '.join(HoldTest)}, got {self.test!r}.")
         for key in ("torsion", "squeeze"):
             value = getattr(self, key)
-            if not (np.isfinite(value) and value >= 0.0):
+            if not (is_finite_number(value) and value >= 0.0):
                 raise CommandError(f"hold: {key}: expected a finite number of at least 0, got {value!r}.")
         for key in ("pull", "duration", "max_distance", "max_angle", "height"):
             value = getattr(self, key)
-            if not (np.isfinite(value) and value > 0.0):
+            if not (is_finite_number(value) and value > 0.0):
                 raise CommandError(f"hold: {key}: expected a finite number above 0, got {value!r}.")
 
     @property

@@ -24,6 +24,13 @@ from .shape_text import is_shape_text, parse_shape
 
 #: Radius of the built-in ball: a tennis ball [m].
 BALL_RADIUS: Final = 0.0335
+#: Names of files and folders that do not tell objects apart.
+SAYS_NOTHING: Final = frozenset(
+    {
+        *("textured", "nontextured", "textured_simple", "mesh", "meshes", "model", "models", "visual", "collision"),
+        *("object", "objects", "base", "scan", "google_16k", "google_64k", "google_512k", "tsdf", "poisson"),
+    }
+)
 
 
 def _ball() -> Body:
@@ -75,7 +82,7 @@ def load_object(
     else:
         path = expanded(model)
         _refuse_bare_name(model, path)
-        name = path.stem
+        name = file_name(path)
         vertices, triangles = read_mesh(path)
         checked = check_mesh(vertices, triangles, path.name)
         body = Body(name, (Shape(ShapeKind.MESH, mesh=checked.mesh, name=name),), closed=checked.closed)
@@ -87,6 +94,20 @@ def load_object(
         name, (in_source(body, source),), Pose.identity() if pose is None else pose, source, warnings, path, factor
     )
     return replace(read, warnings=(*warnings, *size_warnings(read)))
+
+
+def file_name(path: Path) -> str:
+    """Return the name of an object in a file: the stem, or the nearest folder that says more.
+
+    Collections of scans call every mesh alike, such as `mug/google_16k/textured.obj`.
+    """
+    stem = path.stem
+    if stem.lower() not in SAYS_NOTHING:
+        return stem
+    folders = (folder.name for folder in path.absolute().parents)
+    folder = next((name for name in folders if name and name.lower() not in SAYS_NOTHING), stem)
+    # The two stand side by side.
+    return f"{folder}_{stem}" if stem.lower() in ("visual", "collision") and folder != stem else folder
 
 
 def size_warnings(obj: GraspObject) -> tuple[str, ...]:

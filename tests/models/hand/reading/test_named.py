@@ -148,7 +148,10 @@ def test_packages_that_are_not_installed(monkeypatch) -> None:
         monkeypatch.delitem(sys.modules, package, raising=False)
     with pytest.raises(HandError, match=r"mujoco_menagerie is not installed; .*pip install 'clench\[hands\]'"):
         Hand.load("mujoco_menagerie:shadow_hand")
-    with pytest.raises(UnknownNameError, match=r"more hands by name need pip install 'clench\[hands\]'\. Hands: pat"):
+    with pytest.raises(
+        UnknownNameError,
+        match=r"more hands by name need pip install 'clench\[hands\]' \(in a checkout: uv .*\)\. Hands: pat",
+    ):
         Hand.load("shadow_hand")
 
 

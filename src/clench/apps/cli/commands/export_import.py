@@ -42,9 +42,9 @@ def export(
     """Write grasps as isaac_grasp YAML, DexGraspBench npy, moveit_msgs/Grasp JSON, or scenes (docs/exporting.md).
 
     Args:
-        solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, or batches
-            (.npz) written by `clench batch --out` (all poses with a grasp); or one dataset: the folder of `clench
-            generate`, or its grasps.parquet.
+        solutions: files written by `clench solve --out` or `GraspSolution.save`, JSON lists of solutions, plan.json of
+            `clench plan --out`, or batches (.npz) written by `clench batch --out` (all poses with a grasp); or one
+            dataset: the folder of `clench generate`, or its grasps.parquet.
         out: the file; for several grasps in the format dexgraspbench, a folder; of a dataset, a folder or an HDF5 file.
             A .glb, .usd, .usda or .usdc file shows hand, object and contacts; USD has the grasp lines, too.
         format: of the file; by its ending (.yaml, .npy, .json, .h5) by default, a folder is dexgraspbench. hdf5 is for

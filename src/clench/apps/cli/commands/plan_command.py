@@ -78,7 +78,7 @@ def plan(
         threads: number of threads; all cores by default.
         without_path: leave out the free paths, which take most of the time.
         hold: test every grasp in simulation: close on the free object, squeeze, pull in six directions
-            (docs/hold.md).
+            (docs/hold.md); the exit code is 1 if an object is dropped.
         out: folder for plan.json, the solution and trajectory of every grasp, and pictures: the best grasps, where
             all of them touch the object, and the zones in which the hand grasps.
         html: file (.html) for a page that shows all grasps in any browser, without a network (docs/pictures.md).
@@ -137,7 +137,7 @@ def plan(
     else:
         print_plan(document, found.text)
         print_files(files)
-    return 0 if len(found) else 1
+    return 0 if len(found) and all(report.held for report in held) else 1
 
 
 def _searched(hand: Hand, obj: GraspObject, count: int, asked: dict[str, Any]) -> GraspPlan:

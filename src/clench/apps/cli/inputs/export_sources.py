@@ -180,9 +180,23 @@ def _contents(file: Path) -> list[tuple[str, GraspSolution | SavedBatch]]:
 
     if file.suffix == ".npz":
         return [(str(file), SavedBatch(file))]
-    data = read_json(file, "a solution or a list of solutions")
+    data = read_json(file, "a solution, a list of solutions or a plan")
+    if isinstance(data, dict) and str(data.get("schema")).startswith("clench.plan/"):
+        data = [grasp.get("solution") if isinstance(grasp, dict) else grasp for grasp in _grasps(data, file)]
     listed = [(f"{file}[{i}]", each) for i, each in enumerate(data)] if isinstance(data, list) else [(str(file), data)]
     return [(source, clench.GraspSolution.from_dict(each, source)) for source, each in listed]
+
+
+def _grasps(plan: dict[str, Any], file: Path) -> list[Any]:
+    """Return the entries of a plan.
+
+    Raises:
+        FileError: it has no list of them.
+    """
+    grasps = plan.get("grasps")
+    if not isinstance(grasps, list):
+        raise FileError(file, "grasps: expected a list of planned grasps.")
+    return grasps
 
 
 def _check_hand(solution: GraspSolution, hand: Hand | None, source: str, first: str) -> None:

@@ -11,10 +11,11 @@ from types import ModuleType
 from typing import Any, Final
 
 from clench.core.exceptions import HandError, UnknownNameError
+from clench.core.extras import how_to_install
 
 MENAGERIE: Final = "mujoco_menagerie"
 DESCRIPTIONS: Final = "robot_descriptions"
-_INSTALL: Final = "pip install 'clench[hands]'"
+_INSTALL: Final = how_to_install("hands")
 #: Hands whose models were loaded and solved, so that messages may suggest them. The packages also have grippers with
 #: prismatic fingers or closed linkages, which clench refuses, and models that were not tried.
 _LOADING: Final = frozenset(
