@@ -107,9 +107,10 @@ def test_the_report_names_findings_in_words_and_in_json(tmp_path, capsys) -> Non
     assert main(["hand", str(model), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     codes = [finding["code"] for finding in document["findings"]]
-    assert codes == ["collision_from_visuals", "axis_not_unit", "axis_not_unit"]
+    assert codes == ["collision_from_visuals", "axis_not_unit", "axis_not_unit", "effort_missing"]
     assert document["findings"][1]["numbers"] == {"length": 2.0}
-    assert document["warnings"] == [f["text"] for f in document["findings"]]
+    # The last one is a note.
+    assert document["warnings"] == [f["text"] for f in document["findings"][:-1]]
     assert main(["hand", str(model)]) == 0
     shown = capsys.readouterr().out
     assert "warning (axis_not_unit): Joint 'ja': its axis has length 2 in the model" in shown
