@@ -18,8 +18,9 @@ SHARED = Path(__file__).parents[2] / "shared" / "data"
 LONGEST = (
     "test_hostile_files.py",
     "test_guides.py",
-    "test_symbols.py",
     "test_ros2.py",
+    "test_listed_sweep.py",
+    "test_symbols.py",
     "test_cuda_closing.py",
     "test_viewer_page.py",
     "test_generating.py",
