@@ -136,7 +136,7 @@ def warm_up(*, motions: bool = False) -> None:
 
 def _compile_together(motions: bool) -> None:
     """Compile all jobs, in several processes that share them."""
-    sys.stderr.write("clench: compiling its kernels, once on this machine; this takes about a minute.\n")
+    sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
     with tempfile.TemporaryDirectory(prefix="clench-") as folder:
         others = _others(min(os.cpu_count() or 1, MOST_PROCESSES) - 1, [folder, *["motions"] * motions])
         CLAIMS.share(Path(folder), lambda: all(other.poll() in (None, 0) for other in others))
