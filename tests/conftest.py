@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from clench.kernels.runtime.warming import announce, warm_up
+from clench.kernels.runtime.warming import warm_up
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
 from mug_grasp import MugGrasp, make_mug_grasp
@@ -18,8 +18,9 @@ SHARED = Path(__file__).parents[2] / "shared" / "data"
 LONGEST = (
     "test_hostile_files.py",
     "test_guides.py",
-    "test_symbols.py",
     "test_ros2.py",
+    "test_listed_sweep.py",
+    "test_symbols.py",
     "test_cuda_closing.py",
     "test_viewer_page.py",
     "test_generating.py",
@@ -41,8 +42,7 @@ LONGEST = (
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile what a solve calls once, before there are workers: each of them would do so, all at the same time."""
     if session.config.getoption("dist", "no") != "no" and not hasattr(session.config, "workerinput"):
-        announce()
-        warm_up()
+        warm_up(motions=True)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

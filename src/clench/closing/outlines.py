@@ -224,12 +224,13 @@ def _cut_round(shape: Shape, T: FloatArray, offset: float) -> RoundedOutline | N
 
 def _round_section(shape: Shape, T: FloatArray, offset: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     from clench.kernels.closing.layout import RoundArrays
+    from clench.kernels.runtime.by_reference import kept
     from clench.kernels.sections.plane_sections import cut_rounds, make_sections
 
     kind = np.array([_ROUND[shape.kind]], dtype=np.int64)
     rounds = RoundArrays(kind, np.array([shape.size]), np.ascontiguousarray(T[None, :3]))
     sections = make_sections(1, 0, 1)
-    cut_rounds(rounds, np.eye(4)[:3].copy(), offset, 0, sections, np.empty((3, 4)))
+    cut_rounds(kept(rounds), np.eye(4)[:3].copy(), offset, 0, kept(sections), np.empty((3, 4)))
     n, d, e = sections.counts[0]
     return sections.segments[0, :n], sections.disks[0, :d], sections.ellipses[0, :e]
 

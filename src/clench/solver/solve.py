@@ -35,12 +35,12 @@ def solve(hand: Hand, obj: GraspObject, command: GraspCommand | Pose, *, record:
     Raises:
         ClenchError: a command that does not fit the hand, or a hand that no plane can close.
     """
-    from clench.kernels.runtime.warming import announce
+    from clench.kernels.runtime.warming import warm_up
 
     check_type(hand, Hand, "hand")
     check_type(obj, GraspObject, "obj")
     command = as_command(command)
-    announce()
+    warm_up()
     options = posture_options(hand, command)
     if options:
         clock = Clock()

@@ -63,8 +63,7 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> FakeSolver:
     monkeypatch.setattr(sizes, "warn_of_size", lambda *_: None)
     monkeypatch.setattr("clench.apps.cli.output.printing.print_closure", lambda *_: None)
     # Nothing is computed: nothing is compiled or said to be, whatever the cache on disk holds.
-    monkeypatch.setattr(warming, "announce", lambda: None)
-    monkeypatch.setattr(warming, "warm_up", lambda: None)
+    monkeypatch.setattr(warming, "warm_up", lambda **_: None)
     return fake
 
 

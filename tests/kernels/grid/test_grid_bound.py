@@ -18,26 +18,31 @@ STACK = np.zeros((PAIRS, 3), dtype=np.int64)
 FLAT = ([0, 0, 0], [0, 1, 1], [0, 1, 0])
 
 
-def to_segment(p, a, b):
+def dot(a, b):
+    return (a * b).sum(axis=-1)
+
+
+def to_segments(p, a, b):
     along = b - a
-    length = along @ along
-    t = np.clip((p - a) @ along / length, 0.0, 1.0) if length > 0.0 else 0.0
-    return float(np.linalg.norm(p - a - t * along))
+    length = dot(along, along)
+    t = np.clip(np.divide(dot(p - a, along), length, out=np.zeros_like(length), where=length > 0.0), 0.0, 1.0)
+    return np.linalg.norm(p - a - t[:, None] * along, axis=-1)
 
 
-def to_triangle(p, a, b, c):
-    """Return the distance of a point from a triangle: from its edges, or from its plane where it lies over it."""
+def to_triangles(p, a, b, c):
+    """Return the distances of a point from triangles: from their edges, or from the planes of those it lies over."""
     n = np.cross(b - a, c - a)
-    least = min(to_segment(p, a, b), to_segment(p, b, c), to_segment(p, c, a))
-    if n @ n > 0.0 and all(np.cross(y - x, p - x) @ n >= 0.0 for x, y in ((a, b), (b, c), (c, a))):
-        least = min(least, abs(float((p - a) @ n)) / np.linalg.norm(n))
+    least = np.minimum.reduce([to_segments(p, a, b), to_segments(p, b, c), to_segments(p, c, a)])
+    over = np.logical_and.reduce([dot(np.cross(y - x, p - x), n) >= 0.0 for x, y in ((a, b), (b, c), (c, a))])
+    over &= dot(n, n) > 0.0
+    least[over] = np.minimum(least, np.abs(dot(p - a, n)) / np.where(over, np.linalg.norm(n, axis=-1), 1.0))[over]
     return least
 
 
 def distance(body, p):
-    """Return the distance of a point from all elements of a body, one by one."""
-    each = (to_triangle(p, *body.vertices[e]) - w for e, w in zip(body.elements, body.radius, strict=True))
-    return max(min(each), 0.0)
+    """Return the distance of a point from all elements of a body."""
+    corners = body.vertices[body.elements]
+    return max(float((to_triangles(p, *corners.transpose(1, 0, 2)) - body.radius).min()), 0.0)
 
 
 def drawn_body(rng, kind, scale):

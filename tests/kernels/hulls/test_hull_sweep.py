@@ -49,9 +49,9 @@ def drawn(seed, kinds, hulls):
 
 def first_contact(moving, resting, chain, touch, best, work):
     """Return when the first of all pairs of elements meets, and the elements of the resting body that meet by then."""
-    found = np.full(len(resting.elements), best)
+    found, others = np.full(len(resting.elements), best), list(cores(resting, work.resting))
     for a, ka, wa in cores(moving, work.moving):
-        for n, (b, kb, wb) in enumerate(cores(resting, work.resting)):
+        for n, (b, kb, wb) in enumerate(others):
             at = sweep_pair(a, ka, b, kb, wa + wb, chain, len(chain), touch, 0.0, best, np.zeros((6, 3)))
             found[n] = min(found[n], at)
     return found

@@ -11,8 +11,9 @@ from kernels.toi.test_toi_bodies import KINDS, TOUCH, cores
 def meetings(moving, resting, chain, best, work):
     """Return when every pair of elements meets, moving ones by rows."""
     found = np.full((len(moving.elements), len(resting.elements)), best)
+    others = list(cores(resting, work.resting))
     for i, (a, ka, wa) in enumerate(cores(moving, work.moving)):
-        for n, (b, kb, wb) in enumerate(cores(resting, work.resting)):
+        for n, (b, kb, wb) in enumerate(others):
             found[i, n] = sweep_pair(a, ka, b, kb, wa + wb, chain, len(chain), TOUCH, 0.0, best, np.zeros((6, 3)))
     return found
 

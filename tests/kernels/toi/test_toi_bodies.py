@@ -96,9 +96,9 @@ def test_a_body_meets_what_the_first_of_its_elements_meets(one, other):
         move_core(np.tile(work.moving[:, 3], (3, 1)), 1, chain, len(chain), 0.6 * best, on_the_way)
         work.resting[:] = pose(rng, on_the_way[0] + 0.02 * beside / np.linalg.norm(beside))
         found = sweep_body(moving, 0, resting, 0, chain, len(chain), TOUCH, best, work)
-        expected = best
+        expected, others = best, list(cores(resting, work.resting))
         for a, ka, wa in cores(moving, work.moving):
-            for b, kb, wb in cores(resting, work.resting):
+            for b, kb, wb in others:
                 each = sweep_pair(a, ka, b, kb, wa + wb, chain, len(chain), TOUCH, 0.0, best, np.zeros((6, 3)))
                 expected = min(expected, each)
         assert found == pytest.approx(expected, abs=1e-6), (seed, found, expected)

@@ -154,7 +154,8 @@ def sweep_element(
 ) -> float:
     """Return the first contact of an element before `end`, else `end`; the pair and its place are written."""
     resting, rows, ka, touch = pair.resting, work.round, motion.corners, pair.touch
-    kb, w = resting.corners[e], motion.radius + resting.radius[e]
+    # With 64 bits, as from `put_item`: for another size, all that is called with `cores` would be compiled again.
+    kb, w = int(np.int64(resting.corners[e])), motion.radius + resting.radius[e]
     put_core(resting, e, work.resting, work.fixed)
     d, nx, ny, nz, _, _, x, y, z = separation(rows[END:], ka, work.fixed, kb)
     cores = CorePair(MovingCore(work.core, ka, pair.chain, pair.rows, work.placed), work.fixed, kb, w, touch)

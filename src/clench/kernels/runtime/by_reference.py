@@ -79,6 +79,12 @@ def by_reference(kind: Any) -> Any:
     return types.unliteral(kind)
 
 
+def handed_on(kind: Any) -> Any:
+    """Return the type by which a kernel hands an argument on: see `by_reference`; whole numbers have 64 bits."""
+    kind = by_reference(kind)
+    return types.int64 if isinstance(kind, types.Integer) and kind is not types.uint64 else kind
+
+
 @infer_getattr
 class ByReferenceAttribute(AttributeTemplate):
     """The fields of the tuple; a tuple inside is handed on, too."""

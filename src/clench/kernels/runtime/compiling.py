@@ -16,7 +16,7 @@ from numba.core.registry import CPUDispatcher
 
 from clench.core import tolerances
 
-from .by_reference import by_reference, type_of
+from .by_reference import handed_on, type_of
 from .kernel_cache import index_of, keep_on_disk
 from .kernel_compiler import compiled, compiler_of
 
@@ -119,13 +119,11 @@ class CachedKernel(CPUDispatcher):
         return type_of(val) if isinstance(val, np.ndarray | tuple) else super().typeof_pyval(val)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return how another kernel calls this one: once for all values of a number.
+        """Return how another kernel calls this one: once for all values and sizes of a whole number.
 
         Numba would compile it anew for every integer that the other kernel writes out in a call.
         """
-        return super().get_call_template(
-            tuple(map(by_reference, args)), {name: by_reference(a) for name, a in kws.items()}
-        )
+        return super().get_call_template(tuple(map(handed_on, args)), {name: handed_on(a) for name, a in kws.items()})
 
     def compile(self, sig: Any) -> Any:
         """Compile for arguments, unless it is done or on disk; return what Python calls."""

@@ -11,14 +11,17 @@ import gc
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final
 
+from numba import types
+from numba.core import ir
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager
 from numba.core.sigutils import normalize_signature
+from numba.core.typed_passes import NopythonRewrites
 from numba.core.typing.context import Context
 
 from .claims import CLAIMS
@@ -26,6 +29,16 @@ from .symbols import described, has_a_fixed_symbol, name_symbols
 
 #: Intermediate code from this size on stays apart [bytes]. A smaller one compiles less, and loads more files.
 LARGE: Final = 40_000
+#: Steps of Numba that look for what kernels do not have: closures, comprehensions, `with`, functions that are inlined
+#: before types are known, `literally`, messages that are put together, notes for a reader. Where a kernel has one of
+#: them nevertheless, it does not compile.
+NEEDLESS: Final = frozenset(
+    (
+        *("WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction", "InlineInlinables", "InlineOverloads"),
+        *("FindLiterallyCalls", "LiteralUnroll", "LiteralPropagationSubPipelinePass", "RewriteDynamicRaises"),
+        *("AnnotateTypes", "DumpParforDiagnostics"),
+    )
+)
 #: Sizes and alignments of types [bytes], by their names.
 _MEASURED: Final[dict[Any, int]] = {}
 #: The steps that all kernels share, once they are made.
@@ -98,7 +111,7 @@ def compiler_of(stamp: bytes) -> type[Compiler]:
             )
             state.flags.no_compile = not called
             measure_once(state.targetctx)
-            state.typingctx = KernelTyping(state.typingctx)
+            state.typingctx = typing_of(state.typingctx)
             compiled: Any = super()._compile_bytecode()
             return compiled if called else compiled._replace(entry_point=object())
 
@@ -106,7 +119,7 @@ def compiler_of(stamp: bytes) -> type[Compiler]:
 
 
 class KernelPipeline(PassManager):
-    """The steps of another pipeline, without a report of each.
+    """The steps of another pipeline that kernels need, without a report of each.
 
     Args:
         other: pipeline.
@@ -114,13 +127,26 @@ class KernelPipeline(PassManager):
 
     def __init__(self, other: PassManager) -> None:
         super().__init__(other.pipeline_name)
-        self.passes = other.passes
+        self.passes = [(step, said) for step, said in other.passes if step.__name__ not in NEEDLESS]
         self.finalize()
 
     def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:
+        if isinstance(pss, NopythonRewrites) and not makes_an_array(internal_state):
+            return
         pss.analysis = self._analysis
         for step in (pss.run_initialization, pss.run_pass, pss.run_finalizer):
             step(internal_state)
+
+
+def makes_an_array(state: Any) -> bool:
+    """Say whether an expression of a function is an array, such as a sum of arrays; Numba makes one loop of those."""
+    assigned = (each for block in state.func_ir.blocks.values() for each in block.find_insts(ir.Assign))
+    return any(
+        isinstance(each.value, ir.Expr)
+        and each.value.op not in ("getitem", "static_getitem", "getattr", "cast")
+        and isinstance(state.typemap[each.target.name], types.Array)
+        for each in assigned
+    )
 
 
 class KernelTyping(Context):
@@ -141,6 +167,12 @@ class KernelTyping(Context):
         if key not in _OPERATIONS:
             _OPERATIONS[key] = super().resolve_function_type(func, args, kws)
         return _OPERATIONS[key]
+
+
+@cache
+def typing_of(known: Context) -> KernelTyping:
+    """Return the one context of all kernels: Numba compiles `max` and `min` anew for every context."""
+    return KernelTyping(known)
 
 
 def measure_once(context: Any) -> None:

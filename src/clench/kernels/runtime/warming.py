@@ -6,16 +6,19 @@ other processes: kernels that they do not deliver are compiled when they are cal
 
 from __future__ import annotations
 
+import gc
 import inspect
+import multiprocessing
 import os
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -46,6 +49,7 @@ from clench.kernels.closing.solve_layout import (
 )
 from clench.kernels.closing.solve_poses import make_workspace, solve_poses
 from clench.kernels.closing.verdict import judge_pose
+from clench.kernels.geometry.bodies import pack_triangles
 from clench.kernels.geometry.link_frames import FrameArrays, place_links, relate_poses
 from clench.kernels.geometry.link_meshes import DepthWork, LinkMeshArrays, ObjectMesh, measure_depths
 from clench.kernels.geometry.smallest_gap import smallest_gap
@@ -58,57 +62,88 @@ from clench.kernels.sections.plane_sections import cut_first_axis_groups
 from clench.kernels.toi.full_width import planes_only
 from clench.kernels.toi.toi_links import Stage, sweep_stage
 from clench.kernels.toi.toi_work import SweepWork
-from clench.kernels.trees.bvh import MeshTree, build_tree
+from clench.kernels.trees.bvh import MeshTree, build_tree, feature_owners
+from clench.kernels.trees.connectivity import connected_parts
 
 from .by_reference import by_reference, kept
 from .claims import CLAIMS
 from .compiling import is_kept
 from .kernel_compiler import claim_of
 
-#: What the processes compile, in this order: long ones first, and what others need before these.
+#: What the processes compile, in this order: long ones first, and what others need before these. The last ones are
+#: short and need no other, so that both of two processes have work while `solve_poses` compiles.
 JOBS: tuple[Any, ...] = (
     sweep_stage,
     cut_first_axis_groups,
     advance,
     judge_pose,
     look_at,
+    close_at_once,
     make_workspace,
     settle_contact,
     settle_pair,
     close_candidate,
     measure_depths,
-    read_contacts,
     smallest_gap,
-    describe_contact,
-    close_at_once,
-    relate_poses,
-    place_links,
     close_in_turn,
     solve_poses,
+    read_contacts,
+    describe_contact,
+    relate_poses,
+    place_links,
 )
 
 #: These have an entry from Python, but in a solve other kernels call them, or Python hands them pointers.
 _BY_POINTER: tuple[Any, ...] = (cut_first_axis_groups, close_candidate, place_links)
 
+#: So many jobs at the end are the short ones that need no other.
+TAIL = 4
 #: Another process is given up after this long [s].
 PATIENCE = 300.0
 #: More processes than these wait for each other most of the time.
 MOST_PROCESSES = 4
 
+#: What this process has compiled or found on disk: the kernels of a solve (False), and of motions (True).
+_WARM: set[bool] = set()
+_ONE_AT_A_TIME = threading.Lock()
 _MODULE = "clench.kernels.runtime.warming"
 _TYPES: dict[str, Any] = {"f": np.float64, "i": np.int64, "s": np.int32, "b": np.uint8}
 
 
-def warm_up() -> None:
-    """Compile what a solve calls where none of it has been compiled before; else do nothing."""
-    if not _is_cold():
-        return
+class Job(NamedTuple):
+    """Kernels that one process compiles.
+
+    Args:
+        name: the same in all processes. do: compiles them.
+    """
+
+    name: str
+    do: Callable[[], object]
+
+
+def warm_up(*, motions: bool = False) -> None:
+    """Compile what a solve calls where none of it has been compiled before, and say so; else do nothing.
+
+    Args:
+        motions: forces and motions follow the solve; compile what these call, too.
+    """
+    with _ONE_AT_A_TIME:
+        if motions not in _WARM:
+            _WARM.update((False, motions))
+            if _is_cold(motions) and multiprocessing.parent_process() is None:
+                _compile_together(motions)
+
+
+def _compile_together(motions: bool) -> None:
+    """Compile all jobs, in several processes that share them."""
+    sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
     with tempfile.TemporaryDirectory(prefix="clench-") as folder:
-        others = _others(min(os.cpu_count() or 1, MOST_PROCESSES) - 1, folder)
+        others = _others(min(os.cpu_count() or 1, MOST_PROCESSES) - 1, [folder, *["motions"] * motions])
         CLAIMS.share(Path(folder), lambda: all(other.poll() in (None, 0) for other in others))
         try:
-            with _bar() as show:
-                for done in _jobs_done():
+            jobs = _jobs(motions)
+            with _bar(len(jobs)) as show:
+                for done in _jobs_done(jobs):
                     show(done)
             for other in others:
                 other.wait(PATIENCE)
@@ -121,38 +156,68 @@ def warm_up() -> None:
                 other.wait()
 
 
-def _others(count: int, folder: str) -> list[subprocess.Popen[bytes]]:
-    """Start processes that take jobs, too, and put their claims into a folder."""
+def _others(count: int, words: list[str]) -> list[subprocess.Popen[bytes]]:
+    """Start processes that take jobs, too.
+
+    There are none in a program that contains Python: `sys.executable` would start that program again.
+
+    Args:
+        count: of processes. words: the folder for their claims, and `motions` where these are wanted.
+    """
+    if not Path(sys.executable or "").name.lower().startswith("python"):
+        return []
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", _MODULE, folder]
+    command = [sys.executable, "-m", _MODULE, *words]
     try:
         return [subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) for _ in range(count)]
     except OSError:
         return []
 
 
-def _jobs_done() -> Iterator[int]:
-    """Compile the jobs that no other process has taken; give after each how many are done, by any process."""
+def _jobs(motions: bool) -> list[Job]:
+    """Return what there is to compile."""
     values = sample_values()
-    build_tree(np.zeros((1, 3)), np.zeros((1, 3)))
-    for kernel in JOBS:
-        kinds = argument_types(kernel, values)
-        name = claim_of(kernel, kinds)
-        if CLAIMS.take_job(name):
-            kernel.compile(kinds)
-            CLAIMS.note_done(name)
+    jobs = [_job(kernel, values) for kernel in JOBS]
+    jobs.insert(1, Job("trees", pack_one_triangle))
+    if motions:
+        from .motion_samples import MOTIONS, motion_values
+
+        values |= motion_values(values)
+        jobs[-TAIL:-TAIL] = [_job(kernel, values) for kernel in MOTIONS]
+    return jobs
+
+
+def _job(kernel: Any, values: dict[str, Any]) -> Job:
+    kinds = argument_types(kernel, values)
+    return Job(claim_of(kernel, kinds), partial(kernel.compile, kinds))
+
+
+def pack_one_triangle() -> None:
+    """Compile the kernels of trees: pack the least that every one of them is called for."""
+    tree = build_tree(np.eye(3), np.arange(3)[None])
+    pack_triangles(tree)
+    feature_owners(tree)
+    connected_parts(np.zeros((1, 2), dtype=np.int64), 1)
+
+
+def _jobs_done(jobs: list[Job]) -> Iterator[int]:
+    """Compile the jobs that no other process has taken; give after each how many are done, by any process."""
+    for job in jobs:
+        if CLAIMS.take_job(job.name):
+            job.do()
+            CLAIMS.note_done(job.name)
         yield CLAIMS.count_done()
 
 
 @contextmanager
-def _bar() -> Iterator[Callable[[int], None]]:
+def _bar(total: int) -> Iterator[Callable[[int], None]]:
     """Show a bar on standard error; the function that is given moves it."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=2) as progress:
-        task = progress.add_task("Compiling", total=len(JOBS))
+        task = progress.add_task("Compiling", total=total)
         yield lambda done: progress.update(task, completed=done)
 
 
@@ -260,19 +325,18 @@ def _arrays(kinds: str) -> list[Any]:
     return [np.empty((0,) * int(kind[1]), dtype=_TYPES[kind[0]]) for kind in kinds.split()]
 
 
-@cache
-def announce() -> None:
-    """Say on standard error that what comes compiles, where it does; once per process."""
-    if _is_cold():
-        sys.stderr.write("clench: compiling its kernels, once on this machine; this takes one to two minutes.\n")
+def _is_cold(motions: bool) -> bool:
+    """Say whether the cache on disk lacks the kernel of every solve, or of every motion that is checked."""
+    if motions:
+        from .motion_samples import MOTIONS
 
-
-def _is_cold() -> bool:
-    """Say whether the cache on disk lacks the kernel of every solve."""
+        return not is_kept(solve_poses) or not all(map(is_kept, MOTIONS))
     return not is_kept(solve_poses)
 
 
 if __name__ == "__main__":
+    gc.disable()  # The process ends soon.
     CLAIMS.share(Path(sys.argv[1]))
-    for _ in _jobs_done():
+    for _ in _jobs_done(_jobs("motions" in sys.argv)):
         pass
+    os._exit(0)  # Nothing is left to write; to take the interpreter apart takes half a second.

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from clench.kernels.runtime.by_reference import kept
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.trees.bvh import Floats, Ints, MeshTree, build_tree
 
@@ -49,7 +50,7 @@ def cut_mesh(
     while wanted:
         capacity = wanted
         segments, sources = np.empty((1, capacity, 6)), np.empty((1, capacity), dtype=np.int64)
-        wanted = cut(tree, T, offsets, (0, 1), float(reach), segments, sources, counts, 0, capacity)
+        wanted = cut(kept(tree), T, offsets, (0, 1), float(reach), segments, sources, counts, 0, capacity)
     found = counts[0, 0]
     return segments[0, :found].copy(), tree.original[sources[0, :found]]
 

@@ -155,7 +155,7 @@ def _may_be_held(held: HeldObject, load: FloatArray) -> bool:
     edges = around.edge_wrenches(_EDGES).reshape(-1, 6).T
     wanted = -load / np.linalg.norm(load)
     rows, most = np.vstack([edges, -edges]), np.concatenate([wanted, -wanted]) + _UNBALANCED
-    return bool(least_cost(rows, most, np.ones(rows.shape[1]), np.empty(rows.shape[1])))
+    return bool(least_cost(np.ascontiguousarray(rows), most, np.ones(rows.shape[1]), np.empty(rows.shape[1])))
 
 
 def _with_friction(task: SqueezeTask, reserve: float) -> SqueezeTask:

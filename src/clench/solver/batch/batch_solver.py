@@ -46,9 +46,9 @@ class BatchSolver:
     """
 
     def __init__(self, hand: Hand, obj: GraspObject, command: GraspCommand) -> None:
-        from clench.kernels.runtime.warming import announce
+        from clench.kernels.runtime.warming import warm_up
 
-        announce()
+        warm_up()
         self._question = Question(hand, obj, command, {})
         self._start = make_problem(hand, obj, command)
         asked = asked_fingers(hand, command)

@@ -74,7 +74,7 @@ def batch(
     from clench.apps.cli.output.printing import print_batch, print_files
     from clench.apps.cli.output.results import print_json
     from clench.closing.collision.sizes import warn_of_size
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
     from clench.solver.batch.batch_parts import check_batch_file
     from clench.solver.batch.devices import CPU, why_not
     from clench.solver.batch.solve_batch import CHUNK
@@ -98,7 +98,6 @@ def batch(
         raise CommandError(f"--count: expected at least 1, got {count}.")
     # An error of the file comes before anything is compiled.
     read = None if poses is None else _read(poses)
-    announce()
     warm_up()
     rows = clench.approach_poses(the_hand, the_object, count, seed) if read is None else read
     began = time.perf_counter()

@@ -40,15 +40,14 @@ def run_demo(models: tuple[str, str], out: Path, seed: int | None, page: Path, j
     from clench.apps.cli.output.printing import print_closure, print_files, print_report, print_solution
     from clench.apps.pages.page_files import check_page
     from clench.core.files.json_files import check_folder
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
 
     check_folder(out)
     check_page(page, out)
     hand_model, object_model = models
     if out.is_dir():
         clench.Record.check(out / "record.sqlite")
-    announce()
-    warm_up()
+    warm_up(motions=True)
     with _progress() as step:
         step(f"Loading hand '{hand_model}' and object '{object_model}'")
         hand, obj = clench.Hand.load(hand_model), clench.GraspObject.load(object_model)

@@ -148,14 +148,13 @@ def _generate(
     from clench.apps.cli.interrupts import stopped_by_signals
     from clench.apps.cli.output.results import print_json
     from clench.dataset.storage.folder import DatasetFolder
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
 
     part = clench.dataset.Shard.parse(shard) if shard is not None else clench.dataset.Shard.of_environment()
     # Report impossible requests before compiling anything.
     DatasetFolder(out, job).check()
     options: dict[str, Any] = {} if memory is None else {"memory": memory}
-    announce()
-    warm_up()
+    warm_up(motions=True)
     units = sum(part.has(unit) for unit in job.units())
     try:
         with stopped_by_signals(), _progress(units, not json) as tell:

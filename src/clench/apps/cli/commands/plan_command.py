@@ -91,7 +91,7 @@ def plan(
     from clench.apps.pages.page_files import check_page
     from clench.closing.collision.sizes import warn_of_size
     from clench.core.files.json_files import check_folder
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
 
     if out is not None:
         check_folder(out)
@@ -118,8 +118,7 @@ def plan(
     the_object = clench.GraspObject.load(object, scale=scale)
     the_object = with_scene(the_object, None, table, obstacle)
     warn_of_size(the_hand, the_object)
-    announce()
-    warm_up()
+    warm_up(motions=True)
     found = _searched(the_hand, the_object, count, asked)
     held = [_held(grasp, the_hand, the_object, asked["friction"]) for grasp in found] if hold else []
     document = found.to_dict()

@@ -94,7 +94,7 @@ def view(
     from clench.apps.viewer.opening import open_session
     from clench.apps.viewer.serving import check_viewer, serve
     from clench.core.defaults import MASS
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
     from clench.mechanics.grasp.contacts import friction_range
     from clench.mechanics.grasp.loads import mass_range
     from clench.planner.options import PlanOptions
@@ -126,8 +126,7 @@ def view(
         asked = {"order": order, "criteria": criteria, "collision_source": collision_source}
         around = command, table, obstacle
         session, grasps = open_session(_given(hand or HAND, object or OBJECT, loaded, scale, around, asked, forces)), []
-    announce()
-    warm_up()
+    warm_up(motions=True)
     with serve(session, host, port, grasps, dark) as page:
         _announce(page.url, without_browser, json)
         _wait()

@@ -219,12 +219,11 @@ def _check_hand(solution: GraspSolution, hand: Hand | None, source: str, first: 
 
 
 def _solved(batch: SavedBatch, hand: Hand | None, obj: GraspObject | None) -> list[GraspSolution]:
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
 
     if hand is None or obj is None:
         what, model = ("hand", batch.hand_model) if hand is None else ("object", batch.object_model)
         raise FileError(batch.path, f"{what}_model: '{model}' cannot be loaded; give --{what}.")
-    announce()
     warm_up()
     return list(batch.solutions(hand, obj))
 

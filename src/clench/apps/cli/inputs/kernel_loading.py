@@ -5,9 +5,8 @@ from __future__ import annotations
 
 def compile_kernels() -> None:
     """Compile the kernels that every solve calls, unless they are on disk, and say so."""
-    from clench.kernels.runtime.warming import announce, warm_up
+    from clench.kernels.runtime.warming import warm_up
 
-    announce()
     warm_up()
 
 
