@@ -59,7 +59,10 @@ def test_an_error_is_a_sentence_and_beside_json_a_document(
     ("arguments", "sentence"),
     [
         (["execute", "FILE"], "not JSON: expected a solution, as `clench solve --out` writes it, got {}."),
-        (["export", "FILE", "--out", "g.yaml"], "not JSON: expected a solution, a list of solutions or a plan, got {}."),
+        (
+            ["export", "FILE", "--out", "g.yaml"],
+            "not JSON: expected a solution, a list of solutions or a plan, got {}.",
+        ),
         ([*SOLVE, "--command", "FILE"], "not JSON: expected a command file, got {}."),
         (["calibrate", "FILE"], "not JSON: expected an examples file, got {}."),
     ],
