@@ -40,6 +40,7 @@ def test_listed_pairs_hold_all_that_meet_and_give_the_first_contact(kind):
         rows, found = list_pairs(*arguments, listed, work)
         if found >= 0:
             assert set(zip(*np.nonzero(at < short), strict=True)) <= set(map(tuple, rows))
+            assert len(set(map(tuple, rows))) == found
             pairs, every = pairs + found, every + at.size
         first = sweep_listed(*arguments, listed, work)
         assert first == pytest.approx(at.min(), abs=1e-7) if at.min() >= 0.0 else first < 0.0

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from clench.kernels.toi import core_motion
+from clench.kernels.toi import core_motion, spatial_motion
 from clench.kernels.toi.spatial_motion import SPATIAL
 from kernels.kernel_entries import entry
 from kernels.motion_check import STEPS, check_motion
@@ -14,6 +14,7 @@ from kernels.motion_check import STEPS, check_motion
 move_core, corner_motion, carried_back, turn_rate = (
     entry(getattr(core_motion, name)) for name in ("move_core", "corner_motion", "carried_back", "turn_rate")
 )
+move_pose = entry(spatial_motion.move_pose)
 seeds = st.integers(0, 10**6)
 
 
@@ -91,3 +92,14 @@ def test_parallel_joints_move_alike_in_either_form(seed):
         if (chain[:, 0] > 0.0).all():
             assert one[2] >= other[2] - 1e-15
             assert one[3] >= other[3] - 1e-15
+
+
+@settings(deadline=None, max_examples=100)
+@given(seeds)
+def test_a_pose_goes_along_with_its_corners(seed):
+    core, chain, _, s = drawn(seed)
+    T = np.column_stack([Rotation.random(rng=np.random.default_rng(seed)).as_matrix(), core[0]])
+    moved = T.copy()
+    move_pose(chain, len(chain), s, moved)
+    assert moved[:, :3] == pytest.approx(orientation(chain, s).as_matrix() @ T[:, :3], abs=1e-12)
+    assert moved[:, 3] == pytest.approx(placed(T[:, 3], chain, s), abs=1e-12)

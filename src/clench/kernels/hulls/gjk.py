@@ -63,13 +63,13 @@ def nearest_of_simplex(s: Floats, size: int, w: Floats) -> float:
         return nearest_on_segment(s, 0, 1, w)
     if size == 3:
         return nearest_on_triangle(s, 0, 1, 2, w)
-    best, square = 0, math.inf
+    best, square, a, b, c = 0, math.inf, 0.0, 0.0, 0.0
     for n in range(3):
         found = nearest_on_triangle(s, (n + 1) % 3, (n + 2) % 3, 3, w)
         if found < square:
-            best, square = n, found
-    w[best] = 0.0
-    return nearest_on_triangle(s, (best + 1) % 3, (best + 2) % 3, 3, w)
+            best, square, a, b, c = n, found, w[(n + 1) % 3], w[(n + 2) % 3], w[3]
+    w[best], w[(best + 1) % 3], w[(best + 2) % 3], w[3] = 0.0, a, b, c
+    return square
 
 
 @kernel

@@ -9,8 +9,9 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.core_motion import base_motion
-from clench.kernels.toi.spatial_motion import axis_of, is_spatial, moved, point_bounds, turned_about
+from clench.kernels.toi.spatial_motion import is_spatial, move_pose, point_bounds
 from clench.kernels.toi.toi_work import SweepWork
 
 from .enclosing_hulls import HullArrays, lowest_corner
@@ -76,26 +77,19 @@ def bend_along(motion: HullMotion, n: Vector) -> float:
 @kernel
 def put_pose(chain: Floats, count: int, s: float, sweep: SweepWork, out: Floats) -> None:
     """Write the pose of the moving body in the resting one's frame when the chain has moved by `s`, (3, 4)."""
-    T = sweep.moving
+    copy_pose(sweep.moving, out)
+    if is_spatial(chain):
+        move_pose(chain, count, s, out)
+    else:
+        px, pz, _, _, _, _ = base_motion(chain, count, 0.0, 0.0, s)
+        turn = chain[count - 1, 0] * s
+        co, si = math.cos(turn), math.sin(turn)
+        for c in range(4):
+            x, z = out[0, c], out[2, c]
+            out[0, c], out[2, c] = co * x - si * z, si * x + co * z
+        out[0, 3], out[2, 3] = out[0, 3] + px, out[2, 3] + pz
     for c in range(4):
-        x, y, z = T[0, c], T[1, c], T[2, c]
-        if is_spatial(chain):
-            p = (x, y, z)
-            if c == 3:
-                p = moved(p, chain, count, s)
-            else:
-                for k in range(count):
-                    i = count - 1 - k
-                    p = turned_about(p, axis_of(chain, i), chain[i, 0] * s)
-            x, y, z = p
-        else:
-            turn = chain[count - 1, 0] * s
-            co, si = math.cos(turn), math.sin(turn)
-            x, z = co * x - si * z, si * x + co * z
-            if c == 3:
-                px, pz, _, _, _, _ = base_motion(chain, count, 0.0, 0.0, s)
-                x, z = x + px, z + pz
-        put_back(sweep.resting, x, y, z, c, out)
+        put_back(sweep.resting, out[0, c], out[1, c], out[2, c], c, out)
 
 
 @kernel

@@ -53,7 +53,7 @@ FAR = 1.0
 #: No plane is looked for between a hull and a node that is nearer than this share of the radius of the node's ball [-].
 SOME = 1.0
 #: How near to the best direction the directions between a hull and an element are [-].
-FINE = 0.02
+FINE = 0.1
 
 
 @kernel

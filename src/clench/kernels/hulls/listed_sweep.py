@@ -15,6 +15,7 @@ from clench.kernels.geometry.vectors import Vector
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import back
 from clench.kernels.toi.core_motion import CorePair, MovingCore
+from clench.kernels.toi.separating_planes import keep_plane, lay_plane, lies_within, stays_beyond
 from clench.kernels.toi.toi_bodies import sweep_elements
 from clench.kernels.toi.toi_pairs import sweep_pair
 from clench.kernels.toi.toi_work import BodyPair, SweepWork, put_item
@@ -25,7 +26,7 @@ from .hull_motion import HullMotion, bend_along, lowest_between, motion_of_hull
 from .hull_window import CORNERS, END, LISTED, NOW, PLANES, SIMPLEX, put_element
 
 #: Pairs that are swept one by one at most. They wait in the rows of the stack from the last ones on.
-MOST = 128
+MOST = 256
 
 
 class Fall(NamedTuple):
@@ -48,24 +49,33 @@ class Fall(NamedTuple):
 def sweep_listed(pair: BodyPair, best: float, listed: int, sweep: SweepWork) -> float:
     """Return what `sweep_elements` does for a window that `list_near` has listed elements for; `best` is its end.
 
+    A pair is left out if the plane between the elements that met last, or the plane by which two never met, keeps it
+    apart.
+
     Args:
         listed: number of listed elements; -1: any can be met.
     """
     found = list_pairs(pair, best, listed, sweep) if listed >= 0 else -1
     if found < 0:
         return sweep_elements(pair, best, listed, sweep)
-    moving, resting, last = pair.moving, pair.resting, sweep.stack.shape[0] - 1
+    moving, resting, last, laid, met = pair.moving, pair.resting, sweep.stack.shape[0] - 1, False, False
     for k in range(found):
         a, b = sweep.stack[last - k, 0], sweep.stack[last - k, 1]
         ka, wa = put_item(moving, -1 - a, sweep.moving, sweep.core)
+        within = laid and lies_within(resting, -1 - b, sweep)
+        if within and stays_beyond(ka, wa, pair.chain, pair.rows, 0.0, best, sweep):
+            continue
         kb, wb = put_item(resting, -1 - b, sweep.resting, sweep.fixed)
         core = MovingCore(sweep.core, ka, pair.chain, pair.rows, sweep.placed)
-        met = sweep_pair(CorePair(core, sweep.fixed, kb, wa + wb, pair.touch), 0.0, best)
-        if met < best:
-            best = met
+        s = sweep_pair(CorePair(core, sweep.fixed, kb, wa + wb, pair.touch), 0.0, best)
+        if s < best:
+            best, laid, met = s, True, True
             sweep.pair[0], sweep.pair[1], sweep.pair[2], sweep.pair[3] = a, b, pair.m, pair.r
             if best < 0.0:
                 return best
+            lay_plane(ka, wa, kb, wb, sweep)
+        elif best > 0.0 and not met and keep_plane(kb, wb, pair.touch, sweep):
+            laid = True
     return best
 
 
@@ -85,7 +95,7 @@ def list_pairs_with(pair: BodyPair, motion: HullMotion, end: float, k: int, foun
     """List the moving elements that may meet one listed element; see `list_pairs`."""
     moving, resting, window, stack, e = pair.moving, pair.resting, sweep.hull, sweep.stack, sweep.listed[k]
     fall, at = fall_on(pair, motion, k, end, sweep), middle_of(resting.ball[e], window)
-    reach, last = resting.ball[e, 3] + pair.touch + motion.speed * end, stack.shape[0] - 1
+    reach = resting.ball[e, 3] + pair.touch + motion.speed * end
     stack[0, 0], waiting = moving.root[pair.m], 1
     while waiting > 0:
         waiting -= 1
@@ -97,12 +107,29 @@ def list_pairs_with(pair: BodyPair, motion: HullMotion, end: float, k: int, foun
             waiting += 2
             continue
         for a in range(moving.first[node], moving.first[node] + moving.count[node]):
-            if is_within(moving.ball[a], at, reach) and element_falls(moving, a, fall):
+            if not is_within(moving.ball[a], at, reach):
+                continue
+            left = height_left(moving, a, fall)
+            if left <= 0.0:
                 if found == MOST:
                     return -1
-                stack[last - found, 0], stack[last - found, 1] = a, e
+                put_pair(a, e, left, found, sweep)
                 found += 1
     return found
+
+
+@kernel
+def put_pair(a: int, e: int, left: float, found: int, sweep: SweepWork) -> None:
+    """Put a pair of elements behind those found; the one that comes down lowest stays the first.
+
+    Args:
+        a, e: the moving element and the resting one. left: see `height_left`.
+    """
+    stack, lowest, last = sweep.stack, sweep.keys, sweep.stack.shape[0] - 1
+    stack[last - found, 0], stack[last - found, 1] = a, e
+    if found == 0 or left < lowest[last]:
+        stack[last - found, 0], stack[last - found, 1] = stack[last, 0], stack[last, 1]
+        stack[last, 0], stack[last, 1], lowest[last] = a, e, left
 
 
 @kernel
@@ -169,11 +196,11 @@ def box_falls(slab: Any, fall: Fall) -> bool:
 
 
 @kernel
-def element_falls(moving: BodyArrays, a: int, fall: Fall) -> bool:
-    """Say whether a moving element may come down to the plane."""
+def height_left(moving: BodyArrays, a: int, fall: Fall) -> float:
+    """Return a bound on how far over the plane a moving element stays; it may come down if that is not positive [m]."""
     u, v, start, later = fall.now, fall.then, math.inf, math.inf
     for k in range(moving.corners[a]):
         p = moving.vertices[moving.elements[a, k]]
         start = min(start, u[0] * p[0] + u[1] * p[1] + u[2] * p[2])
         later = min(later, v[0] * p[0] + v[1] * p[1] + v[2] * p[2])
-    return bool(lowest_between(fall.begin + start, fall.end + later, fall.sag) <= moving.radius[a])
+    return float(lowest_between(fall.begin + start, fall.end + later, fall.sag) - moving.radius[a])

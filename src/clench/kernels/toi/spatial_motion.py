@@ -38,9 +38,33 @@ def way_of(chain: Floats, i: int) -> Vector:
 @kernel
 def turned_about(p: Vector, axis: Vector, angle: float) -> Vector:
     """Return a vector turned about a unit axis."""
-    s, v = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
+    s, v = turn_of(angle)
+    return turned_so(p, axis, s, v)
+
+
+@kernel
+def turn_of(angle: float) -> tuple[float, float]:
+    """Return the sine of an angle, and 1 less its cosine."""
+    return math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
+
+
+@kernel
+def turned_so(p: Vector, axis: Vector, s: float, v: float) -> Vector:
+    """Return a vector turned about a unit axis by an angle; `s` and `v` are what `turn_of` tells of it."""
     across = cross(axis, p)
     return plus(plus(p, scaled(across, s)), scaled(cross(axis, across), v))
+
+
+@kernel
+def move_pose(chain: Floats, count: int, s: float, T: Floats) -> None:
+    """Move a pose, relative to the last pivot, as the chain moves by `s`; then it is relative to the first, (3, 4)."""
+    for k in range(count):
+        i = count - 1 - k
+        axis, (sine, versine) = axis_of(chain, i), turn_of(chain[i, 0] * s)
+        for c in range(4):
+            T[0, c], T[1, c], T[2, c] = turned_so((T[0, c], T[1, c], T[2, c]), axis, sine, versine)
+        if i > 0:
+            T[0, 3], T[1, 3], T[2, 3] = plus((T[0, 3], T[1, 3], T[2, 3]), way_of(chain, i - 1))
 
 
 @kernel
