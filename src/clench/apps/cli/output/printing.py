@@ -59,11 +59,11 @@ def print_closure(solution: GraspSolution, hand: Hand, obj: GraspObject, frictio
         solution: the answer; without its quality, a fast lower bound of epsilon decides. hand, obj: as solved.
         friction: of all contacts [-], the lowest of a range counts; None: that of hand and object.
     """
+    if solution.status.value not in ("grasp", "partial"):
+        return
     from clench.mechanics.epsilon.epsilon_quality import epsilon_bound
     from clench.solver.analysis.holding import hold
 
-    if solution.status.value not in ("grasp", "partial"):
-        return
     contacts = hold(solution, hand, obj, friction=friction).held
     at = f"at friction {contacts.contacts.friction.min(initial=np.inf):g}"
     exact = None if solution.quality is None else solution.quality["epsilon"]
