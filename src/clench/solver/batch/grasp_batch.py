@@ -83,21 +83,6 @@ class BatchContacts:
         return filled
 
     @classmethod
-    def load(cls, path: str | Path, hand: Hand | None = None, obj: GraspObject | None = None) -> GraspBatch:
-        """Read a file that `save` wrote; every array has the same bits.
-
-        Args:
-            path: the file. hand, obj: that were solved; None: loaded by the names in the file. An object with obstacles
-                has to be given.
-
-        Raises:
-            FileError: no batch, or one of another hand or object. ClenchError: a model cannot be loaded.
-        """
-        from .batch_loading import load_batch
-
-        return load_batch(path, hand, obj)
-
-    @classmethod
     def joined(cls, parts: Sequence[BatchContacts]) -> BatchContacts:
         """Return the contacts of several batches as one table."""
         counts = np.concatenate([np.diff(part.first) for part in parts])
