@@ -14,7 +14,7 @@ from clench.mechanics.grasp.contacts import ContactModel
 from clench.models.command import GraspCommand
 from clench.models.hand.forward import poses_at
 from clench.models.hand.hand import Hand
-from clench.models.objects.grasp_object import BodyRole, GraspObject
+from clench.models.objects.grasp_object import GraspObject
 from clench.models.objects.mass import mass_properties
 from clench.solver.batch.batch_epsilon import HOLDS, BatchEpsilon
 from clench.solver.batch.batch_solver import BatchSolver
@@ -78,7 +78,6 @@ class Closer:
         torsion = self.asked.torsion if self.asked.model is ContactModel.SOFT else None
         self._epsilon = BatchEpsilon(self.hand, self.obj, self.asked.lowest_friction, torsion)
         self._center = mass_properties(self.obj).center
-        self._graspable = np.array([body.role is BodyRole.GRASPABLE for body in self.obj.bodies])
         self._solid = [*self.hand.solid_links]
 
     def command(self, arm: Arm) -> GraspCommand:
@@ -197,7 +196,7 @@ class Closer:
             wrong |= ~self.asked.touch.contains(points)
         if self.asked.avoid is not None:
             wrong |= self.asked.avoid.contains(points)
-        inside[owner[wrong & self._graspable[contacts.body]]] = False
+        inside[owner[wrong & self._epsilon.graspable[contacts.body]]] = False
         return inside
 
     def _places(self, q: FloatArray, T_object_palm: FloatArray) -> FloatArray:

@@ -45,13 +45,13 @@ class BatchEpsilon:
         self._center, self._length = mass.center if self.center is None else self.center, mass.length
         links, bodies = range(len(self.hand.links)), self.obj.bodies
         self._mu = np.array([[self.friction or pair_friction(self.hand, k, body) for body in bodies] for k in links])
-        self._graspable = np.array([body.role is BodyRole.GRASPABLE for body in bodies])
+        self.graspable = np.array([body.role is BodyRole.GRASPABLE for body in bodies])
 
     def counted(self, batch: GraspBatch) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the grasp of every contact, and whether it counts, (C,): not opened again and no obstacle's."""
         contacts = batch.contacts
         owner = np.repeat(np.arange(len(batch)), np.diff(contacts.first))
-        return owner, ~contacts.passed & self._graspable[contacts.body]
+        return owner, ~contacts.passed & self.graspable[contacts.body]
 
     def bounds(self, batch: GraspBatch, share: float = 1.0) -> FloatArray:
         """Return a lower bound of epsilon for every answer [N/N], shape (N,); 0 for anything but a grasp.

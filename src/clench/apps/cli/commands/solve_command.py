@@ -125,7 +125,7 @@ def solve(
         untold = [warning for warning in the_object.warnings if warning not in told]
         print_solution(solution, [*the_hand.warnings, *untold], files)
         if not forces:
-            print_closure(solution, the_hand, the_object, gripped)
+            print_closure(solution, the_hand, the_object)
         _tell_planned(planned)
         print_posture_choice(solution)
         if error is not None:

@@ -52,19 +52,18 @@ def print_solution(solution: GraspSolution, warnings: Sequence[str], files: Sequ
     print_files(files)
 
 
-def print_closure(solution: GraspSolution, hand: Hand, obj: GraspObject, friction: Any = None) -> None:
+def print_closure(solution: GraspSolution, hand: Hand, obj: GraspObject) -> None:
     """Print whether a grasp resists every wrench; nothing for an answer without a grasp.
 
     Args:
         solution: the answer; without its quality, a fast lower bound of epsilon decides. hand, obj: as solved.
-        friction: of all contacts [-], the lowest of a range counts; None: that of hand and object.
     """
     if solution.status.value not in ("grasp", "partial"):
         return
     from clench.mechanics.epsilon.epsilon_quality import epsilon_bound
     from clench.solver.analysis.holding import hold
 
-    contacts = hold(solution, hand, obj, friction=friction).held
+    contacts = hold(solution, hand, obj).held
     at = f"at friction {contacts.contacts.friction.min(initial=np.inf):g}"
     exact = None if solution.quality is None else solution.quality["epsilon"]
     radius, word = (epsilon_bound(contacts), "at least ") if exact is None else (exact, "")
