@@ -35,13 +35,13 @@ def has_grid(pair: BodyPair) -> bool:
 
 
 @kernel
-def sweep_round(pair: BodyPair, best: float, work: SweepWork) -> float:
-    """Return what `sweep_body` returns where `has_grid`."""
+def sweep_round(pair: BodyPair, begin: float, best: float, work: SweepWork) -> float:
+    """Return what `sweep_from` returns where `has_grid`."""
     moving = pair.moving
     item = item_of(moving, moving.root[pair.m])
     corners, radius = put_item(moving, item, work.moving, work.core)
     motion = motion_of_core(pair, corners, radius, work)
-    edge, s, longer = pair.resting.grid.place[3], 0.0, 1.0
+    edge, s, longer = pair.resting.grid.place[3], begin, 1.0
     work.pair[0], work.pair[2], work.pair[3] = -1 - item, pair.m, pair.r
     work.round[PLANE, 0] = work.round[PLANE, 1] = work.round[PLANE, 2] = 0.0
     while s < best or s == 0.0:
@@ -60,7 +60,7 @@ def sweep_round(pair: BodyPair, best: float, work: SweepWork) -> float:
         begin_window(pair, motion, s, end, work)
         found = sweep_window(pair, motion, s, end, work)
         if found < 0.0:
-            return found if s == 0.0 else sweep_elements(pair, best, -1, work)
+            return found if s == 0.0 else sweep_elements(pair, 0.0, best, -1, work)
         if found < end or end >= best:
             return found
         s, longer = end, min(LONGER * longer, LONGEST)

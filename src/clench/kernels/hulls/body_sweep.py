@@ -6,6 +6,7 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector
+from clench.kernels.grid.grid_travel import clear_by_grid
 from clench.kernels.grid.round_sweep import has_grid, sweep_round
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
@@ -27,36 +28,47 @@ UNSURE = -3.0
 def sweep_body(pair: BodyPair, best: float, work: SweepWork) -> float:
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
-    Hulls take the place of elements, which a body of one element would gain nothing from.
-
     Args:
         pair: the bodies.
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
+    begin = clear_by_grid(pair, best, work)
+    return best if begin == math.inf else float(sweep_from(pair, begin, best, work))
+
+
+@kernel
+def sweep_from(pair: BodyPair, begin: float, best: float, work: SweepWork) -> float:
+    """Return what `sweep_body` returns for bodies that are known to be apart.
+
+    Hulls take the place of elements, which a body of one element would gain nothing from.
+
+    Args:
+        pair, work: as in `sweep_body`. begin: a travel before which they do not meet, below `best`, or 0.
+    """
     if has_grid(pair):
-        return sweep_round(pair, best, work)
+        return sweep_round(pair, begin, best, work)
     moving, root = pair.moving, pair.moving.root[pair.m]
     if root >= 0 and item_of(moving, root) < 0:
-        return sweep_elements(pair, best, -1, work)
+        return sweep_elements(pair, begin, best, -1, work)
     if never_meet(pair, best, work):
         return best
     copy_pose(work.moving, work.begun)
-    found = sweep_stepwise(pair, best, work)
+    found = sweep_stepwise(pair, begin, best, work)
     copy_pose(work.begun, work.moving)
     if found == UNSURE:
-        return sweep_elements(pair, best, -1, work)
+        return sweep_elements(pair, 0.0, best, -1, work)
     return found
 
 
 @kernel
-def sweep_stepwise(pair: BodyPair, best: float, work: SweepWork) -> float:
-    """Return what `sweep_body` returns, or `UNSURE` where elements seem to overlap on the way.
+def sweep_stepwise(pair: BodyPair, begin: float, best: float, work: SweepWork) -> float:
+    """Return what `sweep_from` returns, or `UNSURE` where elements seem to overlap on the way.
 
     Args:
         work: `begun` has the pose of the moving body. `moving` is overwritten.
     """
     chain, count, touch = pair.chain, pair.rows, pair.touch
-    onward, done, length = work.turned if is_spatial(chain) else work.level, 0.0, FIRST * NEAR
+    onward, done, length = work.turned if is_spatial(chain) else work.level, begin, FIRST * NEAR
     ahead = BodyPair(pair.moving, pair.m, pair.resting, pair.r, onward, count, touch)
     while True:
         put_onward(chain, count, done, work, onward)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -24,6 +25,11 @@ AT_ONCE: Final = 2_000_000
 ROUNDING: Final = 1e-12
 #: Points are taken to lie in a plane if their box is thinner than this fraction of its size [-].
 THIN: Final = 1e-6
+#: The balls that cover a hull are so many at most, and those that cover a body; a body of more hulls has none.
+HULL_BALLS: Final = 8
+BODY_BALLS: Final = 64
+#: Cells of a hull that is grown need not be shorter than this multiple of the radius [-].
+SMALL: Final = 1.5
 
 
 class HullArrays(NamedTuple):
@@ -33,6 +39,8 @@ class HullArrays(NamedTuple):
         points: corners of all hulls, in the bodies' frames [m], (P, 3). first: first corner of each hull, (H + 1,).
         radius: by which each hull is grown to enclose its part [m], (H,). body: first hull of each body, (B + 1,).
         box: pose of a box around the corners of each hull, and half its sizes [m], (H, 3, 5).
+        ball: centre and radius of balls that cover a body together [m], (K, 4). cover: first ball of each body,
+            (B + 1,).
         table: first cone of each hull, or -1 without a table, (H,).
         cone, entry: see `CornerTable`; those of all hulls. Entries are rows of `points`.
     """
@@ -42,6 +50,8 @@ class HullArrays(NamedTuple):
     radius: Floats
     body: Whole
     box: Floats
+    ball: Floats
+    cover: Whole
     table: Whole
     cone: Small
     entry: Small
@@ -68,12 +78,17 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
             cones.append(cone + np.where(cone[:, 1:] < 0, [cone_count, 0], [entry_count, 0]))
             entries.append(entry + first[h])
             cone_count, entry_count = cone_count + len(cone), entry_count + len(entry)
+    boxes = np.array([_box(points) for points, _ in hulls], dtype=np.float64).reshape(-1, 3, 5)
+    radius, body = np.array([radius for _, radius in hulls], dtype=np.float64), np.cumsum([0, *map(len, enclosed)])
+    covers = [_cover(boxes[i:j], radius[i:j]) for i, j in pairwise(body)]
     return HullArrays(
         np.concatenate([np.empty((0, 3)), *points]),
         first.astype(np.int64),
-        np.array([radius for _, radius in hulls], dtype=np.float64),
-        np.cumsum([0, *map(len, enclosed)]).astype(np.int64),
-        np.array([_box(points) for points, _ in hulls], dtype=np.float64).reshape(-1, 3, 5),
+        radius,
+        body.astype(np.int64),
+        boxes,
+        np.concatenate([np.empty((0, 4)), *covers]),
+        np.cumsum([0, *map(len, covers)]).astype(np.int64),
         table.astype(np.int64),
         np.concatenate(cones).astype(np.int32),
         np.concatenate(entries).astype(np.int32),
@@ -120,6 +135,30 @@ def _box(points: Floats) -> Floats:
     low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     return np.column_stack([axes.T, axes.T @ middle, half + ROUNDING * np.abs(points).max(initial=0.0)])
+
+
+def _cover(boxes: Floats, radius: Floats) -> Floats:
+    """Return balls that cover the hulls of one body together, (K, 4).
+
+    A box is divided into cells, and each cell has a ball.
+
+    Args:
+        boxes, radius: of the hulls, see `HullArrays`.
+    """
+    most, balls = min(HULL_BALLS, BODY_BALLS // max(len(boxes), 1)), [np.empty((0, 4))]
+    for box, grown in zip(boxes if most > 0 else boxes[:0], radius, strict=False):
+        half, cells = box[:, 4], np.ones(3, dtype=np.int64)
+        while True:
+            longest = int(np.argmax(half / cells))
+            more = cells + (np.arange(3) == longest)
+            if 2.0 * half[longest] <= SMALL * grown * cells[longest] or more.prod() > most:
+                break
+            cells = more
+        steps = [size * ((2.0 * np.arange(n) + 1.0) / n - 1.0) for size, n in zip(half, cells, strict=True)]
+        middles = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3) @ box[:, :3].T + box[:, 3]
+        reach = (np.linalg.norm(half / cells) + grown) * (1.0 + ROUNDING)
+        balls.append(np.column_stack([middles, np.full(len(middles), reach)]))
+    return np.concatenate(balls)
 
 
 @kernel

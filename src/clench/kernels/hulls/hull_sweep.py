@@ -17,7 +17,7 @@ from clench.kernels.toi.toi_work import BodyPair, SweepWork
 from clench.kernels.trees.obb import slab_top
 
 from .enclosing_hulls import HullArrays
-from .gjk import lowest_of, separating_direction
+from .gjk import separating_direction
 from .hull_motion import HullMotion, height, motion_of_hull, put_pose
 from .hull_window import (
     CORNERS,
@@ -28,6 +28,7 @@ from .hull_window import (
     SIMPLEX,
     begin_window,
     forget_planes,
+    forget_shorter,
     keeps_off_box,
     keeps_off_hull,
     least_height,
@@ -35,8 +36,10 @@ from .hull_window import (
     put_element,
     remember_plane,
     square_from_box,
+    top_along,
     way_to_box,
 )
+from .turned_planes import left_over, normal_of, put_turned, remember_turned
 
 #: Windows at most.
 WINDOWS = 40
@@ -48,12 +51,16 @@ NEAR = 2e-5
 TRIALS = 6
 #: A shorter window is meant to leave this share of the gap [-].
 LEFT = 0.04
+#: A plane that turns is worth a try where it leaves more of the gap than one that rests, by this factor [-].
+MUCH = 2.0
+#: A later end of a window is tried so often, each time so much of the way from the known end [-].
+TURNS, BACK = 3, 0.5
 #: A node whose gap is above this share of its ball's radius shortens the window; others are split [-].
 FAR = 1.0
 #: No plane is looked for between a hull and a node that is nearer than this share of the radius of the node's ball [-].
 SOME = 1.0
 #: How near to the best direction the directions between a hull and an element are [-].
-FINE = 0.1
+FINE = 0.01
 
 
 @kernel
@@ -104,7 +111,7 @@ def clear_window(pair: BodyPair, motion: HullMotion, s: float, end: float, sweep
 
     `END` has the pose there.
     """
-    begin_window(pair.moving, motion, pair.chain, pair.rows, end, sweep)
+    begin_window(pair.moving, motion, pair.chain, pair.rows, end, end - s, sweep)
     parts, r = pair.resting.hulls, pair.r
     for part in range(parts.body[r], parts.body[r + 1]):
         w = parts.radius[part] + pair.touch
@@ -211,8 +218,7 @@ def keep_off(
     if not separating_direction(hulls, motion.hull, now, others, other, points, FINE, simplex, direction):
         return -1.0
     n = (direction[0], direction[1], direction[2])
-    low, _ = lowest_of(others, other, points, -n[0], -n[1], -n[2])
-    start, top = height(hulls, motion, now, n), w - low
+    start, top = height(hulls, motion, now, n), top_along(others, other, points, w, n)
     if start - top <= NEAR * motion.speed:
         # What lists the elements near by begins with this plane.
         remember_plane(n, start, -math.inf, -1.0, window)
@@ -220,8 +226,51 @@ def keep_off(
     low = least_height(hulls, motion, n, start, end - s, window)
     remember_plane(n, start, low, end - s, window)
     if low <= top:
-        end = shorten(pair, motion, n, start, top, s, end, sweep)
+        last, end = end, shorten(pair, motion, n, start, top, s, end, sweep)
+        left = window[PLANES, 4] - top
+        remember_turned(motion, n, start, now, window)
+        put_turned(motion, now, window[END:SIMPLEX], end - s, window)
+        later = left_over(0, top, top_along(others, other, points, w, normal_of(0, True, window)), window)
+        if end < last and later > MUCH * left:
+            end = lengthen(pair, motion, others, other, points, w, (start - top, later), (s, end, last), sweep)
     return end
+
+
+@kernel
+def lengthen(
+    pair: BodyPair,
+    motion: HullMotion,
+    others: HullArrays,
+    other: int,
+    points: Floats,
+    w: float,
+    gaps: tuple[float, float],
+    ends: tuple[float, float, float],
+    sweep: SweepWork,
+) -> float:
+    """Return a later end of a window, up to which the plane that turns and was found last keeps the hull off.
+
+    Args:
+        others, other, points, w: what rests, see `keep_off`. gaps: the plane's where the window begins, and where it
+            ends. ends: of the window the start, the end, and the latest end.
+    """
+    window, (s, known, last), (gap, left) = sweep.hull, ends, gaps
+    now, then, end = window[NOW:END], window[END:SIMPLEX], last
+    top = top_along(others, other, points, w, normal_of(0, False, window))
+    for _ in range(TURNS):
+        if left < gap:
+            end = min(end, s + (1.0 - LEFT) * (known - s) * gap / (gap - left))
+        if end <= known:
+            break
+        put_pose(pair.chain, pair.rows, end, sweep, then)
+        put_turned(motion, now, then, end - s, window)
+        if left_over(0, top, top_along(others, other, points, w, normal_of(0, True, window)), window) > 0.0:
+            forget_shorter(end - s, window)
+            return end
+        end = known + BACK * (end - known)
+    put_pose(pair.chain, pair.rows, known, sweep, then)
+    put_turned(motion, now, then, known - s, window)
+    return known
 
 
 @kernel
@@ -254,4 +303,5 @@ def shorten(
         if left > 0.0 or length <= least:
             break
     window[PLANES, 4], window[PLANES, 5] = left + top, s + length - s
+    put_turned(motion, window[NOW:END], window[END:SIMPLEX], length, window)
     return s + length

@@ -21,6 +21,7 @@ from clench.kernels.trees.obb import slab_top
 from .enclosing_hulls import HullArrays
 from .gjk import lowest_of
 from .hull_motion import HullMotion, bend_along, height, lowest_between, put_pose
+from .turned_planes import COUNT, forget_turned, is_over, is_there, left_over, normal_of, put_turned
 
 #: Poses of the moving body in the resting one's frame where the window begins, and where it ends.
 NOW, END = 0, 3
@@ -39,11 +40,14 @@ LISTED = 24
 
 @kernel
 def begin_window(
-    moving: BodyArrays, motion: HullMotion, chain: Floats, count: int, end: float, sweep: SweepWork
+    moving: BodyArrays, motion: HullMotion, chain: Floats, count: int, end: float, length: float, sweep: SweepWork
 ) -> None:
     """Begin a window: place the hull at its end, and the box around the hull at its start; no height is known.
 
     `NOW` has the pose at the start already.
+
+    Args:
+        end: the travel where the window ends. length: of the window.
     """
     window, hulls = sweep.hull, moving.hulls
     put_pose(chain, count, end, sweep, window[END:SIMPLEX])
@@ -51,6 +55,7 @@ def begin_window(
     for k in range(PLANES, LAST):
         if window[k, 3] > -math.inf:
             window[k, 3], window[k, 4], window[k, 5] = math.inf, -math.inf, -1.0
+    put_turned(motion, window[NOW:END], window[END:SIMPLEX], length, window)
 
 
 @kernel
@@ -106,6 +111,15 @@ def forget_planes(window: Floats) -> None:
     for k in range(PLANES, LAST):
         window[k, 0] = window[k, 1] = window[k, 2] = 0.0
         window[k, 3] = window[k, 4] = -math.inf
+    forget_turned(window)
+
+
+@kernel
+def forget_shorter(length: float, window: Floats) -> None:
+    """Forget the bounds on heights that hold for shorter windows than one of a length."""
+    for k in range(PLANES, LAST):
+        if window[k, 5] < length:
+            window[k, 4], window[k, 5] = -math.inf, -1.0
 
 
 @kernel
@@ -142,6 +156,15 @@ def keeps_off_box(
     hulls: HullArrays, motion: HullMotion, slab: Any, touch: float, length: float, window: Floats
 ) -> bool:
     """Say whether one of the planes keeps the hull off a box."""
+    for k in range(COUNT):
+        if not is_there(k, window):
+            break
+        n = normal_of(k, False, window)
+        top = slab_top(slab, n[0], n[1], n[2]) + touch
+        if is_over(k, top, window):
+            n = normal_of(k, True, window)
+            if left_over(k, top, slab_top(slab, n[0], n[1], n[2]) + touch, window) > 0.0:
+                return True
     for k in range(PLANES, LAST):
         if window[k, 3] == -math.inf:
             return False
@@ -163,13 +186,27 @@ def keeps_off_hull(
     window: Floats,
 ) -> bool:
     """Say whether one of the planes keeps the hull off another one, grown by `w`; see `lowest_of`."""
+    for k in range(COUNT):
+        if not is_there(k, window):
+            break
+        top = top_along(others, other, corners, w, normal_of(k, False, window))
+        if is_over(k, top, window):
+            if left_over(k, top, top_along(others, other, corners, w, normal_of(k, True, window)), window) > 0.0:
+                return True
     for k in range(PLANES, LAST):
         if window[k, 3] == -math.inf:
             return False
-        low, _ = lowest_of(others, other, corners, -window[k, 0], -window[k, 1], -window[k, 2])
-        if stays_over(hulls, motion, k, w - low, length, window):
+        top = top_along(others, other, corners, w, (window[k, 0], window[k, 1], window[k, 2]))
+        if stays_over(hulls, motion, k, top, length, window):
             return True
     return False
+
+
+@kernel
+def top_along(others: HullArrays, other: int, corners: Floats, w: float, n: Vector) -> float:
+    """Return the largest coordinate of a hull along a unit vector, grown by `w` [m]; see `lowest_of`."""
+    low, _ = lowest_of(others, other, corners, -n[0], -n[1], -n[2])
+    return float(w - low)
 
 
 @kernel

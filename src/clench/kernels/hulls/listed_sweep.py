@@ -57,7 +57,7 @@ def sweep_listed(pair: BodyPair, best: float, listed: int, sweep: SweepWork) -> 
     """
     found = list_pairs(pair, best, listed, sweep) if listed >= 0 else -1
     if found < 0:
-        return sweep_elements(pair, best, listed, sweep)
+        return sweep_elements(pair, 0.0, best, listed, sweep)
     moving, resting, last, laid, met = pair.moving, pair.resting, sweep.stack.shape[0] - 1, False, False
     for k in range(found):
         a, b = sweep.stack[last - k, 0], sweep.stack[last - k, 1]

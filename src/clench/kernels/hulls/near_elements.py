@@ -49,7 +49,7 @@ def list_near(pair: BodyPair, end: float, sweep: SweepWork) -> int:
     for hull in range(moving.hulls.body[m], moving.hulls.body[m + 1]):
         motion = motion_of_hull(moving, hull, chain, count, sweep)
         put_pose(chain, count, 0.0, sweep, window[NOW:END])
-        begin_window(moving, motion, chain, count, end, sweep)
+        begin_window(moving, motion, chain, count, end, end, sweep)
         found = list_near_hull(moving.hulls, motion, pair.resting, pair.r, pair.touch, end, found, sweep)
         if found < 0:
             return -1

@@ -254,7 +254,9 @@ def sample_values() -> dict[str, Any]:
         "answer": ClosingArrays(*_arrays("f2 f2 i1 i3 f3 f4 i1 i1 i1")),
         "full_width": planes_only(0, 0),
         "chain": chain,
-        "sweep": SweepWork(*_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 f2 i1 i1 i1 i1 i1")),
+        "sweep": SweepWork(
+            *_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 f2 i1 i1 f2 f1 i1 i1 i1 i1")
+        ),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
     }
     values |= {"links": values["full_width"].links, "target": values["full_width"].object}

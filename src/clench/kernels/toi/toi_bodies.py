@@ -114,7 +114,7 @@ def measure(s: float, chain: Floats, count: int) -> float:
 
 
 @kernel
-def sweep_elements(pair: BodyPair, best: float, listed: int, work: SweepWork) -> float:
+def sweep_elements(pair: BodyPair, begin: float, best: float, listed: int, work: SweepWork) -> float:
     """Return the first contact of body `m` with body `r` before `best`, else `best`; `OVERLAP` where they overlap.
 
     Pairs of items are looked at in the order in which they can meet, as far as balls, and boxes after those, tell. A
@@ -123,14 +123,14 @@ def sweep_elements(pair: BodyPair, best: float, listed: int, work: SweepWork) ->
     last, and the plane by which two never met. Elements that are left are swept.
 
     Args:
-        pair: the bodies. listed: see `push_first`.
+        pair: the bodies. begin: a travel before which they do not meet, or 0. listed: see `push_first`.
         work: has `moving` (the pose relative to the last pivot) and `resting` (relative to the first).
     """
     moving, resting, chain, count, touch = pair.moving, pair.resting, pair.chain, pair.rows, pair.touch
     stack, keys, laid, met, beyond, apart = work.stack, work.keys, False, False, NONE, 0.0
     limit = measure(best, chain, count)
     queue, height = 0, push_first(moving, pair.m, resting, pair.r, listed, work.listed, stack[QUEUE:]) + QUEUE
-    height = keep_earliest(pair, QUEUE, height, 0.0, 0.0, limit, NONE, work)
+    height = keep_earliest(pair, QUEUE, height, begin, measure(begin, chain, count), limit, NONE, work)
     while queue > 0 or height > QUEUE:
         if height > QUEUE:
             height = row = height - 1

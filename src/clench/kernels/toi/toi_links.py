@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from clench.kernels.closing.layout import ChainArrays, Floats, Work
 from clench.kernels.geometry.bodies import BodyArrays
-from clench.kernels.hulls.body_sweep import sweep_body
+from clench.kernels.grid.grid_travel import clear_by_grid
+from clench.kernels.hulls.body_sweep import sweep_body, sweep_from
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.advance import fill_chain, place_joints
 from clench.kernels.sections.plane_pose import compose_inverse, copy_pose
@@ -42,18 +43,17 @@ class Stage(NamedTuple):
 
 
 @kernel
-def sweep_turning(
+def place_turning(
     stage: Stage,
     m: int,
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
     joints: tuple[int, int],
-    best: float,
     work: Work,
     sweep: SweepWork,
-) -> float:
-    """Return what `sweep_link` does where the active joints are of one axis group."""
+) -> BodyPair:
+    """Return what `place_pair` does where the active joints are of one axis group."""
     first, joint = joints
     links, rates, T_palm_axis_group = (
         stage.full_width.links,
@@ -66,10 +66,10 @@ def sweep_turning(
     compose_inverse(T_palm_axis_group, T_palm_resting, other)
     # Told before from what `put_lanes` wrote, but for segments in which other axis groups move as well.
     if lanes_apart(lane_of(links.box[m], moving, 0.0, 1.0, 0.0), lane_of(resting.box[r], other, 0.0, 1.0, 0.0)):
-        return best
+        count = 0
     moving[0, 3], moving[2, 3] = moving[0, 3] - place[last, 0], moving[2, 3] - place[last, 1]
     other[0, 3], other[2, 3] = other[0, 3] - place[first, 0], other[2, 3] - place[first, 1]
-    return sweep_body(BodyPair(links, m, resting, r, work.chain, count, stage.touch), best, sweep)
+    return BodyPair(links, m, resting, r, work.chain, count, stage.touch)
 
 
 @kernel
@@ -89,17 +89,16 @@ def fill_spatial(first: int, joint: int, rates: Floats, sweep: SweepWork) -> tup
 
 
 @kernel
-def sweep_spatially(
+def place_spatially(
     stage: Stage,
     m: int,
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
     joints: tuple[int, int],
-    best: float,
     sweep: SweepWork,
-) -> float:
-    """Return what `sweep_link` does where the active joints are of several axis groups."""
+) -> BodyPair:
+    """Return what `place_pair` does where the active joints are of several axis groups."""
     links, first = stage.full_width.links, joints[0]
     count, last = fill_spatial(first, joints[1], stage.rates, sweep)
     copy_pose(sweep.poses[m], sweep.moving)
@@ -107,7 +106,7 @@ def sweep_spatially(
     for k in range(3):
         sweep.moving[k, 3] -= sweep.anchor[last, k]
         sweep.resting[k, 3] -= sweep.anchor[first, k]
-    return sweep_body(BodyPair(links, m, resting, r, sweep.spatial, count, stage.touch), best, sweep)
+    return BodyPair(links, m, resting, r, sweep.spatial, count, stage.touch)
 
 
 @kernel
@@ -122,31 +121,30 @@ def lane_of(box: Floats, T: Floats, x: float, y: float, z: float) -> tuple[float
 
 
 @kernel
-def sweep_link(
+def place_pair(
     stage: Stage,
     m: int,
     resting: BodyArrays,
     r: int,
     T_palm_resting: Floats,
     joints: tuple[int, int],
-    best: float,
     work: Work,
     sweep: SweepWork,
-) -> float:
-    """Return the first contact of one moving link with one resting body before `best`; see `sweep_body`.
+) -> BodyPair:
+    """Return a moving link and a resting body as `sweep_body` takes them; their poses are written to `sweep`.
+
+    A pair whose chain has no rows never meets.
 
     Args:
         stage: the segment, for which `sweep_stage` has placed joints, axes and links.
         T_palm_resting: where the body is. joints: first active joint, and the last joint that moves the link.
     """
-    if resting.root[r] < 0:
-        return best
     first, last = joints
     while stage.rates[last] == 0.0:
         last -= 1
     if stage.chain.joint_axis_group[last] == stage.chain.joint_axis_group[first]:
-        return sweep_turning(stage, m, resting, r, T_palm_resting, joints, best, work, sweep)
-    return sweep_spatially(stage, m, resting, r, T_palm_resting, joints, best, sweep)
+        return place_turning(stage, m, resting, r, T_palm_resting, joints, work, sweep)
+    return place_spatially(stage, m, resting, r, T_palm_resting, joints, sweep)
 
 
 @kernel
@@ -183,7 +181,7 @@ def sweep_links(
     """Return the first contact of a moving link with other links of the hand before `best`, and that link or -1.
 
     Args:
-        m: the moving link. first, joint: first active joint, and the last joint that moves it; see `sweep_link`.
+        m: the moving link. first, joint: first active joint, and the last joint that moves it; see `place_pair`.
     """
     full_width, met, lane = stage.full_width, -1, sweep.lane
     for r in range(full_width.checked.shape[0]):
@@ -193,7 +191,10 @@ def sweep_links(
         after = sweep.after[r]
         if after > joint or lanes_apart((lane[m, 0], lane[m, 1]), (lane[r, 0], lane[r, 1])):
             continue
-        found = sweep_link(stage, m, full_width.links, r, sweep.poses[r], (after, joint), best, work, sweep)
+        if full_width.links.root[r] < 0:
+            continue
+        pair = place_pair(stage, m, full_width.links, r, sweep.poses[r], (after, joint), work, sweep)
+        found = sweep_body(pair, best, sweep) if pair.rows > 0 else best
         if found < 0.0:
             sweep.skipped[0] += 1
         elif found < best:
@@ -220,26 +221,70 @@ def sweep_stage(stage: Stage, best: float, work: Work, sweep: SweepWork) -> tupl
         first += 1
     if first == rates.shape[0]:
         return best, -1
-    met, links, lane = -1, full_width.checked.shape[0], sweep.lane
     several = place_active(stage, first, work, sweep)
     pose_movers(full_width, chain, finger_posture, stage.turns, sweep.poses)
     put_lanes(stage, several, first, sweep)
+    best, met = sweep_towards_object(stage, first, best, work, sweep)
+    if best < 0.0:
+        return best, met
     for n in range(full_width.mover_first[finger_posture], full_width.mover_first[finger_posture + 1]):
+        m, joint = full_width.mover_link[n], full_width.mover_joint[n]
+        if joint >= first and full_width.links.root[m] >= 0:
+            best, other = sweep_links(stage, m, first, joint, best, work, sweep)
+            if other >= 0:
+                met = other
+    return best, met
+
+
+@kernel
+def sweep_towards_object(stage: Stage, first: int, best: float, work: Work, sweep: SweepWork) -> tuple[float, int]:
+    """Return what `sweep_stage` does for the object alone.
+
+    Links are swept in the order in which they may touch, as the object's grid tells. What the first of them leave
+    of the way, the others often pass without a closer look.
+    """
+    full_width, met, order, clear = stage.full_width, -1, sweep.order, sweep.clear
+    if full_width.object.root[0] < 0:
+        return best, met
+    for k in range(order_movers(stage, first, best, work, sweep)):
+        n = order[k]
+        m, joint = full_width.mover_link[n], full_width.mover_joint[n]
+        if clear[k] >= best > 0.0:
+            break
+        pair = place_pair(stage, m, full_width.object, 0, stage.T_palm_object, (first, joint), work, sweep)
+        found = sweep_from(pair, clear[k], best, sweep)
+        if found < best:
+            best, met = found, full_width.checked.shape[0]
+            keep_pair(sweep)
+            if best < 0.0:
+                break
+    return best, met
+
+
+@kernel
+def order_movers(stage: Stage, first: int, best: float, work: Work, sweep: SweepWork) -> int:
+    """Write which links may touch the object before `best`, and from when on, the earliest first; return how many."""
+    full_width, lane, order, clear, count = stage.full_width, sweep.lane, sweep.order, sweep.clear, 0
+    links = full_width.checked.shape[0]
+    for n in range(full_width.mover_first[stage.finger_posture], full_width.mover_first[stage.finger_posture + 1]):
         m, joint = full_width.mover_link[n], full_width.mover_joint[n]
         if joint < first or full_width.links.root[m] < 0:
             continue
-        found = best
-        if not lanes_apart((lane[m, 0], lane[m, 1]), (lane[links, 0], lane[links, 1])):
-            found = sweep_link(stage, m, full_width.object, 0, stage.T_palm_object, (first, joint), best, work, sweep)
-        if found < best:
-            best, met = found, links
-            keep_pair(sweep)
-            if best < 0.0:
-                return best, met
-        best, other = sweep_links(stage, m, first, joint, best, work, sweep)
-        if other >= 0:
-            met = other
-    return best, met
+        if lanes_apart((lane[m, 0], lane[m, 1]), (lane[links, 0], lane[links, 1])):
+            continue
+        pair = place_pair(stage, m, full_width.object, 0, stage.T_palm_object, (first, joint), work, sweep)
+        if pair.rows == 0:
+            continue
+        begin = clear_by_grid(pair, best, sweep)
+        if begin == math.inf:
+            continue
+        k = count
+        while k > 0 and clear[k - 1] > begin:
+            clear[k], order[k] = clear[k - 1], order[k - 1]
+            k -= 1
+        clear[k], order[k] = begin, n
+        count += 1
+    return count
 
 
 @kernel

@@ -11,6 +11,7 @@ from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import crosses, separation
 from clench.kernels.geometry.crossing import only_touch
+from clench.kernels.hulls.enclosing_hulls import BODY_BALLS
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 from clench.kernels.trees.obb import put_slab_core, slab_misses, slab_slack
@@ -43,9 +44,11 @@ class SweepWork(NamedTuple):
             (8,).
         begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
             (J, 7) and for parallel ones (J + 1, 3).
-        hull: scratch space of `hull_sweep`, (56, 6). round: that of `round_motion`, (12, 3). near: the element that the
+        hull: scratch space of `hull_window`, (62, 6). round: that of `round_motion`, (12, 3). near: the element that the
             hull came near to last, or -1, (1,).
         listed: resting elements that a short sweep can meet, (32,).
+        balls: those of a moving body, see `grid_travel`, (BODY_BALLS, 6).
+        clear: a travel before which each link does not meet the object, (L,). order: links by this travel, (L,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
@@ -73,6 +76,9 @@ class SweepWork(NamedTuple):
     round: Floats
     near: Ints
     listed: Ints
+    balls: Floats
+    clear: Floats
+    order: Ints
     pair: Ints
     winner: Ints
     skipped: Ints
@@ -118,10 +124,13 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((3, 4)),
         np.empty((joints, SPATIAL)),
         np.empty((joints + 1, 3)),
-        np.empty((56, 6)),
+        np.empty((62, 6)),
         np.empty((12, 3)),
         np.zeros(1, dtype=np.int64),
         np.zeros(32, dtype=np.int64),
+        np.empty((BODY_BALLS, 6)),
+        np.empty(links),
+        np.empty(links, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(1, dtype=np.int64),
