@@ -58,12 +58,17 @@ def arrays_of(key: str, make: Callable[[], Sequence[np.ndarray[Any, Any]]]) -> A
 def _read(path: Path, key: str) -> Arrays | None:
     """Return the arrays of a file, or None if it is missing or unusable."""
     try:
-        if path.stat().st_size > MOST_BYTES:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
             return None
-        content = bytearray(path.read_bytes())
+        content = bytearray(size)
+        with path.open("rb") as file:
+            if file.readinto(content) != size:
+                return None
         end = content.index(b"\n") + 1
         head = json.loads(content[:end])
-        if (head["schema"], head["key"], head["digest"]) != (SCHEMA, key, _digest(head["arrays"], content[end:])):
+        digest = _digest(head["arrays"], memoryview(content)[end:])
+        if (head["schema"], head["key"], head["digest"]) != (SCHEMA, key, digest):
             return None
         return _arrays(head["arrays"], content, end)
     except (OSError, ValueError, TypeError, LookupError, RecursionError, OverflowError):
@@ -108,7 +113,7 @@ def _head(key: str, digest: str, rows: list[Any]) -> bytes:
     return json.dumps({"schema": SCHEMA, "key": key, "digest": digest, "arrays": rows}).encode() + b"\n"
 
 
-def _digest(rows: list[Any], body: bytearray) -> str:
+def _digest(rows: list[Any], body: bytearray | memoryview) -> str:
     digest = hashlib.sha256(json.dumps(rows).encode())
     digest.update(body)
     return digest.hexdigest()
