@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from clench.closing.collision import packed_object
 from clench.closing.collision.packed_object import ROUND_POLYHEDRA, SWEEP_DEVIATION, PackedObject, shape_elements
+from clench.core.caching.kept_arrays import Arrays, arrays_of
 from clench.core.pose import FloatArray
 from clench.models.hand.hand import Hand
+from clench.models.hand.shapes_key import shapes_key
 from clench.models.shapes import CollisionSource, ShapeKind
 
 from .finger_plan import FingerPlan, closing_joints, last_closing_joint
@@ -56,14 +59,24 @@ def link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
 
 
 def _link_bodies(hand: Hand, source: CollisionSource) -> BodyArrays:
-    from clench.kernels.geometry.bodies import join_elements, pack_bodies
+    from clench.kernels.geometry.bodies import BodyArrays, join_elements, pack_bodies
+    from clench.kernels.grid.distance_grid import no_grid
+    from clench.kernels.hulls.enclosing_hulls import HullArrays
 
-    solid = set(hand.solid_links)
-    parts = [
-        join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
-        for i, link in enumerate(hand.links)
-    ]
-    return pack_bodies(parts)
+    own = len(BodyArrays._fields) - 2  # without the hulls and the grid
+
+    def make() -> Arrays:
+        solid = set(hand.solid_links)
+        parts = [
+            join_elements([shape_elements(s, source) for s in (link.shapes.get(source, ()) if i in solid else ())])
+            for i, link in enumerate(hand.links)
+        ]
+        packed: Any = pack_bodies(parts)
+        return [*packed[:own], *packed.hulls]
+
+    key = shapes_key(hand, source, "link bodies", __file__, str(packed_object.__file__))
+    found: Any = arrays_of(key, make)
+    return BodyArrays._make([*found[:own], HullArrays(*found[own:]), no_grid()])
 
 
 def _across(hand: Hand, allowed: tuple[tuple[int, int], ...]) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -85,6 +86,24 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 SOLVE = ["solve", "--hand", "pincer", "--object", "ball"]
+
+
+@pytest.mark.parametrize(("given", "then"), [(None, "4"), ("20", "20")])
+def test_the_waiting_of_blas_threads_is_set_before_numpy_loads(given: str | None, then: str) -> None:
+    """Every thread of OpenBLAS waits in a loop once it has started, which takes a tenth of a short command's time."""
+    program = (
+        "import os, sys\n"
+        "class Watch:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name == 'numpy': print('numpy', os.environ.get('OPENBLAS_THREAD_TIMEOUT'))\n"
+        "sys.meta_path.insert(0, Watch())\n"
+        "from clench.apps.cli.main import main\n"
+        "main(['object', 'sphere:r=0.03'])\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_THREAD_TIMEOUT"}
+    environment |= {} if given is None else {"OPENBLAS_THREAD_TIMEOUT": given}
+    run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    assert [line for line in run.stdout.splitlines() if line.startswith("numpy ")] == [f"numpy {then}"]
 
 
 def test_help_loads_nothing_heavy_and_names_every_command() -> None:

@@ -26,6 +26,10 @@ EXIT_INTERNAL = 70
 #: command makes 300,000 objects and no garbage.
 GARBAGE_THRESHOLDS = (500_000, 20, 100)
 
+#: How long OpenBLAS's threads wait in a loop for more work, as a power of two in processor cycles, unless the
+#: environment says so. By itself, each thread waits for 2^26 cycles when it starts and after its work.
+BLAS_WAITS = ("OPENBLAS_THREAD_TIMEOUT", "4")
+
 DESCRIPTION = """Close a robot hand around a known object, in closed form, and carry it out.
 
 Exit codes: 0 = grasp or partial, and executed where asked (--strict: grasp only); 1 = any other answer, or a failed
@@ -65,6 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    os.environ.setdefault(*BLAS_WAITS)  # NumPy reads it when it is loaded
     from .command_table import COMMANDS, bench
 
     # Imported modules stay: garbage collections of them take a twentieth of a short command's time. The last one, at

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clench.core.caching.kept_arrays import Arrays, arrays_of
 from clench.core.pose import FloatArray, invert
 from clench.models.mesh import TriangleMesh, is_closed
 from clench.models.parts import part_points
@@ -16,9 +17,13 @@ from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.models.tessellation import shape_mesh
 
 from .hand import Hand
+from .shapes_key import shapes_key
 
 if TYPE_CHECKING:
     from clench.kernels.trees.bvh import MeshTree
+
+#: A link's mesh on disk has so many arrays: 11 of its tree and 4 others.
+_ARRAYS: Final = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +61,23 @@ def link_meshes(hand: Hand, source: CollisionSource | None = None) -> tuple[Link
 
 
 def _meshes(hand: Hand, source: CollisionSource) -> tuple[LinkMesh, ...]:
-    made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
-    return tuple(mesh for mesh in made if len(mesh.tree.triangles))
+    def make() -> Arrays:
+        made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
+        return [array for mesh in made if len(mesh.tree.triangles) for array in _as_arrays(mesh)]
+
+    found = arrays_of(shapes_key(hand, source, "link meshes", __file__), make)
+    return tuple(_from_arrays(found[k : k + _ARRAYS]) for k in range(0, len(found), _ARRAYS))
+
+
+def _as_arrays(mesh: LinkMesh) -> Arrays:
+    return [np.array([mesh.link, mesh.closed, mesh.radius]), mesh.owners, mesh.center, mesh.points, *mesh.tree]
+
+
+def _from_arrays(arrays: Arrays) -> LinkMesh:
+    from clench.kernels.trees.bvh import MeshTree
+
+    (link, closed, radius), owners, center, points, *tree = arrays
+    return LinkMesh(int(link), MeshTree(*tree), owners, bool(closed), center, float(radius), points)
 
 
 def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) -> LinkMesh:

@@ -1,0 +1,39 @@
+"""What the bits of computed arrays depend on, beside their input: sources, versions and the processor."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import numba
+import numpy as np
+from numba.core.registry import cpu_target
+
+from clench.core.caching.fingerprint import fingerprint
+
+from .compiling import source_stamp
+
+#: Environment variables that choose the code of NumPy and of its linear algebra.
+_CHOOSING: Final = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
+
+
+@cache
+def made_by(kernels: str, *others: str) -> str:
+    """Return a hash of what computes arrays, hexadecimal.
+
+    Args:
+        kernels: file of a module with kernels; the modules with kernels that it imports count, too. others: files of
+            the modules without kernels that take part.
+    """
+    import scipy  # without its parts, which take long to load
+
+    config: Any = numba.config
+    return fingerprint(
+        source_stamp(Path(kernels)).hex(),
+        [fingerprint(Path(file).read_text(encoding="utf-8")) for file in others],
+        [numba.__version__, np.__version__, scipy.__version__, bool(config.DISABLE_JIT)],
+        [str(part) for part in cpu_target.target_context.codegen().magic_tuple()],
+        [os.environ.get(name) for name in _CHOOSING],
+    )
