@@ -65,14 +65,15 @@ def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) ->
 
     meshes = [shape_mesh(shape, source) for shape in shapes]
     mesh = TriangleMesh.joined(meshes)
-    tree = build_tree(mesh.vertices, mesh.triangles)
+    closed = all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True))
+    tree = build_tree(mesh.vertices, mesh.triangles, is_open=not closed)
     corners = tree.vertices[tree.triangles].reshape(-1, 3)
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) if len(corners) else np.zeros(3)
     return LinkMesh(
         link,
         tree,
         feature_owners(tree),
-        all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True)),
+        closed,
         center,
         float(np.linalg.norm(corners - center, axis=1).max(initial=0.0)),
         part_points(tree),
