@@ -24,6 +24,7 @@ KERNELS = {
     "kernels/closing/segments": ["kernels/closing/test_segments.py"],
     "kernels/geometry/core_distance": ["kernels/geometry/test_core_distance.py", "kernels/toi/test_toi_pairs.py"],
     "kernels/geometry/mesh_clearance": ["kernels/geometry/test_mesh_clearance.py"],
+    "kernels/trees/node_moments": ["kernels/trees/test_node_moments.py"],
     "kernels/trees/obb": ["kernels/trees/test_obb.py", "closing/test_link_bodies.py"],
     "kernels/toi/core_motion": ["kernels/toi/test_core_motion.py", "kernels/toi/test_spatial_motion.py"],
     "kernels/toi/toi_pairs": ["kernels/toi/test_toi_pairs.py", "kernels/toi/test_separating.py"],

@@ -69,7 +69,7 @@ def test_boxes_side_by_side(shift, scale, expected):
 
 def link_arrays(one, closed):
     tree, mesh = TREES[one], SOLIDS[one]
-    counts = [np.array([0, n]) for n in (1, len(tree.vertices), len(tree.triangles), len(tree.low))]
+    counts = [np.array([0, n]) for n in (1, len(tree.vertices), len(tree.triangles), len(tree.low), len(tree.moments))]
     radius = np.linalg.norm(mesh.vertices, axis=1).max()
     return LinkMeshArrays(
         np.array([0]),

@@ -12,8 +12,8 @@ from clench.kernels.geometry.mesh_distance import (
     closest_point,
     is_inside,
     signed_distance,
-    winding_number,
 )
+from clench.kernels.geometry.winding import winding_number
 from clench.kernels.trees.bvh import build_tree
 from clench.models.mesh import TriangleMesh
 from kernels.kernel_solids import ball, box, hull, moved, star, torus

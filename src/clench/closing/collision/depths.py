@@ -222,6 +222,7 @@ def _joined(meshes: Sequence[LinkMesh]) -> LinkMeshArrays:
         vertex_first=firsts([len(mesh.tree.vertices) for mesh in meshes]),
         triangle_first=firsts([len(mesh.tree.triangles) for mesh in meshes]),
         node_first=firsts([len(mesh.tree.low) for mesh in meshes]),
+        moment_first=firsts([len(mesh.tree.moments) for mesh in meshes]),
         tree=type(none)(*(np.concatenate(columns) for columns in zip(*trees, strict=True))),
         owners=np.concatenate([np.empty(0, dtype=np.uint8), *(mesh.owners for mesh in meshes)]),
     )

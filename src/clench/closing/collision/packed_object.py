@@ -206,8 +206,10 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     expect(sum(shape.mesh.triangles.nbytes for _, shape in placed if shape.mesh is not None))
     flat = [(n, shape_mesh(s, source)) for n, s in placed if s.kind not in ROUND_KINDS]
     curved = [(n, shape_mesh(s, source)) for n, s in placed if s.kind in ROUND_KINDS]
-    tree = _tree(flat)
-    full_tree = _tree(flat + curved) if curved else tree
+    # With `engine` every mesh became a convex hull, which is always closed.
+    closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
+    tree = _tree(flat, not all(closed))
+    full_tree = _tree(flat + curved, not all(closed)) if curved else tree
     made = _at_once(
         bodies=lambda: _bodies(placed, source) if curved else (pack_triangles(tree), tree.body),
         owners=lambda: feature_owners(full_tree),
@@ -218,8 +220,6 @@ def _pack(bodies: tuple[Body, ...], source: CollisionSource) -> PackedObject:
     everything = _corners(full_tree, slice(None))
     held = everything if len(graspable) == len(bodies) else _corners(full_tree, np.isin(full_tree.body, graspable))
     center = _middle(held)
-    # With `engine` every mesh became a convex hull, which is always closed.
-    closed = tuple(body.closed or source is CollisionSource.ENGINE for body in bodies)
     return PackedObject(
         tree=tree,
         rounds=_rounds([(n, s) for n, s in placed if s.kind in ROUND_KINDS]),
@@ -267,12 +267,13 @@ def _corners(tree: MeshTree, triangles: NDArray[np.bool_] | slice) -> FloatArray
     return tree.vertices[named]
 
 
-def _tree(parts: list[tuple[int, TriangleMesh]]) -> MeshTree:
+def _tree(parts: list[tuple[int, TriangleMesh]], is_open: bool) -> MeshTree:
     from clench.kernels.trees.bvh import build_tree
 
     mesh = TriangleMesh.joined([part for _, part in parts])
     numbers = np.array([n for n, _ in parts], dtype=np.int32)
-    return build_tree(mesh.vertices, mesh.triangles, np.repeat(numbers, [len(part.triangles) for _, part in parts]))
+    body = np.repeat(numbers, [len(part.triangles) for _, part in parts])
+    return build_tree(mesh.vertices, mesh.triangles, body, is_open)
 
 
 def _rounds(placed: list[tuple[int, Shape]]) -> RoundShapes:

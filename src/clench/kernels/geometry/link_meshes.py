@@ -26,6 +26,7 @@ class LinkMeshArrays(NamedTuple):
         center: of a ball around it, (M, 3), radius: of that ball [m], (M,).
         point_first: first of its points, (M + 1,). points: one of every connected part [m], (P, 3).
         vertex_first, triangle_first, node_first: first vertex, triangle and node of each, (M + 1,).
+        moment_first: first row of moments of each, (M + 1,); closed meshes have none.
         tree: the trees' arrays joined, with numbers that count from each tree's own beginning. owners: (T,).
     """
 
@@ -38,6 +39,7 @@ class LinkMeshArrays(NamedTuple):
     vertex_first: Numbers
     triangle_first: Numbers
     node_first: Numbers
+    moment_first: Numbers
     tree: MeshTree
     owners: NDArray[np.uint8]
 
@@ -70,6 +72,7 @@ def mesh_of(meshes: LinkMeshArrays, k: int) -> MeshTree:
         tree.count[n0:n1],
         tree.right[n0:n1],
         tree.skip[n0:n1],
+        tree.moments[meshes.moment_first[k] : meshes.moment_first[k + 1]],
     )
 
 

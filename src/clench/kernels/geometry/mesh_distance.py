@@ -10,6 +10,8 @@ import numpy as np
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.trees.bvh import STACK_SIZE, Floats, Ints, MeshTree
 
+from .winding import winds_around
+
 Point = tuple[float, float, float]
 
 #: Three fixed directions for rays, in general position: no component is 0, none is a simple fraction of another.
@@ -113,27 +115,7 @@ def is_inside(tree: MeshTree, p: Any, closed: bool) -> bool:
         clear2, winding2 = _crossings(tree, q, 2)
         if clear2 and ((clear0 and winding0 == winding2) or (clear1 and winding1 == winding2)):
             return bool(winding2 > 0)
-    return bool(abs(winding_number(tree, q)) > 0.5)
-
-
-@entry_kernel
-def winding_number(tree: MeshTree, p: Any) -> float:
-    """Return the winding number around a point: the exact solid angle over 4π (van Oosterom and Strackee)."""
-    vertices, triangles = tree.vertices, tree.triangles
-    total = 0.0
-    for t in range(triangles.shape[0]):
-        a, b, c = corners(vertices, triangles, t)
-        ax, ay, az = a[0] - p[0], a[1] - p[1], a[2] - p[2]
-        bx, by, bz = b[0] - p[0], b[1] - p[1], b[2] - p[2]
-        cx, cy, cz = c[0] - p[0], c[1] - p[1], c[2] - p[2]
-        la = math.sqrt(ax * ax + ay * ay + az * az)
-        lb = math.sqrt(bx * bx + by * by + bz * bz)
-        lc = math.sqrt(cx * cx + cy * cy + cz * cz)
-        volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-        below = la * lb * lc + (ax * bx + ay * by + az * bz) * lc
-        below += (bx * cx + by * cy + bz * cz) * la + (cx * ax + cy * ay + cz * az) * lb
-        total += math.atan2(volume, below)
-    return total / (2.0 * math.pi)
+    return bool(winds_around(tree, q))
 
 
 @kernel

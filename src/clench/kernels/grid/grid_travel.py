@@ -51,8 +51,8 @@ def clear_by_grid(pair: BodyPair, best: float, work: SweepWork) -> float:
             return 0.0
         look_at(pair, k, until, work)
         if (work.balls[k, UNTIL] - until) * speed <= near:
-            return until
-    return work.balls[earliest(last - first, work), UNTIL]
+            return float(until)
+    return float(work.balls[earliest(last - first, work), UNTIL])
 
 
 @kernel

@@ -190,9 +190,10 @@ def keeps_off_hull(
         if not is_there(k, window):
             break
         top = top_along(others, other, corners, w, normal_of(k, False, window))
-        if is_over(k, top, window):
-            if left_over(k, top, top_along(others, other, corners, w, normal_of(k, True, window)), window) > 0.0:
-                return True
+        if not is_over(k, top, window):
+            continue
+        if left_over(k, top, top_along(others, other, corners, w, normal_of(k, True, window)), window) > 0.0:
+            return True
     for k in range(PLANES, LAST):
         if window[k, 3] == -math.inf:
             return False

@@ -246,7 +246,7 @@ def sample_values() -> dict[str, Any]:
     outlines = OutlineArrays(*_arrays("i1 i1 f1 i1 f2 i1 f2 i1 f2"))
     hand: tuple[Any, ...] = (*_arrays("i1 i1"), chain, outlines, *_arrays("f3 i1 f1 f1 f1 i1"))
     sections = SectionArrays(*_arrays("f3 i2 f3 i2 f3 i2 i2 f3"))
-    tree = MeshTree(*_arrays("f2 s2 f2 s1 s1 f2 f2 s1 s1 s1 s1"))
+    tree = MeshTree(*_arrays("f2 s2 f2 s1 s1 f2 f2 s1 s1 s1 s1 f2"))
     values: dict[str, Any] = {
         "hand": HandArrays(*hand),
         "rounds": RoundArrays(*_arrays("i1 f2 f3")),
@@ -262,7 +262,7 @@ def sample_values() -> dict[str, Any]:
     values |= {"links": values["full_width"].links, "target": values["full_width"].object}
     values["frames"] = FrameArrays(*_arrays("i1 i1 f3 f2 f2 f1 i1 f1 f1 f1 i1 i1 f1 f1 f2 i1 i1 f1 i1"))
     owners = _arrays("b1")[0]
-    values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1"), tree, owners])
+    values["meshes"] = LinkMeshArrays(*[*_arrays("i1 i1 f2 f1 i1 f2 i1 i1 i1 i1"), tree, owners])
     values["solid"] = ObjectMesh(tree, owners, True, _arrays("f2")[0])
     values["mesh"] = values["solid"]
     values["surface"] = SurfaceArrays(*[*_arrays("f2 s1"), values["rounds"], *_arrays("s1 s1 i1")])

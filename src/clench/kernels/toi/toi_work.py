@@ -44,8 +44,8 @@ class SweepWork(NamedTuple):
             (8,).
         begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
             (J, 7) and for parallel ones (J + 1, 3).
-        hull: scratch space of `hull_window`, (62, 6). round: that of `round_motion`, (12, 3). near: the element that the
-            hull came near to last, or -1, (1,).
+        hull: scratch space of `hull_window`, (62, 6). round: that of `round_motion`, (12, 3).
+        near: the element that the hull came near to last, or -1, (1,).
         listed: resting elements that a short sweep can meet, (32,).
         balls: those of a moving body, see `grid_travel`, (BODY_BALLS, 6).
         clear: a travel before which each link does not meet the object, (L,). order: links by this travel, (L,).

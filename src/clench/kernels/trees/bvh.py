@@ -12,6 +12,7 @@ from clench.kernels.runtime.compiling import entry_kernel
 
 from .connectivity import owned_features
 from .node_boxes import local_elements
+from .node_moments import COLUMNS, node_moments
 from .tree_growth import LEAF_SIZE, STACK_SIZE, Floats, Ints, grow_tree, row_parts
 
 __all__ = ["LEAF_SIZE", "STACK_SIZE", "Floats", "Ints", "MeshTree", "build_tree", "feature_owners"]
@@ -35,6 +36,7 @@ class MeshTree(NamedTuple):
         first: first triangle of a leaf, shape (N,). count: its triangles, 0 for inner nodes, shape (N,).
         right: right child of an inner node, -1 for leaves, shape (N,).
         skip: first node after the node's subtree, shape (N,).
+        moments: see `node_moments`, shape (N, 15); only an open mesh needs them, others have no rows.
     """
 
     vertices: Floats
@@ -48,15 +50,19 @@ class MeshTree(NamedTuple):
     count: Ints  # type: ignore[assignment]
     right: Ints
     skip: Ints
+    moments: Floats
 
 
-def build_tree(vertices: ArrayLike, triangles: ArrayLike, body: ArrayLike | None = None) -> MeshTree:
+def build_tree(
+    vertices: ArrayLike, triangles: ArrayLike, body: ArrayLike | None = None, is_open: bool = False
+) -> MeshTree:
     """Build the tree of a mesh; a mesh without triangles has a tree without nodes.
 
     Args:
         vertices: [m], shape (V, 3).
         triangles: vertex indices, shape (T, 3).
         body: body of each triangle, shape (T,); None is all 0.
+        is_open: the mesh is not watertight; with moments, what lies inside it is told much faster.
 
     Raises:
         ValueError: a vertex that is not finite, an index that does not exist, or a wrong length of `body`.
@@ -74,7 +80,8 @@ def build_tree(vertices: ArrayLike, triangles: ArrayLike, body: ArrayLike | None
     t = np.ascontiguousarray(t[order])
     normals = np.empty((len(t), 3))
     share_out(lambda some: face_normals(v, t[some], normals[some]), row_parts(len(t)), core_count())
-    return MeshTree(v, t, normals, b[order], order, *nodes)
+    moments = node_moments(v, t, nodes) if is_open else np.empty((0, COLUMNS))
+    return MeshTree(v, t, normals, b[order], order, *nodes, moments)
 
 
 def feature_owners(tree: MeshTree) -> NDArray[np.uint8]:

@@ -22,8 +22,8 @@ from .shapes_key import shapes_key
 if TYPE_CHECKING:
     from clench.kernels.trees.bvh import MeshTree
 
-#: A link's mesh on disk has so many arrays: 11 of its tree and 4 others.
-_ARRAYS: Final = 15
+#: A link's mesh on disk has so many arrays besides those of its tree.
+_OTHERS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +65,10 @@ def _meshes(hand: Hand, source: CollisionSource) -> tuple[LinkMesh, ...]:
         made = (_link_mesh(n, hand.links[n].shapes.get(source, ()), source) for n in hand.solid_links)
         return [array for mesh in made if len(mesh.tree.triangles) for array in _as_arrays(mesh)]
 
-    found = arrays_of(shapes_key(hand, source, "link meshes", __file__), make)
-    return tuple(_from_arrays(found[k : k + _ARRAYS]) for k in range(0, len(found), _ARRAYS))
+    from clench.kernels.trees.bvh import MeshTree
+
+    found, each = arrays_of(shapes_key(hand, source, "link meshes", __file__), make), _OTHERS + len(MeshTree._fields)
+    return tuple(_from_arrays(found[k : k + each]) for k in range(0, len(found), each))
 
 
 def _as_arrays(mesh: LinkMesh) -> Arrays:
@@ -85,14 +87,15 @@ def _link_mesh(link: int, shapes: tuple[Shape, ...], source: CollisionSource) ->
 
     meshes = [shape_mesh(shape, source) for shape in shapes]
     mesh = TriangleMesh.joined(meshes)
-    tree = build_tree(mesh.vertices, mesh.triangles)
+    closed = all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True))
+    tree = build_tree(mesh.vertices, mesh.triangles, is_open=not closed)
     corners = tree.vertices[tree.triangles].reshape(-1, 3)
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) if len(corners) else np.zeros(3)
     return LinkMesh(
         link,
         tree,
         feature_owners(tree),
-        all(s.kind is not ShapeKind.MESH or is_closed(m) for s, m in zip(shapes, meshes, strict=True)),
+        closed,
         center,
         float(np.linalg.norm(corners - center, axis=1).max(initial=0.0)),
         part_points(tree),
