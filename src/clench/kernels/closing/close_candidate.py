@@ -20,6 +20,8 @@ from clench.kernels.toi.toi_work import SweepWork
 from .layout import (
     CONTACT_DOF,
     CONTACT_JOINT,
+    CONTACT_MET,
+    CONTACT_MET_SOURCE,
     SUNK,
     CandidateArrays,
     ChainArrays,
@@ -154,6 +156,7 @@ def write_contact(
         return
     full_width, sweep = closing.full_width, closing.sweep
     pose_movers(full_width, hand.chain, finger_posture, answer.turn[i], sweep.poses)
+    contact[CONTACT_MET], contact[CONTACT_MET_SOURCE] = sweep.winner[0], sweep.winner[1]
     describe_pair(full_width, closing.T_palm_object, met, dof, axis_group, sweep, contact, point)
 
 
@@ -165,21 +168,20 @@ def close_candidate(closing: Closing, i: int, times: int, together: bool) -> Non
     Args:
         i: the candidate. times, together: as above.
     """
-    hand, full_width, candidates, answer = closing.hand, closing.full_width, closing.candidates, closing.answer
-    work, sweep = closing.work, closing.sweep
-    finger_posture = candidates.finger_posture[i]
-    if full_width.requested[i]:
-        for link in range(sweep.poses.shape[0]):
-            copy_pose(full_width.link_pose[finger_posture, link], sweep.poses[link])
-    sweep.skipped[0] = 0
-    # Travels of other finger postures' joints are never written: they would continue with the values of the candidate
-    # before.
-    for j in range(work.rates.shape[0]):
-        work.rates[j] = 0.0
-    for _ in range(times):
+    close_from(closing, i, times, together, closing.hand.first_dof[closing.candidates.finger_posture[i]])
+
+
+@kernel
+def close_from(closing: Closing, i: int, times: int, together: bool, first: int) -> None:
+    """Close one candidate from a degree of freedom on, in the first pass; those before have closed already."""
+    hand, answer, work, sweep = closing.hand, closing.answer, closing.work, closing.sweep
+    finger_posture = closing.candidates.finger_posture[i]
+    begin, end = hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]
+    begin_candidate(closing, i)
+    for turn in range(times):
         for j in range(work.before.shape[0]):
             work.before[j] = answer.turn[i, j]
-        if not close_dofs(closing, i, together):
+        if not close_dofs(closing, i, together, (first if turn == 0 else begin, end)):
             return
         moved = False
         for j in range(work.before.shape[0]):
@@ -192,13 +194,32 @@ def close_candidate(closing: Closing, i: int, times: int, together: bool) -> Non
 
 
 @kernel
-def close_dofs(closing: Closing, i: int, together: bool) -> bool:
-    """Close every degree of freedom of a candidate once, palm side first, or all at once; False: it cannot begin."""
+def begin_candidate(closing: Closing, i: int) -> None:
+    """Place the links for a candidate, before any of its joints moves."""
+    full_width, work, sweep = closing.full_width, closing.work, closing.sweep
+    finger_posture = closing.candidates.finger_posture[i]
+    if full_width.requested[i]:
+        for link in range(sweep.poses.shape[0]):
+            copy_pose(full_width.link_pose[finger_posture, link], sweep.poses[link])
+    sweep.skipped[0] = 0
+    # Travels of other finger postures' joints are never written: they would continue with the values of the candidate
+    # before.
+    for j in range(work.rates.shape[0]):
+        work.rates[j] = 0.0
+
+
+@kernel
+def close_dofs(closing: Closing, i: int, together: bool, dofs: tuple[int, int]) -> bool:
+    """Close degrees of freedom of a candidate once, palm side first, or all at once; False: it cannot begin.
+
+    Args:
+        dofs: the first one, and the one after the last.
+    """
     hand, answer, work = closing.hand, closing.answer, closing.work
     finger_posture, swept = closing.candidates.finger_posture[i], closing.full_width.requested[i] != 0
     start = hand.first_axis_group[finger_posture]
     axis_group = start - 1
-    for dof in range(hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]):
+    for dof in range(dofs[0], dofs[1]):
         wanted = dof_axis_group(hand, dof)
         while axis_group < wanted and answer.overlap[i] > SUNK:
             axis_group += 1
@@ -229,10 +250,14 @@ def close_on_object(
     space: Workspace,
     answer: ClosingArrays,
     i: int,
-    times: int,
+    first: int,
     together: bool,
 ) -> None:
-    """Close one candidate on the object of a problem, with other links in the way or other candidates; as above."""
+    """Close one candidate on the object of a problem, with other links in the way or other candidates.
+
+    Args:
+        first: the first degree of freedom that closes. The rest as above.
+    """
     closing = Closing(
         problem.hand,
         full_width,
@@ -245,4 +270,4 @@ def close_on_object(
         space.sweep,
         answer,
     )
-    close_candidate(closing, i, times, together)
+    close_from(closing, i, problem.command.times, together, first)

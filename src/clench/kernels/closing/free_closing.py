@@ -40,8 +40,8 @@ def close_free(
     for i in range(candidates.finger_posture.shape[0]):
         clear_answer(answer, i)
         if crossed[candidates.finger_posture[i]] < 0:
-            full_width, times = problem.full_width, command.times
-            close_on_object(problem, full_width, candidates, T_palm_object, space, answer, i, times, command.together)
+            first, together = hand.first_dof[candidates.finger_posture[i]], command.together
+            close_on_object(problem, problem.full_width, candidates, T_palm_object, space, answer, i, first, together)
         overflow = max(overflow, answer.overflow[i])
     return int(overflow)
 

@@ -7,8 +7,8 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.full_width import FullWidthArrays
 
 from .bundles import among, clear_answer, with_lengths
-from .close_candidate import close_candidate, close_on_object
-from .layout import SUNK, ClosingArrays, Floats, HandArrays, Ints
+from .close_candidate import begin_candidate, close_dofs, close_on_object
+from .layout import CONTACT_DOF, SUNK, ClosingArrays, Floats, HandArrays, Ints
 from .picking import put_candidate_angles, take_joints
 from .solve_layout import Closing, ProblemArrays, Workspace
 
@@ -24,7 +24,8 @@ def close_in_turn(
 ) -> int:
     """Close fingers anew that meet another one, each with the earlier ones where they are by then.
 
-    A finger's set stands once the sets before it do. Sets of a single plane, and those of fingers that overlap the
+    A finger's set stands once the sets before it do. A finger closes anew from the joint on whose motion meets another
+    finger: the joints before it end where they did. Sets of a single plane, and those of fingers that overlap the
     object before they move, stay as they are.
 
     Args:
@@ -34,19 +35,19 @@ def close_in_turn(
     Returns:
         the capacity of the arenas that is wanted, or 0.
     """
-    hand, target, nothing, command = problem.hand, problem.target, problem.nothing, problem.command
+    hand, target, nothing = problem.hand, problem.target, problem.nothing
     first = 0
     while True:
         place_fingers(problem, space, final)
         others = among(problem.full_width, space.swept, nothing.bodies, space.placed, problem.apart)
-        f = first_meeting(
+        f, dof = first_meeting(
             problem, with_lengths(hand, space.length), others, T_palm_object, space, final, blocked, first
         )
         if f < 0:
             return 0
         everything = among(problem.full_width, space.swept, target.bodies, space.placed, problem.across)
-        clear_answer(final, f)
-        close_on_object(problem, everything, space.picked, T_palm_object, space, final, f, command.times, False)
+        dof = undo_from(hand, space.picked.finger_posture[f], dof, final, f)
+        close_on_object(problem, everything, space.picked, T_palm_object, space, final, f, dof, False)
         if final.overflow[f] > 0:
             return int(final.overflow[f])
         anew[f], first = 1, f + 1
@@ -84,18 +85,20 @@ def first_meeting(
     final: ClosingArrays,
     blocked: Ints,
     first: int,
-) -> int:
+) -> tuple[int, int]:
     """Return the first finger from `first` on that meets another finger's links on the path to its set, or -1.
 
-    Fingers that close in several rounds, or whose joints break away, do not follow one path: they always close again.
+    The second result is the degree of freedom on whose motion it does. Fingers that close in several rounds, or whose
+    joints break away, do not follow one path: they always close again.
     """
     nothing, spare, picked = problem.nothing, space.spare, space.picked
     for f in range(first, picked.finger_posture.shape[0]):
         finger_posture = picked.finger_posture[f]
         if blocked[finger_posture] or not space.swept[f] or final.overlap[f] <= SUNK:
             continue
+        begin, end = hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]
         if problem.command.times > 1 or breaks_away(hand, finger_posture):
-            return f
+            return f, begin
         clear_answer(spare, f)
         closing = Closing(
             hand,
@@ -109,10 +112,36 @@ def first_meeting(
             space.sweep,
             spare,
         )
-        close_candidate(closing, f, 1, False)
-        if spare.contacts[f] > 0 or spare.skipped[f] > 0:
-            return f
-    return -1
+        begin_candidate(closing, f)
+        for dof in range(begin, end):
+            close_dofs(closing, f, False, (dof, dof + 1))
+            # Links that overlap at the start are left alone, and counted, wherever the finger begins anew.
+            if space.sweep.skipped[0] > 0:
+                return f, begin
+            if spare.contacts[f] > 0:
+                return f, dof
+    return -1, -1
+
+
+@kernel
+def undo_from(hand: HandArrays, finger_posture: int, dof: int, answer: ClosingArrays, i: int) -> int:
+    """Take back what a candidate's degrees of freedom did, from one on; return the first one that has to close again.
+
+    That is an earlier one if links were left alone: their count is that of the whole closing.
+    """
+    if answer.skipped[i] > 0 or dof == hand.first_dof[finger_posture]:
+        clear_answer(answer, i)
+        return int(hand.first_dof[finger_posture])
+    n = 0
+    while n < answer.contacts[i] and answer.contact[i, n, CONTACT_DOF] < dof:
+        n += 1
+    answer.contacts[i] = n
+    for g in range(dof, hand.first_dof[finger_posture + 1]):
+        answer.travel[i, g] = 0.0
+        for j in range(hand.chain.joint_dof.shape[0]):
+            if hand.chain.joint_dof[j] == g:
+                answer.turn[i, j] = 0.0
+    return dof
 
 
 @kernel

@@ -263,7 +263,10 @@ SUNK = -2
 ) = 0, 1, 2, 3, 4, 5, 6, 7
 #: The last joint that the contact stops.
 CONTACT_JOINT = 8
-CONTACT_INTEGERS = 9
+#: For a full-width contact the elements of the link and of the other body that met; later motions may let other ones
+#: touch, see `settle`.
+CONTACT_MET, CONTACT_MET_SOURCE = 9, 10
+CONTACT_INTEGERS = 11
 #: For a full-width contact the plane is -1, and the columns mean: link, kind, element of the other body, degree of
 #: freedom, axis group, element of the link, and the other body (a link, or the number of links for the object). Columns
 #: of `ClosingArrays.point`: contact, outward normal of the object there, normal of its curve, and the gap at the

@@ -17,12 +17,12 @@ from clench.kernels.toi.toi_work import SweepWork, body_gap, elements_of, put_co
 from .layout import (
     CONTACT_AXIS_GROUP,
     CONTACT_DOF,
-    CONTACT_FEATURE,
     CONTACT_GAP,
     CONTACT_JOINT,
+    CONTACT_MET,
+    CONTACT_MET_SOURCE,
     CONTACT_OUTLINE,
     CONTACT_PLANE,
-    CONTACT_SOURCE,
     CONTACT_WHICH,
     ChainArrays,
     Floats,
@@ -93,7 +93,7 @@ def settle_pair(
     Where the link only touches something else by now, which does not hold what was stopped, the contact is left behind.
     """
     m, met = contact[CONTACT_OUTLINE], contact[CONTACT_WHICH]
-    i, k = contact[CONTACT_FEATURE], contact[CONTACT_SOURCE]
+    i, k = contact[CONTACT_MET], contact[CONTACT_MET_SOURCE]
     sweep.winner[0], sweep.winner[1], sweep.winner[2] = i, k, m
     describe_pair(
         full_width, T_palm_object, met, contact[CONTACT_DOF], contact[CONTACT_AXIS_GROUP], sweep, contact, point

@@ -1,0 +1,88 @@
+"""Fingers that meet another finger close anew from the joint that meets it, to the bits of closing anew as a whole."""
+
+import numpy as np
+import pytest
+
+import clench
+from clench.closing import kernel_run
+from clench.kernels.closing import in_turn
+from clench.kernels.closing.layout import CONTACT_DOF, ClosingArrays
+from clench.kernels.closing.solve_layout import FINISH
+from kernels.kernel_entries import entry
+
+undo_from = entry(in_turn.undo_from)
+
+
+def answer_at(answers, n):
+    """Return the answers at a pose."""
+    return ClosingArrays(*(array[n] for array in answers))
+
+
+def finished(monkeypatch, obj, whole):
+    """Return the answers of a batch whose fingers interlock, and the hand's arrays.
+
+    Args:
+        whole: fingers close anew as a whole.
+    """
+    seen = []
+
+    def in_two_parts(problem, T_palm_object, answers, stages):
+        run(problem, T_palm_object, answers, stages & ~FINISH)
+        if whole:
+            answers.closed.free.skipped[:] = 1
+        run(problem, T_palm_object, answers, FINISH)
+        seen.append((answers.closed, problem.arrays.hand))
+
+    run = kernel_run.run_stages
+    monkeypatch.setattr(kernel_run, "run_stages", in_two_parts)
+    hand, shape = clench.Hand.load("robonaut2"), clench.GraspObject.load(obj)
+    poses = clench.approach_poses(hand, shape, 40, 3)
+    command = clench.GraspCommand(hand_pose=poses[0], preshape="open", measure=False)
+    clench.solve_batch(hand, shape, poses, command, threads=1)
+    monkeypatch.setattr(kernel_run, "run_stages", run)
+    ((closed, arrays),) = seen
+    return closed, arrays
+
+
+@pytest.mark.parametrize("obj", ["box:x=0.01,y=0.01,z=0.01", "sphere:r=0.012"])
+def test_closing_anew_from_a_joint_has_the_bits_of_closing_anew_as_a_whole(obj, monkeypatch):
+    part, _ = finished(monkeypatch, obj, False)
+    whole, _ = finished(monkeypatch, obj, True)
+    assert np.array_equal(part.anew, whole.anew)
+    assert part.anew.sum() >= 10
+    for n, f in zip(*np.nonzero(part.anew), strict=True):
+        one, other = answer_at(part.final, n), answer_at(whole.final, n)
+        count = one.contacts[f]
+        assert count == other.contacts[f]
+        assert np.array_equal(one.turn[f], other.turn[f])
+        assert np.array_equal(one.travel[f], other.travel[f])
+        assert np.array_equal(one.contact[f, :count], other.contact[f, :count])
+        assert np.array_equal(one.point[f, :count], other.point[f, :count])
+
+
+def test_only_what_came_from_a_joint_on_is_taken_back(monkeypatch):
+    closed, hand = finished(monkeypatch, "sphere:r=0.03", False)
+    tried = 0
+    for n in range(len(closed.anew)):
+        for f in range(closed.anew.shape[1]):
+            answer = answer_at(closed.final, n)
+            begin, end = hand.first_dof[f], hand.first_dof[f + 1]
+            for dof in range(begin + 1, end):
+                before = [array.copy() for array in answer]
+                answer.skipped[f] = 0
+                assert undo_from(hand, f, dof, answer, f) == dof
+                kept = answer.contact[f, : answer.contacts[f], CONTACT_DOF]
+                assert (kept < dof).all()
+                assert answer.contacts[f] == (before[3][f, : before[2][f], CONTACT_DOF] < dof).sum()
+                assert np.array_equal(answer.travel[f, :dof], before[0][f, :dof])
+                assert not answer.travel[f, dof:end].any()
+                moved = hand.chain.joint_dof < dof
+                assert np.array_equal(answer.turn[f, moved], before[1][f, moved])
+                for array, old in zip(answer, before, strict=True):
+                    array[:] = old
+                tried += 1
+            answer.skipped[f] = 1
+            assert undo_from(hand, f, end - 1, answer, f) == begin
+            assert answer.contacts[f] == 0
+            assert not answer.turn[f].any()
+    assert tried >= 100
