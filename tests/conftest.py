@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,9 @@ from clench.kernels.runtime.warming import warm_up
 from clench.solver.solution import GraspSolution
 from handmade import make_solution
 from mug_grasp import MugGrasp, make_mug_grasp
+
+# Tests make their hands, so that no test meets what another one made with patched code.
+os.environ.setdefault("CLENCH_HAND_CACHE", "0")
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 

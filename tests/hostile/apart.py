@@ -272,7 +272,7 @@ def serve() -> None:
     import tyro  # noqa: F401
 
     import clench
-    import clench.models.hand.hand_loading
+    import clench.models.hand.hand_making
     import clench.models.objects.object_loading
 
     clench.Hand.load("patent15")

@@ -24,7 +24,8 @@ def part_points(tree: MeshTree) -> FloatArray:
     used = np.zeros(len(tree.vertices), dtype=bool)
     used[tree.triangles] = True
     part = connected_parts(tree.triangles, len(tree.vertices))
-    if len(np.unique(part[used])) == 1:
+    parts_used = part[used]
+    if (parts_used == parts_used[0]).all():
         # Merging places, which takes longer than all the rest, would join nothing more.
         corners = tree.vertices[used]
         corners = corners[corners[:, 0] == corners[:, 0].min()]

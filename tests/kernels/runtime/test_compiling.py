@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import inspect
 import pickle
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 from benchmarks.peers.kernels import stepped_closing
 from clench.kernels.closing import close_candidate
 from clench.kernels.runtime import compiling, warming
+from clench.kernels.runtime.kernel_compiler import compiler_of
 
 KERNELS = Path(compiling.__file__).parents[1]
 
@@ -110,9 +112,9 @@ def test_modules_of_kernels_import_each_other_and_numbers_only_as_the_stamp_expe
                 outside |= {alias.name for alias in node.names if alias.name.startswith("clench")}
             elif isinstance(node, ast.ImportFrom) and not node.level and node.module.startswith("clench"):
                 outside.add(node.module)
-    # Only numbers of `tolerances` are compiled in; functions that Python runs call the other modules.
-    allowed = {"clench.core", "clench.core.tolerances", "clench.core.memory", "clench.core.threads"}
-    allowed.add("clench.core.caching.fingerprint")
+    # Only numbers of `tolerances` are compiled in; functions that Python runs call the others.
+    called = {"clench.core.memory", "clench.core.threads", "clench.core.caching.fingerprint"}
+    allowed = {"clench.core", "clench.core.tolerances", *called}
     assert {module for module in outside if not module.startswith("clench.kernels.")} <= allowed
 
 
@@ -137,3 +139,29 @@ def test_kernels_run_as_plain_python_with_the_plugin() -> None:
     code = "import interpreted; from clench.kernels.toi.core_motion import move_core; print(type(move_core).__name__)"
     run = subprocess.run([sys.executable, "-c", code], cwd=tests, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "function"
+
+
+def test_a_kernel_has_the_signature_of_its_function_and_asks_for_it_once(monkeypatch):
+    def plain(a: float, b) -> int: ...
+    def with_default(a: float, b: int = 2) -> None: ...
+    def with_any(a, *more, key=1, **others): ...
+
+    for function in (plain, with_default, with_any, lambda: 0):
+        before = inspect.signature(function)
+        compiling._note_signature(function)
+        assert inspect.signature(function) == before
+    assert plain.__signature__ is inspect.signature(plain)
+
+    # Looking at a function's code, which Numba did twice for each of 500 kernels, takes ten times as long.
+    looked_at = []
+    look = inspect._signature_from_function
+    monkeypatch.setattr(inspect, "_signature_from_function", lambda *a, **k: looked_at.append(a) or look(*a, **k))
+    assert numba.njit(plain).py_func is plain
+    assert not looked_at
+    numba.njit(with_default)
+    assert looked_at
+
+
+def test_kernels_of_one_module_share_their_compiler():
+    assert compiler_of(b"one") is compiler_of(b"one")
+    assert compiler_of(b"one") is not compiler_of(b"other")

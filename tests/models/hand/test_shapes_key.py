@@ -12,7 +12,7 @@ import pytest
 from clench.closing import link_bodies
 from clench.core.caching import kept_arrays
 from clench.kernels.runtime.made_by import made_by
-from clench.models.hand import link_mesh
+from clench.models.hand import kept_hand, link_mesh
 from clench.models.hand.hand import Hand
 from clench.models.hand.shapes_key import shapes_key
 from clench.models.shapes import CollisionSource
@@ -22,6 +22,7 @@ from clench.models.shapes import CollisionSource
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("CLENCH_CACHE_DIR", str(tmp_path))
     monkeypatch.delenv(kept_arrays.SWITCH, raising=False)
+    monkeypatch.setenv(kept_hand.SWITCH, "0")
     return tmp_path / "arrays"
 
 

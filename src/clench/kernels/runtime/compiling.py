@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import re
 from collections.abc import Callable
@@ -26,6 +27,12 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 _IMPORTED: Final = re.compile(r"^\s*from (\.+|clench\.kernels\.)(\w[\w.]*) import ", re.MULTILINE)
 #: The folder of all kernels.
 _KERNELS: Final = os.path.dirname(os.path.dirname(__file__))
+
+
+#: Marks of functions that take any number of arguments.
+_TAKE_ANY: Final = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
+#: What signatures have where no annotation is.
+_NOTHING: Final = inspect.Parameter.empty
 
 
 @overload
@@ -146,9 +153,32 @@ class KernelForKernels(CachedKernel):
         self.overloads[tuple(cres.signature.args)] = cres
 
 
+@cache
+def _stamp_of(file: str) -> bytes:
+    """Return the stamp of the kernels of a file."""
+    return source_stamp(Path(file))
+
+
+def _note_signature(function: Callable[..., Any]) -> None:
+    """Keep the signature of a function with it: Numba asks for it twice, and asking takes longer than noting it."""
+    code = function.__code__
+    if function.__defaults__ or code.co_kwonlyargcount or code.co_flags & _TAKE_ANY:
+        return
+    noted = function.__annotations__
+    parameters = [
+        inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=noted.get(name, _NOTHING))
+        for name in code.co_varnames[: code.co_argcount]
+    ]
+    kinds: Any = inspect.Signature
+    function.__signature__ = kinds(  # type: ignore[attr-defined]
+        parameters, return_annotation=noted.get("return", _NOTHING), __validate_parameters__=False
+    )
+
+
 def _compiled(function: Callable[..., Any], *, from_python: bool, allocates: bool) -> Any:
     """Return the kernel of a function, which is compiled or loaded on its first call."""
-    stamp = source_stamp(Path(function.__code__.co_filename))
+    stamp = _stamp_of(function.__code__.co_filename)
+    _note_signature(function)
     settings: Any = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": allocates}
     if not from_python:
         settings["no_cpython_wrapper"] = True

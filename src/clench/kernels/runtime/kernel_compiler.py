@@ -85,8 +85,9 @@ class KernelLibrary(JITCodeLibrary):
         return super()._get_compiled_object() if self.runs else b""
 
 
+@cache
 def compiler_of(stamp: bytes) -> type[Compiler]:
-    """Return the compiler of kernels.
+    """Return the compiler of kernels, the same for all kernels of a module.
 
     Args:
         stamp: digest that changes when the function has to be compiled again.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gc
 import inspect
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -20,7 +19,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
 from clench.kernels.closing.close_candidate import close_candidate
@@ -65,7 +63,7 @@ from clench.kernels.toi.toi_work import SweepWork
 from clench.kernels.trees.bvh import MeshTree, build_tree, feature_owners
 from clench.kernels.trees.connectivity import connected_parts
 
-from .by_reference import by_reference, kept
+from .by_reference import by_reference, kept, type_of
 from .claims import CLAIMS
 from .compiling import is_kept
 from .kernel_compiler import claim_of
@@ -130,7 +128,7 @@ def warm_up(*, motions: bool = False) -> None:
     with _ONE_AT_A_TIME:
         if motions not in _WARM:
             _WARM.update((False, motions))
-            if _is_cold(motions) and multiprocessing.parent_process() is None:
+            if _is_cold(motions) and _is_first_process():
                 _compile_together(motions)
 
 
@@ -154,6 +152,13 @@ def _compile_together(motions: bool) -> None:
             for other in others:
                 other.kill()
                 other.wait()
+
+
+def _is_first_process() -> bool:
+    """Say whether this process is no worker of another one."""
+    import multiprocessing  # where all kernels are on disk, nothing else needs it
+
+    return multiprocessing.parent_process() is None
 
 
 def _others(count: int, words: list[str]) -> list[subprocess.Popen[bytes]]:
@@ -230,8 +235,7 @@ def compile_ahead(kernels: Iterable[Any]) -> None:
 
 def argument_types(kernel: Any, values: dict[str, Any]) -> tuple[Any, ...]:
     """Return the types of a kernel's arguments, which its parameters' names tell."""
-    typeof: Any = numba.typeof
-    kinds = (typeof(values[name]) for name in inspect.signature(kernel.py_func).parameters)
+    kinds = (type_of(values[name]) for name in inspect.signature(kernel.py_func).parameters)
     return tuple(map(by_reference, kinds) if is_inner(kernel) or kernel in _BY_POINTER else kinds)
 
 

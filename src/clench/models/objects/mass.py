@@ -51,7 +51,9 @@ def _of_bodies(bodies: tuple[Body, ...]) -> MassProperties:
 def _solid(shape: Shape, closed: bool) -> tuple[FloatArray, float, FloatArray]:
     """Return centroid, volume and vertices of a shape; of its convex hull if it is a mesh that does not close."""
     mesh = shape.to_mesh()
-    vertices = mesh.vertices[np.unique(mesh.triangles)]
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.triangles] = True
+    vertices = mesh.vertices[used]
     if shape.kind is not ShapeKind.MESH:
         return shape.pose.position, _primitive_volume(shape), vertices
     middle = vertices.mean(axis=0)
