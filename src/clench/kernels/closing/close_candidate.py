@@ -251,6 +251,7 @@ def close_on_object(
     answer: ClosingArrays,
     i: int,
     first: int,
+    times: int,
     together: bool,
 ) -> None:
     """Close one candidate on the object of a problem, with other links in the way or other candidates.
@@ -270,4 +271,4 @@ def close_on_object(
         space.sweep,
         answer,
     )
-    close_from(closing, i, problem.command.times, together, first)
+    close_from(closing, i, times, together, first)

@@ -40,8 +40,9 @@ def close_free(
     for i in range(candidates.finger_posture.shape[0]):
         clear_answer(answer, i)
         if crossed[candidates.finger_posture[i]] < 0:
-            first, together = hand.first_dof[candidates.finger_posture[i]], command.together
-            close_on_object(problem, problem.full_width, candidates, T_palm_object, space, answer, i, first, together)
+            full_width, first = problem.full_width, hand.first_dof[candidates.finger_posture[i]]
+            times, together = command.times, command.together
+            close_on_object(problem, full_width, candidates, T_palm_object, space, answer, i, first, times, together)
         overflow = max(overflow, answer.overflow[i])
     return int(overflow)
 

@@ -47,7 +47,8 @@ def close_in_turn(
             return 0
         everything = among(problem.full_width, space.swept, target.bodies, space.placed, problem.across)
         dof = undo_from(hand, space.picked.finger_posture[f], dof, final, f)
-        close_on_object(problem, everything, space.picked, T_palm_object, space, final, f, dof, False)
+        times = problem.command.times
+        close_on_object(problem, everything, space.picked, T_palm_object, space, final, f, dof, times, False)
         if final.overflow[f] > 0:
             return int(final.overflow[f])
         anew[f], first = 1, f + 1

@@ -18,6 +18,9 @@ from .grid_bound import square_bound
 
 #: A ball stops to get on when its gap is below this share of a cube's edge [-].
 NEAR = 0.3
+#: Bounds are rounded down to such a part of the way per unit of travel. So the rounding of the grid's distances, which
+#: depends on where the object is, seldom changes from where a sweep begins.
+PARTS = 64.0
 #: Balls are looked at so often at most.
 LOOKS = 4 * BODY_BALLS
 #: Columns of the scratch space: middle of a ball relative to the last pivot, radius, speed of the middle, and a travel
@@ -42,17 +45,18 @@ def clear_by_grid(pair: BodyPair, best: float, work: SweepWork) -> float:
     for k in range(last - first):
         put_moving_ball(pair, first + k, k, work)
         look_at(pair, k, 0.0, work)
+    until = 0.0
     for _ in range(LOOKS):
         k = earliest(last - first, work)
-        until, speed = work.balls[k, UNTIL], work.balls[k, SPEED]
+        until, speed = float(work.balls[k, UNTIL]), work.balls[k, SPEED]
         if until > best:
             return math.inf
         if until == 0.0 and best == 0.0:
             return 0.0
         look_at(pair, k, until, work)
         if (work.balls[k, UNTIL] - until) * speed <= near:
-            return float(until)
-    return float(work.balls[earliest(last - first, work), UNTIL])
+            break
+    return math.floor(PARTS * until) / PARTS
 
 
 @kernel

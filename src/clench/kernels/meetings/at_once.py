@@ -183,7 +183,8 @@ def close_at_once(
                     continue
                 k, i = workspace.pair[p, which], chosen[workspace.pair[p, which]]
                 clear_answer(final, i)
-                close_on_object(problem, full_width, bound, T_palm_object, space, final, i, 1, True)
+                first = problem.hand.first_dof[bound.finger_posture[i]]
+                close_on_object(problem, full_width, bound, T_palm_object, space, final, i, first, 1, True)
                 if final.overflow[i] > 0:
                     return int(final.overflow[i])
                 anew[i] = 1
