@@ -1,8 +1,10 @@
-"""The folder in which clench keeps results that take long to compute."""
+"""The folder in which clench keeps results that take long to compute, and the bounds of what it keeps."""
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -19,3 +21,28 @@ def cache_folder() -> Path:
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "clench"
+
+
+def remove_oldest(folder: Path, ending: str, most_files: int, most_together: float = math.inf) -> None:
+    """Remove the oldest files of a kind beyond the bounds; another process may remove them at the same time.
+
+    Args:
+        folder: with the files, whose names are a hash of 64 digits and the ending. most_together: size of all [bytes];
+            the newest file stays in any case.
+
+    Raises:
+        OSError: the folder cannot be read, or a file cannot be removed.
+    """
+    own, found = re.compile(rf"[0-9a-f]{{64}}\.{re.escape(ending)}"), []
+    for file in folder.iterdir():
+        if own.fullmatch(file.name):
+            try:
+                state = file.stat()
+            except FileNotFoundError:
+                continue
+            found.append((state.st_mtime, state.st_size, file))
+    together = 0
+    for n, (_, size, file) in enumerate(sorted(found, reverse=True)):
+        together += size
+        if n >= most_files or (n > 0 and together > most_together):
+            file.unlink(missing_ok=True)

@@ -20,7 +20,7 @@ import numpy as np
 from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import write_atomically
 
-from .cache_folder import cache_folder
+from .cache_folder import cache_folder, remove_oldest
 
 Arrays = list[np.ndarray[Any, Any]]
 
@@ -34,7 +34,6 @@ MOST_TOGETHER: Final = 256_000_000
 #: Each array begins at a multiple of this number of bytes.
 _ALIGNED: Final = 64
 _KINDS: Final = re.compile(r"<[fiu][1248]|\|[biu]1")
-_OWN: Final = re.compile(r"[0-9a-f]{64}\.arrays")
 
 
 def arrays_of(key: str, make: Callable[[], Sequence[np.ndarray[Any, Any]]]) -> Arrays:
@@ -104,7 +103,7 @@ def _keep(path: Path, key: str, arrays: Arrays) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, _head(key, _digest(rows, body), rows) + bytes(body))
-        _remove_oldest(path.parent)
+        remove_oldest(path.parent, "arrays", MOST_FILES, MOST_TOGETHER)
     except (ClenchError, OSError):
         return
 
@@ -117,20 +116,3 @@ def _digest(rows: list[Any], body: bytearray | memoryview) -> str:
     digest = hashlib.sha256(json.dumps(rows).encode())
     digest.update(body)
     return digest.hexdigest()
-
-
-def _remove_oldest(folder: Path) -> None:
-    """Remove the oldest files beyond the bounds; another process may remove them at the same time."""
-    found = []
-    for file in folder.iterdir():
-        if _OWN.fullmatch(file.name):
-            try:
-                state = file.stat()
-            except FileNotFoundError:
-                continue
-            found.append((state.st_mtime, state.st_size, file))
-    together = 0
-    for n, (_, size, file) in enumerate(sorted(found, reverse=True)):
-        together += size
-        if n >= MOST_FILES or (n > 0 and together > MOST_TOGETHER):
-            file.unlink(missing_ok=True)

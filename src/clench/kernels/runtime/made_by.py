@@ -5,18 +5,15 @@ from __future__ import annotations
 import os
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numba
 import numpy as np
 from numba.core.registry import cpu_target
 
-from clench.core.caching.fingerprint import fingerprint
+from clench.core.caching.fingerprint import CHOOSING, fingerprint
 
 from .compiling import source_stamp
-
-#: Environment variables that choose the code of NumPy and of its linear algebra.
-_CHOOSING: Final = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
 
 
 @cache
@@ -35,5 +32,5 @@ def made_by(kernels: str, *others: str) -> str:
         [fingerprint(Path(file).read_text(encoding="utf-8")) for file in others],
         [numba.__version__, np.__version__, scipy.__version__, bool(config.DISABLE_JIT)],
         [str(part) for part in cpu_target.target_context.codegen().magic_tuple()],
-        [os.environ.get(name) for name in _CHOOSING],
+        [os.environ.get(name) for name in CHOOSING],
     )

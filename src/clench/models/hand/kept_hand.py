@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.caching.fingerprint import fingerprint
+from clench.core.caching.fingerprint import CHOOSING, fingerprint
 from clench.core.caching.kept_arrays import Arrays, arrays_of
 from clench.core.caching.plain_values import as_arrays, from_arrays
 from clench.core.pose import Pose
@@ -43,8 +43,6 @@ CLASSES: Final[dict[str, type[Any]]] = {
         *(JointRole, CollisionSource, ShapeKind, FindingCode, Severity),
     )
 }
-#: Environment variables that choose the code of NumPy and of its linear algebra.
-_CHOOSING: Final = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
 _ONE_AT_A_TIME: Final = Lock()
 #: Where Python notes which warnings it has shown.
 _SHOWN: Final[dict[Any, Any]] = {}
@@ -127,7 +125,7 @@ def _made_by() -> str:
         digest.hexdigest(),
         [sys.version, np.__version__, scipy.__version__, *_files_of("mujoco")],
         {name: bool(there) for name, there in getattr(features, "__cpu_features__", {}).items()},
-        [os.environ.get(name) for name in _CHOOSING],
+        [os.environ.get(name) for name in CHOOSING],
     )
 
 

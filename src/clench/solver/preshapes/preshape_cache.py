@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.core.caching.cache_folder import cache_folder
+from clench.core.caching.cache_folder import cache_folder, remove_oldest
 from clench.core.caching.fingerprint import fingerprint
 from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import read_json, write_atomically
@@ -34,7 +33,6 @@ MOST_FILES: Final = 64
 MOST_BYTES: Final = 1_000_000
 #: Attributes of a hand that do not affect its preshapes.
 _UNUSED: Final = frozenset({"path", "findings", "warnings", "spec_xml", "assets"})
-_OWN: Final = re.compile(r"[0-9a-f]{64}\.json")
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -97,9 +95,7 @@ def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
-        own = [file for file in path.parent.iterdir() if _OWN.fullmatch(file.name)]
-        for file in sorted(own, key=lambda file: file.stat().st_mtime, reverse=True)[MOST_FILES:]:
-            file.unlink(missing_ok=True)
+        remove_oldest(path.parent, "json", MOST_FILES)
     except (ClenchError, OSError):
         return
 
