@@ -7,7 +7,7 @@ from typing import Any
 
 from clench.kernels.geometry import box_walk
 from clench.kernels.grid import grid_travel
-from clench.kernels.hulls import body_sweep, hull_sweep, hull_window, listed_sweep, near_elements
+from clench.kernels.hulls import body_sweep, hull_meeting, hull_sweep, hull_window, listed_sweep, near_elements
 from clench.kernels.toi import toi_bounds, toi_pairs
 from clench.kernels.toi.core_motion import CorePair, MovingCore
 from clench.kernels.toi.toi_work import BodyPair
@@ -63,6 +63,7 @@ def _of_bodies(kernel: Any) -> Callable[..., Any]:
 sweep_body = _of_bodies(body_sweep.sweep_body)
 clear_by_grid = _of_bodies(grid_travel.clear_by_grid)
 clear_travel = _of_bodies(hull_sweep.clear_travel)
+touching_elements = _of_bodies(hull_meeting.put_touching)
 _list_near = _of_bodies(near_elements.list_near)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from clench.kernels.geometry.bodies import Elements, pack_bodies
 from clench.kernels.grid.distance_grid import grid_around
-from clench.kernels.hulls.enclosing_hulls import BODY_BALLS, HULL_BALLS, pack_hulls
+from clench.kernels.hulls.enclosing_hulls import BODY_BALLS, HULL_BALLS, HullPart, pack_hulls
 from kernels.hulls.test_hull_sweep import drawn, first_contact
 from kernels.plain_sweeps import clear_by_grid, sweep_body
 from kernels.toi.test_toi_bodies import KINDS, TOUCH
@@ -67,7 +67,7 @@ def test_balls_that_do_not_move_are_clear_for_ever():
 def test_balls_cover_the_hulls_of_a_body(count):
     rng, grown = np.random.default_rng(count), 0.002
     hulls = [rng.normal(size=(12, 3)) * rng.uniform(0.0, 0.03, 3) + rng.normal(size=3) * 0.1 for _ in range(count)]
-    packed = pack_hulls([[(hulls[0], 0.0)], [(points, grown) for points in hulls]])
+    packed = pack_hulls([[HullPart(hulls[0], 0.0)], [HullPart(points, grown) for points in hulls]])
     balls = packed.ball[packed.cover[1] : packed.cover[2]]
     assert 1 <= packed.cover[1] <= HULL_BALLS
     if count > BODY_BALLS:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clench.kernels.hulls import enclosing_hulls as hulls_module
-from clench.kernels.hulls.enclosing_hulls import FEW, pack_hulls
+from clench.kernels.hulls.enclosing_hulls import FEW, HullPart, pack_hulls
 from kernels.kernel_entries import entry
 
 lowest_corner = entry(hulls_module.lowest_corner)
@@ -39,7 +39,7 @@ def test_the_lowest_corner_is_as_low_as_any_point_along_any_direction(kind, seed
     points = cloud(kind, count, rng) * 10.0**size
     radius = float(rng.choice([0.0, 0.1])) * 10.0**size
     other = rng.normal(size=(4, 3))
-    hulls = pack_hulls([[(other, 0.0)], [], [(points, radius), (other, 0.0)]])
+    hulls = pack_hulls([[HullPart(other, 0.0)], [], [HullPart(points, radius), HullPart(other, 0.0)]])
     assert list(hulls.body) == [0, 1, 1, 3]
     corners = hulls.points[hulls.first[1] : hulls.first[2]]
     assert {tuple(p) for p in corners} <= {tuple(p) for p in points}
@@ -60,7 +60,7 @@ def test_the_lowest_corner_is_as_low_as_any_point_along_any_direction(kind, seed
 @given(seed=st.integers(0, 10**6), kind=st.sampled_from(KINDS))
 def test_the_box_around_a_hull_holds_its_corners(seed, kind):
     rng = np.random.default_rng(seed)
-    hulls = pack_hulls([[(cloud(kind, 30, rng), 0.0)]])
+    hulls = pack_hulls([[HullPart(cloud(kind, 30, rng), 0.0)]])
     box = hulls.box[0]
     inside = np.abs((hulls.points - box[:, 3]) @ box[:, :3])
     assert np.allclose(box[:, :3].T @ box[:, :3], np.eye(3), atol=1e-12)
@@ -71,9 +71,10 @@ def test_the_box_around_a_hull_holds_its_corners(seed, kind):
 def test_a_body_with_a_part_that_is_too_large_has_no_hulls(monkeypatch):
     rng = np.random.default_rng(1)
     small, large = cloud("sphere", 30, rng), cloud("sphere", 50, rng)
+    bodies = [[(small, 0.0)], [(small, 0.0), (large, 0.0)], [(small, 0.0), (small, 0.1)]]
     for limit in ("MOST_POINTS", "MOST_CORNERS"):
         monkeypatch.setattr(hulls_module, limit, 40)
-        hulls = pack_hulls([[(small, 0.0)], [(small, 0.0), (large, 0.0)], [(small, 0.0), (small, 0.1)]])
+        hulls = pack_hulls([[HullPart(p, r) for p, r in body] for body in bodies])
         assert list(hulls.body) == [0, 1, 1, 3]
         assert len(hulls.points) == 90
         monkeypatch.undo()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from clench.kernels.geometry.bodies import pack_bodies
 from clench.kernels.hulls import near_hulls
-from clench.kernels.hulls.enclosing_hulls import pack_hulls
+from clench.kernels.hulls.enclosing_hulls import HullPart, pack_hulls
 from clench.kernels.meetings import hull_planes
 from clench.kernels.toi import toi_work
 from kernels.hulls.test_gjk import distance
@@ -75,6 +75,6 @@ def test_a_plane_between_links_is_the_same_with_hulls_and_without(kinds):
 
 def test_links_without_hulls_are_not_told_to_be_apart():
     _, links, work, _ = drawn(0, ("soup", "soup"))
-    for hulls in ([(), ()], [(), [(np.eye(3), 0.0)]]):
+    for hulls in ([(), ()], [(), [HullPart(np.eye(3), 0.0)]]):
         bare = links._replace(hulls=pack_hulls(hulls))
         assert links_parting(bare, 0, 1, (1.0, 0.0, 0.0), work)[0] == -math.inf

@@ -220,6 +220,7 @@ def _sweep_at(s: SweepWork, n: int) -> SweepWork:
         s.hull[n],
         s.round[n],
         s.near[n],
+        s.met[n],
         s.listed[n],
         s.balls[n],
         s.clear[n],

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from clench.core.memory import in_parts
 from clench.kernels.grid.distance_grid import DistanceGrid, grid_around, no_grid
-from clench.kernels.hulls.enclosing_hulls import HullArrays, pack_hulls
+from clench.kernels.hulls.enclosing_hulls import HullArrays, HullPart, pack_hulls
 from clench.kernels.trees.bvh import MeshTree, build_tree
 from clench.kernels.trees.node_boxes import SLAB, element_balls, local_elements, node_slabs, node_spans
+
+from .convexity import is_convex
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -112,11 +114,18 @@ def pack_bodies(bodies: Sequence[Elements]) -> BodyArrays:
     return BodyArrays(*joined)
 
 
-def _parts(body: Elements) -> list[tuple[Floats, float]]:
-    """Return points and radius of every part of a body that has elements."""
+def _parts(body: Elements) -> list[HullPart]:
+    """Return every part of a body that has elements."""
     ends = (*body.parts[1:], len(body.elements))
     spans = [slice(first, end) for first, end in zip(body.parts, ends, strict=True) if end > first]
-    return [(body.vertices[np.unique(body.elements[s])], float(body.radius[s].max())) for s in spans]
+    return [
+        HullPart(
+            body.vertices[np.unique(body.elements[s])],
+            float(body.radius[s].max()),
+            is_convex(body.vertices, body.elements[s]),
+        )
+        for s in spans
+    ]
 
 
 def pack_triangles(tree: MeshTree) -> BodyArrays:

@@ -147,13 +147,13 @@ def fill_cube(body: BodyArrays, i: int, j: int, k: int, a: int, b: int, c: int, 
             for w in (k, k + c):
                 if square[u, v, w] < 0.0:
                     p = place[0] + u * place[3], place[1] + v * place[3], place[2] + w * place[3]
-                    square[u, v, w] = np.float32(DOWN * closest_square(body, p, stack))
+                    square[u, v, w] = np.float32(DOWN * closest_element(body, p, stack)[0])
 
 
 @kernel
-def closest_square(body: BodyArrays, p: Vector, stack: Any) -> float:
-    """Return the squared distance of a point from a body, as its elements' radii reach [m²]."""
-    best, waiting = math.inf, 1
+def closest_element(body: BodyArrays, p: Vector, stack: Any) -> tuple[float, int]:
+    """Return the squared distance of a point from a body with its elements' radii [m²], and the closest element."""
+    best, found, waiting = math.inf, -1, 1
     stack[0, 0] = body.root[0]
     while waiting > 0:
         waiting -= 1
@@ -167,8 +167,10 @@ def closest_square(body: BodyArrays, p: Vector, stack: Any) -> float:
             waiting += 2
             continue
         for e in range(body.first[n], body.first[n] + body.count[n]):
-            best = min(best, square_to_element(body, e, p))
-    return best
+            square = square_to_element(body, e, p)
+            if square < best:
+                best, found = square, e
+    return best, found
 
 
 @kernel
@@ -215,7 +217,14 @@ def beyond(n: Vector, u: Vector, v: Vector, w: Vector, d: Vector) -> float:
 
 @kernel
 def square_to_element(body: BodyArrays, e: int, p: Vector) -> float:
-    """Return the squared distance of a point from an element [m²]; 0 within its radius.
+    """Return the squared distance of a point from an element [m²]; 0 within its radius."""
+    square, radius = square_to_core(body, e, p), body.radius[e]
+    return square if radius == 0.0 else max(math.sqrt(square) - radius, 0.0) ** 2
+
+
+@kernel
+def square_to_core(body: BodyArrays, e: int, p: Vector) -> float:
+    """Return the squared distance of a point from the core of an element [m²].
 
     Where rounding names the wrong part of a thin triangle, its edges are near enough.
     """
@@ -225,9 +234,7 @@ def square_to_element(body: BodyArrays, e: int, p: Vector) -> float:
         square = min(square, between_points(closest_on_triangle(p, a, b, c), p))
         square = min(square, to_edge(b, c, p))
         square = min(square, to_edge(c, a, p))
-    square = min(square, to_edge(a, b, p) if corners > 1 else between_points(a, p))
-    radius = body.radius[e]
-    return square if radius == 0.0 else max(math.sqrt(square) - radius, 0.0) ** 2
+    return min(square, to_edge(a, b, p) if corners > 1 else between_points(a, p))
 
 
 @kernel

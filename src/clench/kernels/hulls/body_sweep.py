@@ -14,6 +14,7 @@ from clench.kernels.toi.spatial_motion import axis_of, is_spatial, turned_about,
 from clench.kernels.toi.toi_bodies import NONE, keep_earliest, measure, sweep_elements
 from clench.kernels.toi.toi_work import BodyPair, SweepWork, item_of, push_roots
 
+from .hull_meeting import put_touching
 from .hull_sweep import NEAR, clear_travel
 from .listed_sweep import sweep_listed
 from .near_elements import list_near
@@ -76,6 +77,8 @@ def sweep_stepwise(pair: BodyPair, begin: float, best: float, work: SweepWork) -
         if clear == math.inf:
             return best
         if clear > 0.0:
+            if work.near[1] >= 0 and put_touching(ahead, clear, work):
+                return min(done + clear, best)
             done += clear
             put_onward(chain, count, done, work, onward)
         span = min(length, best - done)

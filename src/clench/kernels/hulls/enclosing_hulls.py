@@ -32,6 +32,19 @@ BODY_BALLS: Final = 64
 SMALL: Final = 1.5
 
 
+class HullPart(NamedTuple):
+    """A part of a body.
+
+    Args:
+        points: [m], (P, 3). radius: by which their hull is grown to enclose the part [m].
+        convex: whether the part fills its hull.
+    """
+
+    points: Floats
+    radius: float
+    convex: bool = False
+
+
 class HullArrays(NamedTuple):
     """Hulls of the parts of several bodies; H hulls, B bodies, C cones of all tables.
 
@@ -41,6 +54,7 @@ class HullArrays(NamedTuple):
         box: pose of a box around the corners of each hull, and half its sizes [m], (H, 3, 5).
         ball: centre and radius of balls that cover a body together [m], (K, 4). cover: first ball of each body,
             (B + 1,).
+        convex: whether the part fills its hull, (H,).
         table: first cone of each hull, or -1 without a table, (H,).
         cone, entry: see `CornerTable`; those of all hulls. Entries are rows of `points`.
     """
@@ -52,23 +66,24 @@ class HullArrays(NamedTuple):
     box: Floats
     ball: Floats
     cover: Whole
+    convex: Whole
     table: Whole
     cone: Small
     entry: Small
 
 
-def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
+def pack_hulls(bodies: Sequence[Sequence[HullPart]]) -> HullArrays:
     """Enclose the parts of bodies in hulls.
 
     Args:
-        bodies: of each body the parts: points [m], (P, 3), and the radius by which their hull is grown [m].
+        bodies: of each body the parts.
     """
-    parts = [[_corners(points, radius) for points, radius in body] for body in bodies]
+    parts = [[_corners(part) for part in body] for body in bodies]
     # A body whose parts are too large has no hulls.
     enclosed = [[hull for hull in found if hull] if all(found) else [] for found in parts]
     hulls = [hull for found in enclosed for hull in found]
-    first = np.cumsum([0, *(len(points) for points, _ in hulls)])
-    points, table = [points for points, _ in hulls], np.full(len(hulls), -1)
+    first = np.cumsum([0, *(len(hull.points) for hull in hulls)])
+    points, table = [hull.points for hull in hulls], np.full(len(hulls), -1)
     cones, entries = [np.empty((0, 2), np.int32)], [np.empty(0, np.int32)]
     cone_count, entry_count = 0, 0
     for h in range(len(hulls)):
@@ -78,8 +93,8 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
             cones.append(cone + np.where(cone[:, 1:] < 0, [cone_count, 0], [entry_count, 0]))
             entries.append(entry + first[h])
             cone_count, entry_count = cone_count + len(cone), entry_count + len(entry)
-    boxes = np.array([_box(points) for points, _ in hulls], dtype=np.float64).reshape(-1, 3, 5)
-    radius, body = np.array([radius for _, radius in hulls], dtype=np.float64), np.cumsum([0, *map(len, enclosed)])
+    boxes = np.array([_box(hull.points) for hull in hulls], dtype=np.float64).reshape(-1, 3, 5)
+    radius, body = np.array([hull.radius for hull in hulls], dtype=np.float64), np.cumsum([0, *map(len, enclosed)])
     covers = [_cover(boxes[i:j], radius[i:j]) for i, j in pairwise(body)]
     return HullArrays(
         np.concatenate([np.empty((0, 3)), *points]),
@@ -89,26 +104,27 @@ def pack_hulls(bodies: Sequence[Sequence[tuple[Floats, float]]]) -> HullArrays:
         boxes,
         np.concatenate([np.empty((0, 4)), *covers]),
         np.cumsum([0, *map(len, covers)]).astype(np.int64),
+        np.array([hull.convex for hull in hulls], dtype=np.int64),
         table.astype(np.int64),
         np.concatenate(cones).astype(np.int32),
         np.concatenate(entries).astype(np.int32),
     )
 
 
-def _corners(points: Floats, radius: float) -> tuple[Floats, float] | None:
-    """Return the points that can be corners of their hull, and the radius by which that is grown to hold all of them.
+def _corners(part: HullPart) -> HullPart | None:
+    """Return a part with the points that can be corners of its hull, and a radius by which that holds all of them.
 
     None stands for too many points or corners: a hull would take longer to make than it saves.
 
     Of points that nearly lie in a plane all are kept: rounding does not tell there which ones lie inside.
     """
-    points = np.unique(points, axis=0)
+    points, radius = np.unique(part.points, axis=0), part.radius
     if len(points) > MOST_POINTS:
         return None
     radius += ROUNDING * float(np.abs(points).max(initial=0.0))
     if len(points) <= FEW:
-        return points, radius
-    everything = (points, radius) if len(points) <= MOST_CORNERS else None
+        return HullPart(points, radius, part.convex)
+    everything = HullPart(points, radius, part.convex) if len(points) <= MOST_CORNERS else None
     if _box(points)[:, 4].min() < THIN * np.ptp(points, axis=0).max():
         return everything
     from scipy.spatial import ConvexHull, QhullError
@@ -124,7 +140,7 @@ def _corners(points: Floats, radius: float) -> tuple[Floats, float] | None:
     left = np.flatnonzero(~outside)
     for some in np.array_split(left, len(left) * len(hull.equations) // AT_ONCE + 1):
         outside[some] = (points[some] @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1, initial=-1.0) > 0.0
-    return points[outside], radius
+    return HullPart(points[outside], radius, part.convex)
 
 
 def _box(points: Floats) -> Floats:

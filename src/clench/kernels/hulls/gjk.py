@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 
 from clench.kernels.closing.layout import Floats
+from clench.kernels.geometry.vectors import Vector, cross, dot
 from clench.kernels.runtime.compiling import kernel
 
 from .enclosing_hulls import HullArrays, lowest_corner, lowest_point
 
 #: Steps at most; a direction that is found by then serves as well as it does.
 STEPS = 20
+#: Three corners make a face if the sine of the angle between two edges is above this [-].
+WIDE = 1e-6
 
 
 @kernel
@@ -79,9 +82,27 @@ def keep_corners(s: Floats, size: int, w: Floats) -> tuple[int, float, float, fl
     for k in range(size):
         if w[k] > 0.0:
             x, y, z = x + w[k] * s[k, 0], y + w[k] * s[k, 1], z + w[k] * s[k, 2]
-            s[kept, 0], s[kept, 1], s[kept, 2] = s[k, 0], s[k, 1], s[k, 2]
+            for c in range(5):
+                s[kept, c] = s[k, c]
+            s[kept, 5] = w[k]
             kept += 1
     return kept, x, y, z
+
+
+@kernel
+def foot_on_face(s: Floats, x: float, y: float, z: float) -> Vector:
+    """Return the point of a triangle's plane nearest to the origin, from the edges; of a thin one the point (x, y, z).
+
+    Near the origin the rounding of the point itself would tilt the direction to it.
+    """
+    u = (s[1, 0] - s[0, 0], s[1, 1] - s[0, 1], s[1, 2] - s[0, 2])
+    v = (s[2, 0] - s[0, 0], s[2, 1] - s[0, 1], s[2, 2] - s[0, 2])
+    n = cross(u, v)
+    square = dot(n, n)
+    if square <= WIDE * WIDE * dot(u, u) * dot(v, v):
+        return x, y, z
+    share = (n[0] * s[0, 0] + n[1] * s[0, 1] + n[2] * s[0, 2]) / square
+    return share * n[0], share * n[1], share * n[2]
 
 
 @kernel
@@ -100,22 +121,50 @@ def separating_direction(
     others: HullArrays,
     other: int,
     corners: Floats,
-    good: float,
+    good: tuple[float, float],
     work: Floats,
     n: Floats,
 ) -> bool:
     """Improve a direction from one hull to another; say whether a plane across it parts the two.
 
     Args:
+        n: where the search begins; written. The rest as in `widest_gap`.
+    """
+    work[4, 5] = 0.0
+    return bool(widest_gap(hulls, hull, T, others, other, corners, good, work, n) > 0.0)
+
+
+@kernel
+def widest_gap(
+    hulls: HullArrays,
+    hull: int,
+    T: Floats,
+    others: HullArrays,
+    other: int,
+    corners: Floats,
+    good: tuple[float, float],
+    work: Floats,
+    n: Floats,
+) -> float:
+    """Improve a direction from one hull to another; return how far they are apart along it, below 0 if they overlap.
+
+    Args:
         hulls, hull: the hull that the direction leads to. T: its pose in the frame of the other one, (3, 4).
         others, other: the other one; if its number is -1, the hull of `corners`, (K, 3).
-        good: the search ends if no direction has a gap that is larger by more than this fraction [-].
-        work: scratch space, (5, 4): four corners and their weights. n: written, a unit vector in the frame of
-            the other one; what it has before is where the search begins, (3,).
+        good: the search ends if no direction has a gap that is larger by more than this fraction [-], where both hulls
+            are grown by this together [m].
+        work: four corners of the difference of both hulls, each with the number of either corner and its weight in the
+            point nearest to the origin; scratch space, and how many corners there are, with which the search begins,
+            (5, 6).
+        n: written, a unit vector in the frame of the other one; where the search begins if there are no corners, (3,).
     """
     x, y, z = n[0], n[1], n[2]
-    square, size, parted, bound = math.inf, 0, False, -math.inf
-    s, w = work, work[4]
+    square, bound, (share, grown) = math.inf, -math.inf, good
+    s, w, size = work, work[4], int(work[4, 5])
+    if size > 0:
+        for k in range(size):
+            put_difference(hulls, T, others, other, corners, s[k])
+        square, size, x, y, z = go_nearer(s, size, w)
     for _ in range(STEPS):
         length = math.sqrt(x * x + y * y + z * z)
         if length == 0.0:
@@ -129,20 +178,37 @@ def separating_direction(
         low += x * T[0, 3] + y * T[1, 3] + z * T[2, 3]
         if low + top > bound:
             bound, n[0], n[1], n[2] = low + top, x, y, z
-            parted = bound > 0.0
-        if size > 0 and length - bound <= good * length:
+        if size > 0 and length - bound <= share * (length - grown):
             break
-        p, a, b = s[size], hulls.points[i], others.points[k] if other >= 0 else corners[k]
-        for r in range(3):
-            p[r] = T[r, 0] * a[0] + T[r, 1] * a[1] + T[r, 2] * a[2] + T[r, 3] - b[r]
-        size += 1
-        if size == 1:
-            found = p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
-            x, y, z = p[0], p[1], p[2]
-        else:
-            found = nearest_of_simplex(s, size, w)
-            size, x, y, z = keep_corners(s, size, w)
+        s[size, 3], s[size, 4] = i, k
+        put_difference(hulls, T, others, other, corners, s[size])
+        found, size, x, y, z = go_nearer(s, size + 1, w)
         if not found < square or found == 0.0:
             break
         square = found
-    return parted
+    work[4, 5] = size
+    return bound
+
+
+@kernel
+def put_difference(hulls: HullArrays, T: Floats, others: HullArrays, other: int, corners: Floats, p: Floats) -> None:
+    """Write a corner of the difference of two hulls, of which `p` has the numbers of both corners; see `widest_gap`."""
+    a, k = hulls.points[int(p[3])], int(p[4])
+    b = others.points[k] if other >= 0 else corners[k]
+    for r in range(3):
+        p[r] = T[r, 0] * a[0] + T[r, 1] * a[1] + T[r, 2] * a[2] + T[r, 3] - b[r]
+
+
+@kernel
+def go_nearer(s: Floats, size: int, w: Floats) -> tuple[float, int, float, float, float]:
+    """Drop the corners of a simplex that are of no use; return the square of the distance from the origin of the point
+    nearest to it, how many corners are left, and the point.
+    """
+    if size == 1:
+        s[0, 5] = 1.0
+        return s[0, 0] * s[0, 0] + s[0, 1] * s[0, 1] + s[0, 2] * s[0, 2], 1, s[0, 0], s[0, 1], s[0, 2]
+    found = nearest_of_simplex(s, size, w)
+    size, x, y, z = keep_corners(s, size, w)
+    if size == 3:
+        x, y, z = foot_on_face(s, x, y, z)
+    return found, size, x, y, z

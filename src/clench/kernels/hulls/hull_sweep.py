@@ -11,6 +11,7 @@ import math
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector
+from clench.kernels.grid.grid_bound import closest_element
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import copy_pose
 from clench.kernels.toi.toi_work import BodyPair, SweepWork
@@ -18,8 +19,10 @@ from clench.kernels.trees.obb import slab_top
 
 from .enclosing_hulls import HullArrays
 from .gjk import separating_direction
+from .hull_meeting import keep_meeting, meet
 from .hull_motion import HullMotion, height, motion_of_hull, put_pose
 from .hull_window import (
+    BOX,
     CORNERS,
     END,
     LAST,
@@ -47,6 +50,7 @@ WINDOWS = 40
 LONGER = 2.0
 #: A hull whose gap is below this fraction of the way of its points per unit of travel is near: the bound ends [-].
 NEAR = 2e-5
+REACH = 1e-2
 #: The end of a shorter window is tried so often.
 TRIALS = 6
 #: A shorter window is meant to leave this share of the gap [-].
@@ -61,6 +65,8 @@ FAR = 1.0
 SOME = 1.0
 #: How near to the best direction the directions between a hull and an element are [-].
 FINE = 0.01
+#: Where a window ends with a touch, a hull stays off other parts by this share of `touch` [-].
+BESIDE = 0.125
 
 
 @kernel
@@ -71,6 +77,7 @@ def clear_travel(pair: BodyPair, best: float, sweep: SweepWork) -> float:
         pair, sweep: see `sweep_body`.
     """
     hulls, m, until, near = pair.moving.hulls.body, pair.m, best, False
+    sweep.near[1] = -1
     if pair.moving.root[m] < 0 or pair.resting.root[pair.r] < 0:
         return math.inf
     if hulls[m] == hulls[m + 1]:
@@ -95,13 +102,18 @@ def clear_hull(pair: BodyPair, hull: int, best: float, sweep: SweepWork) -> floa
     sweep.near[0] = -1
     s, end = 0.0, best
     for _ in range(WINDOWS):
+        sweep.met[0] = math.inf
         end = clear_window(pair, motion, s, end, sweep)
         if end < s:
-            return s
+            break
+        if end == sweep.met[0]:
+            keep_meeting(hull, sweep)
+            return end
         if end >= best:
             return math.inf
         s, end = end, min(best, end + LONGER * (end - s))
         copy_pose(window[END:SIMPLEX], window[NOW:END])
+    sweep.near[1] = -1
     return s
 
 
@@ -116,7 +128,7 @@ def clear_window(pair: BodyPair, motion: HullMotion, s: float, end: float, sweep
     for part in range(parts.body[r], parts.body[r + 1]):
         w = parts.radius[part] + pair.touch
         if end >= s and not is_far(parts.box[part], motion, w, end - s, sweep.hull):
-            end = keep_off(pair, motion, parts, part, 0, w, s, end, sweep)
+            end = keep_off(pair, motion, parts, part, 0, parts.radius[part], s, end, sweep)
     if parts.body[r] < parts.body[r + 1]:
         return end
     return clear_of_tree(pair, motion, s, end, sweep)
@@ -137,18 +149,21 @@ def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, swee
     The element that ended the window before is looked at first.
     """
     window, stack, known = sweep.hull, sweep.stack, sweep.near[0]
-    hulls, resting, touch = pair.moving.hulls, pair.resting, pair.touch
-    if known >= 0:
-        end = keep_off_element(pair, motion, known, s, end, sweep)
+    hulls, resting = pair.moving.hulls, pair.resting
+    first = known
+    if known < 0 and s == 0.0 and resting.grid.square.shape[0] > 0:
+        first = closest_element(resting, (window[BOX, 3], window[BOX + 1, 3], window[BOX + 2, 3]), stack)[1]
+    if first >= 0:
+        end = keep_off_element(pair, motion, first, s, end, sweep)
     stack[0, 0], waiting = resting.root[pair.r], 1
     while waiting > 0 and end >= s:
         waiting -= 1
-        n = stack[waiting, 0]
+        n, touch = stack[waiting, 0], margin_at(pair, end, sweep)
         ball, away = resting.node[n, 3], square_from_box(resting.node[n], window)
         reach = ball + motion.radius + touch + motion.speed * (end - s)
         if away > reach * reach or keeps_off_box(hulls, motion, resting.slab[n], touch, end - s, window):
             continue
-        if known < 0 and away > (SOME * ball) ** 2:
+        if known < 0 and end != sweep.met[0] and away > (SOME * ball) ** 2:
             split, end = keep_off_node(pair, motion, n, s, end, sweep)
             if not split:
                 continue
@@ -186,8 +201,8 @@ def keep_off_node(
 @kernel
 def keep_off_element(pair: BodyPair, motion: HullMotion, e: int, s: float, end: float, sweep: SweepWork) -> float:
     """Return what `keep_off` returns for an element; one that ends the window is kept in `sweep.near`."""
-    w, corners = pair.resting.radius[e] + pair.touch, put_element(pair.resting, e, sweep.hull)
-    found = keep_off(pair, motion, pair.moving.hulls, -1, corners, w, s, end, sweep)
+    radius, corners = pair.resting.radius[e], put_element(pair.resting, e, sweep.hull)
+    found = keep_off(pair, motion, pair.moving.hulls, -1, corners, radius, s, end, sweep)
     if found < end:
         sweep.near[0] = e
     return float(found)
@@ -200,7 +215,7 @@ def keep_off(
     others: HullArrays,
     other: int,
     corners: int,
-    w: float,
+    radius: float,
     s: float,
     end: float,
     sweep: SweepWork,
@@ -209,16 +224,20 @@ def keep_off(
 
     Args:
         motion: of the hull. others, other: the other one, or -1 for the first `corners` of the window's corners.
-        w: by which the other one is grown [m]. The rest as in `clear_window`.
+        radius: by which the other one is grown [m]. The rest as in `clear_window`.
     """
     hulls, window, points = pair.moving.hulls, sweep.hull, sweep.hull[CORNERS : CORNERS + corners]
+    w = radius + margin_at(pair, end, sweep)
     if keeps_off_hull(hulls, motion, others, other, points, w, end - s, window):
         return end
     now, simplex, direction = window[NOW:END], window[SIMPLEX:CORNERS], window[LAST]
-    if not separating_direction(hulls, motion.hull, now, others, other, points, FINE, simplex, direction):
+    good = (FINE, motion.radius + radius)
+    if not separating_direction(hulls, motion.hull, now, others, other, points, good, simplex, direction):
         return -1.0
     n = (direction[0], direction[1], direction[2])
     start, top = height(hulls, motion, now, n), top_along(others, other, points, w, n)
+    if start - top <= REACH * motion.speed and is_exact(hulls, motion.hull, others, other):
+        return touch_at(pair, motion, others, other, corners, radius, (s, end), sweep)
     if start - top <= NEAR * motion.speed:
         # What lists the elements near by begins with this plane.
         remember_plane(n, start, -math.inf, -1.0, window)
@@ -234,6 +253,43 @@ def keep_off(
         if end < last and later > MUCH * left:
             end = lengthen(pair, motion, others, other, points, w, (start - top, later), (s, end, last), sweep)
     return end
+
+
+@kernel
+def margin_at(pair: BodyPair, end: float, sweep: SweepWork) -> float:
+    """Return by how much a hull stays off what rests in a window: less where the window ends with a touch [m]."""
+    return BESIDE * pair.touch if end == sweep.met[0] else pair.touch
+
+
+@kernel
+def is_exact(hulls: HullArrays, hull: int, others: HullArrays, other: int) -> bool:
+    """Say whether two hulls are as their parts are; elements are, whose number is -1."""
+    return bool(hulls.convex[hull] != 0 and (other < 0 or others.convex[other] != 0))
+
+
+@kernel
+def touch_at(
+    pair: BodyPair,
+    motion: HullMotion,
+    others: HullArrays,
+    other: int,
+    corners: int,
+    radius: float,
+    span: tuple[float, float],
+    sweep: SweepWork,
+) -> float:
+    """Return what `keep_off` does for a hull that is near another one; the window ends where they touch."""
+    hulls, window, points, (s, last) = pair.moving.hulls, sweep.hull, sweep.hull[CORNERS : CORNERS + corners], span
+    end = meet(pair, motion, others, other, points, radius, span, sweep)
+    if s <= end < last:
+        put_pose(pair.chain, pair.rows, end, sweep, window[END:SIMPLEX])
+        put_turned(motion, window[NOW:END], window[END:SIMPLEX], end - s, window)
+        forget_shorter(0.0, window)
+        sweep.near[4] = other
+        n = (window[LAST, 0], window[LAST, 1], window[LAST, 2])
+        start = height(hulls, motion, window[NOW:END], n)
+        remember_plane(n, start, least_height(hulls, motion, n, start, end - s, window), end - s, window)
+    return float(end)
 
 
 @kernel

@@ -36,6 +36,8 @@ LAST = 20
 BOX = 21
 #: For each listed element a unit vector that leads from it to the hull.
 LISTED = 24
+#: The nearest points of what rests and of the hull, where they touch: in the window, and in the sweep.
+MET, TOUCHING = 68, 69
 
 
 @kernel

@@ -90,8 +90,7 @@ def is_off_hulls(
     """Say whether planes keep a hull off all hulls of a body; not if that has none."""
     parts, none = resting.hulls, window[CORNERS:PLANES]
     for part in range(parts.body[r], parts.body[r + 1]):
-        w = parts.radius[part] + near
-        if not is_kept_off(hulls, motion, parts, part, none, w, 0.0, window):
+        if not is_kept_off(hulls, motion, parts, part, none, (parts.radius[part], near), 0.0, window):
             return False
     return bool(parts.body[r] < parts.body[r + 1])
 
@@ -122,9 +121,9 @@ def list_near_hull(
             waiting = push_children(resting, n, window, stack, waiting)
             continue
         for e in range(resting.first[n], resting.first[n] + resting.count[n]):
-            w, count = resting.radius[e] + touch, put_element(resting, e, window)
+            count = put_element(resting, e, window)
             corners = window[CORNERS : CORNERS + count]
-            if not is_kept_off(hulls, motion, hulls, -1, corners, w, end, window):
+            if not is_kept_off(hulls, motion, hulls, -1, corners, (resting.radius[e], touch), end, window):
                 found = add_once(e, found, sweep)
                 if found < 0:
                     return -1
@@ -138,16 +137,20 @@ def is_kept_off(
     others: HullArrays,
     other: int,
     corners: Floats,
-    w: float,
+    grown: tuple[float, float],
     length: float,
     window: Floats,
 ) -> bool:
-    """Say whether a plane keeps a hull off another one, see `lowest_of`, grown by `w`, in a whole window."""
-    now = window[NOW:END]
+    """Say whether a plane keeps a hull off another one, see `lowest_of`, in a whole window.
+
+    Args:
+        grown: radius of the other one, and by how much more it has to be kept off [m].
+    """
+    now, w = window[NOW:END], grown[0] + grown[1]
     if keeps_off_hull(hulls, motion, others, other, corners, w, length, window):
         return True
-    simplex, direction = window[SIMPLEX:CORNERS], window[LAST]
-    if not separating_direction(hulls, motion.hull, now, others, other, corners, FINE, simplex, direction):
+    simplex, direction, good = window[SIMPLEX:CORNERS], window[LAST], (FINE, motion.radius + grown[0])
+    if not separating_direction(hulls, motion.hull, now, others, other, corners, good, simplex, direction):
         return False
     n = (direction[0], direction[1], direction[2])
     start = height(hulls, motion, now, n)

@@ -70,7 +70,8 @@ def parting(
     for c in range(3):
         found[c] = n[0] * T[0, c] + n[1] * T[1, c] + n[2] * T[2, c]
     none = sweep.hull[CORNERS:PLANES]
-    separating_direction(hulls, i, sweep.hull[NOW:END], hulls, k, none, NEARLY, sweep.hull[SIMPLEX:], found)
+    good = (NEARLY, hulls.radius[i] + hulls.radius[k])
+    separating_direction(hulls, i, sweep.hull[NOW:END], hulls, k, none, good, sweep.hull[SIMPLEX:], found)
     x, y, z = found[0], found[1], found[2]
     side = (
         T[0, 0] * x + T[0, 1] * y + T[0, 2] * z,

@@ -163,6 +163,9 @@ def overlap_truly(
     Args:
         sweep: has their poses.
     """
+    # Planes between hulls part most bodies, even those that touch: these stop a little before.
+    if list_touching(links, m, resting, r, 0.0, sweep) == 0:
+        return False
     listed = list_touching(links, m, resting, r, 2.0 * PRESSED, sweep)
     if listed == 0 or not bodies_overlap(links, m, resting, r, allowed, flush, listed, sweep):
         return False

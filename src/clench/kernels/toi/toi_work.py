@@ -44,8 +44,10 @@ class SweepWork(NamedTuple):
             (8,).
         begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
             (J, 7) and for parallel ones (J + 1, 3).
-        hull: scratch space of `hull_window`, (62, 6). round: that of `round_motion`, (12, 3).
-        near: the element that the hull came near to last, or -1, (1,).
+        hull: scratch space of `hull_window`, (70, 6). round: that of `round_motion`, (12, 3).
+        near: the element that the hull came near to last, or -1; of the sweep the hull that touches, or -1, what it
+            touches, a resting hull or -1 and an element; of the window the resting hull that is touched, or -1, (5,).
+        met: the travel after which a hull touches in a window, (1,).
         listed: resting elements that a short sweep can meet, (32,).
         balls: those of a moving body, see `grid_travel`, (BODY_BALLS, 6).
         clear: a travel before which each link does not meet the object, (L,). order: links by this travel, (L,).
@@ -75,6 +77,7 @@ class SweepWork(NamedTuple):
     hull: Floats
     round: Floats
     near: Ints
+    met: Floats
     listed: Ints
     balls: Floats
     clear: Floats
@@ -124,9 +127,10 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((3, 4)),
         np.empty((joints, SPATIAL)),
         np.empty((joints + 1, 3)),
-        np.empty((62, 6)),
+        np.empty((70, 6)),
         np.empty((12, 3)),
-        np.zeros(1, dtype=np.int64),
+        np.zeros(5, dtype=np.int64),
+        np.empty(1),
         np.zeros(32, dtype=np.int64),
         np.empty((BODY_BALLS, 6)),
         np.empty(links),
