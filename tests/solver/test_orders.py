@@ -495,3 +495,20 @@ def test_an_order_without_a_value_is_not_inside_its_limit():
     said = best_order(command, lambda single: found[single.order]).choice["orders"]
     assert said["chosen"] == "together"
     assert said["text"] == "together comes before proximal-first because it has a value for every criterion."
+
+
+@pytest.mark.parametrize("order", ["together", "fingertip"])
+def test_fingers_that_touch_at_the_start_do_not_go_through_each_other(order):
+    """The closed posture of a solve, in which fingers meet, is where another one begins."""
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("cylinder:r=0.004,h=0.2")
+    followers, closed = {hand.joints[c.follower].name for c in hand.couplings}, 0
+    for pose in clench.approach_poses(hand, obj, 8, 3):
+        first = clench.solve(hand, obj, clench.GraspCommand(hand_pose=pose, preshape="open"))
+        names = [j.name for j in hand.joints if j.role != "upstream" and j.name not in followers]
+        start = {name: float(first.joint_angles[name]) for name in names}
+        command = clench.GraspCommand(hand_pose=pose, preshape=start, order=clench.ClosingOrder(order))
+        again = clench.solve(hand, obj, command)
+        assert first.certified
+        assert again.certified, again.certificate["text"]
+        closed += 1
+    assert closed == 8

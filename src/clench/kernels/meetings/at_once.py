@@ -9,7 +9,8 @@ from clench.kernels.closing.close_candidate import close_on_object
 from clench.kernels.closing.layout import CandidateArrays, ClosingArrays, Floats, Ints
 from clench.kernels.closing.solve_layout import Closed, ProblemArrays, Workspace
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.toi.full_width import FullWidthArrays
+from clench.kernels.toi.full_width import FullWidthArrays, overlap_truly
+from clench.kernels.toi.toi_work import SweepWork
 
 from .finger_lanes import leave_out_lanes
 from .finger_motion import put_motion
@@ -61,6 +62,15 @@ def leave_out_fingers(a: int, b: int, count: int, workspace: MeetingWork) -> Non
     for p in range(count):
         if workspace.pair[p, 0] == a and workspace.pair[p, 1] == b:
             workspace.pair[p, 4], workspace.at[p] = 0, math.inf
+
+
+@kernel
+def cross_at_first(
+    full_width: FullWidthArrays, fingers: FingerLinks, p: int, workspace: MeetingWork, sweep: SweepWork
+) -> bool:
+    """Say whether a pair of links that was looked at last overlaps before anything moves, and does not only touch."""
+    links, m, r = full_width.links, fingers.link[workspace.pair[p, 2]], fingers.link[workspace.pair[p, 3]]
+    return bool(overlap_truly(links, m, links, r, 0.0, False, sweep))
 
 
 @kernel
@@ -173,7 +183,7 @@ def close_at_once(
         )
         if told == FREE:
             workspace.at[p] = math.inf
-        elif told == MEETS and at == 0.0:
+        elif told == MEETS and at == 0.0 and cross_at_first(full_width, fingers, p, workspace, space.sweep):
             overlapping[chosen[a]], overlapping[chosen[b]] = 1, 1
             leave_out_fingers(a, b, count, workspace)
         elif told == MEETS:

@@ -35,6 +35,8 @@ from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shor
 NEAR, CLOSE = 1e-5, 1e-7
 #: Up to which gap elements are measured at first, and how that grows while they are farther apart [m, -].
 REACH, WIDER = 1e-4, 4.0
+#: Links that touch part if they go on by more than this multiple of their gap [-].
+PARTING = 2.0
 #: A pair counts as meeting after this many looks, which is safe.
 LOOKS = 20_000
 #: Result of a look: the pair continues, it is free to the end, it meets.
@@ -173,10 +175,12 @@ def look_at(
         gap = links_gap(full_width.links, m, r, reach, (nx, ny, nz), pair[6:], sweep)
         if gap < reach:
             _, n, point = elements_gap(full_width.links, pair[6], pair[7], sweep)
-            if gap <= TOUCH or pair[5] == LOOKS:
+            if gap > 0.0 and (gap > TOUCH or at == 0.0):
+                step = step_by_parts(both, gap, n, pair[6:], at, end)
+            # Links that touch before anything moves go on if they part.
+            if (gap <= TOUCH and step * speeds_of(both, at) <= PARTING * gap) or pair[5] == LOOKS:
                 put_touch(gap, n, point, at, workspace.touch)
                 return MEETS
-            step = step_by_parts(both, gap, n, pair[6:], at, end)
         else:
             n, step = (nx, ny, nz), gap / speeds_of(both, at)
         workspace.reach[p] = max(WIDER * gap, REACH)
