@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from clench.kernels.geometry.bodies import Elements, pack_bodies
-from clench.kernels.geometry.convexity import is_convex
 from clench.kernels.hulls import gjk, hull_meeting
 from clench.kernels.hulls.enclosing_hulls import HullPart, pack_hulls
 from clench.kernels.toi import core_motion
@@ -145,26 +144,3 @@ def test_the_elements_at_a_point_are_listed():
         count = list_at(body, 0, tuple(corners[0]), 1e-12, listed, work)
         assert set(listed[:count]) == set(np.flatnonzero((body.elements == body.elements[e, 0]).any(axis=1)))
         assert list_at(body, 0, tuple(1.1 * corners.mean(axis=0)), 1e-6, listed, work) == 0
-
-
-@pytest.mark.parametrize("kind", SOLIDS)
-def test_solids_are_convex(kind):
-    for seed in range(5):
-        elements = solid(np.random.default_rng(seed), kind)
-        assert is_convex(elements.vertices, elements.elements)
-        assert is_convex(elements.vertices, elements.elements[:, ::-1])
-
-
-def test_what_is_open_or_dented_or_in_two_pieces_is_not_convex():
-    rng = np.random.default_rng(0)
-    ball = solid(rng, "ball")
-    assert not is_convex(ball.vertices, ball.elements[1:])
-    dented = ball.vertices.copy()
-    dented[7] *= 0.8
-    assert not is_convex(dented, ball.elements)
-    assert not is_convex(ball.vertices, np.vstack([ball.elements, ball.elements[:1]]))
-    flipped = ball.elements.copy()
-    flipped[0] = flipped[0, ::-1]
-    assert not is_convex(ball.vertices, flipped)
-    two = np.arange(6, dtype=np.int32).reshape(2, 3)
-    assert not is_convex(rng.normal(size=(6, 3)), two)

@@ -90,7 +90,8 @@ def meet(
         # The rate may have grown since the middle of the step.
         left, rate = (1.0 - LEFT) * gap - 0.5 * near, rate + 0.5 * motion.bend * step
         step = min(safe_step(max(left, 0.0), -rate, motion.bend), LONGER * step) if motion.bend > 0.0 else LONGER * step
-    return at if at > s else -1.0
+    # Whether parts touch that begin to touch, and slide, their elements tell.
+    return at if at > s and gap > pair.touch else -1.0
 
 
 @kernel
