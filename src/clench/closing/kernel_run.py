@@ -109,9 +109,11 @@ def run_stages(problem: PackedProblem, T_palm_object: FloatArray, answers: Answe
 def _close_on_device(problem: PackedProblem, T_palm_object: FloatArray, closed: Closed) -> None:
     from clench.kernels.closing.cuda_closing import close_on_device
 
+    kept = problem.kept
+    arrays = getattr(kept, "content", kept)
     while True:
         with problem.arena() as arena:
-            close_on_device(problem.arrays, T_palm_object, getattr(arena, "content", arena), closed)
+            close_on_device(arrays, T_palm_object, getattr(arena, "content", arena), closed)
         wanted = int(closed.overflow.max(initial=0))
         if not wanted:
             return

@@ -105,7 +105,7 @@ def pack_full_width(
         hand: the hand. plans: one per finger posture. requested: per candidate. bodies: see `hand_bodies`.
     """
     from clench.kernels.geometry.bodies import no_body
-    from clench.kernels.toi.full_width import FullWidthArrays
+    from clench.kernels.toi.full_width import FullWidthArrays, no_first
 
     first = np.cumsum([0, *(len(plan.joints) for plan in plans)])
     movers = [_movers(hand, plan, int(k)) for plan, k in zip(plans, first, strict=False)]
@@ -125,6 +125,8 @@ def pack_full_width(
         anchor=np.array([anchor for _, anchor in axes]).reshape(-1, 3),
         link_pose=np.ascontiguousarray(poses),
         checked=bodies.within,
+        first=no_first(len(plans), len(axes)),
+        alone=False,
     )
 
 

@@ -34,6 +34,8 @@ KEPT_PROBLEMS: Final = 64
 _ARENAS: Final[OrderedDict[tuple[int, ...], list[Arena]]] = OrderedDict()
 _KEPT_ARENAS: Final = 16
 _LENDING: Final = Lock()
+#: One thread at a time finds what the fingers of a plan meet first.
+_FINDING: Final = Lock()
 
 #: Criteria in a sum: their codes, and what one unit of each adds.
 Terms = tuple[tuple[int, float], ...]
@@ -54,9 +56,14 @@ class PackedProblem:
     @cached_property
     def kept(self) -> ProblemArrays:
         """The arrays where kernels find them by one pointer."""
+        from clench.kernels.closing.first_meetings import find_first_meetings
         from clench.kernels.runtime.by_reference import kept
 
-        return kept(self.arrays)
+        arrays = kept(self.arrays)
+        with _FINDING:
+            if not (self.arrays.full_width.first.known[:, 1] >= 0.0).any():
+                find_first_meetings(arrays)
+        return arrays
 
     def staying(self, present: NDArray[np.int64], margin: float) -> PackedProblem:
         """Return the problem with other candidates that go before others; see `CommandArrays`."""
@@ -148,7 +155,7 @@ def _pack(plan: HandPlan, packed: PackedObject, terms: Terms, tip_only: bool) ->
     target, bodies, candidates = object_arrays(packed), plan.bodies, plan.candidates
     return ProblemArrays(
         hand=plan.arrays(planar=bool((candidates.low < candidates.high).any())),
-        full_width=plan.full_width_arrays._replace(object=target.bodies),
+        full_width=plan.full_width_arrays._replace(object=target.bodies, alone=True),
         candidates=candidates,
         target=target,
         nothing=nothing_to_close(),

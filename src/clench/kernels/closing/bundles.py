@@ -53,6 +53,8 @@ def among(
         full_width.anchor,
         link_pose,
         checked,
+        by_value(full_width.first),
+        False,
     )
 
 

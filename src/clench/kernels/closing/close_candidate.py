@@ -63,12 +63,7 @@ def close_dof(closing: Closing, sections: SectionArrays, base: int, axis_group: 
         end = next_segment(chain, joints, dof, answer.travel[i], locked, candidates.until[i], along, rates)
         if end <= 0.0:
             return True
-        # A little further, so that a touch just at the end is one; no point moves by more than the touch tolerance.
-        fastest = 0.0
-        for j in range(joints[0], joints[1]):
-            fastest += abs(rates[j])
-        reach = end + TOUCH_FRACTION / max(fastest, 1.0)
-        plane, met = -1, -1
+        plane, met, reach = -1, -1, beyond(end, joints, rates)
         if full_width.requested[i]:
             axis_groups = answer.pose[i]
             pose_axis_groups(hand, finger_posture, turns, work, axis_groups)
@@ -92,6 +87,18 @@ def close_dof(closing: Closing, sections: SectionArrays, base: int, axis_group: 
             while last > joints[0] and rates[last] == 0.0:
                 last -= 1
             write_contact(closing, sections, base, last, plane, met, i)
+
+
+@kernel
+def beyond(end: float, joints: tuple[int, int], rates: Floats) -> float:
+    """Return a little more than the end of a path segment, so that a touch just there is one.
+
+    No point moves by more than the touch tolerance.
+    """
+    fastest = 0.0
+    for j in range(joints[0], joints[1]):
+        fastest += abs(rates[j])
+    return end + TOUCH_FRACTION / max(fastest, 1.0)
 
 
 @kernel

@@ -23,6 +23,7 @@ import numpy as np
 
 from clench.kernels.closing.close_candidate import close_candidate
 from clench.kernels.closing.contact_reading import PalmContactArrays, SurfaceArrays, read_contacts
+from clench.kernels.closing.first_meetings import find_first_meetings
 from clench.kernels.closing.in_turn import close_in_turn
 from clench.kernels.closing.layout import (
     CandidateArrays,
@@ -89,6 +90,7 @@ JOBS: tuple[Any, ...] = (
     describe_contact,
     relate_poses,
     place_links,
+    find_first_meetings,
 )
 
 #: These have an entry from Python, but in a solve other kernels call them, or Python hands them pointers.

@@ -42,6 +42,21 @@ from .toi_work import SweepWork, bodies_overlap, make_sweep_work, put_core
 PRESSED = 1e-8
 
 
+class FirstMeetings(NamedTuple):
+    """What the links of each finger posture meet of the hand itself on their first path segment, whatever the object.
+
+    Args:
+        rates: of every joint there, (E, J).
+        known: up to which gap links touch [m], how far the segment was swept, below 0 where it was not, and the travel
+            of the meeting, (E, 3).
+        met: see `sweep_stage`, then `SweepWork.winner`, and how many pairs of links were left alone, (E, 6).
+    """
+
+    rates: Floats
+    known: Floats
+    met: Ints
+
+
 class FullWidthArrays(NamedTuple):
     """The input of the full-width sweeps; L links of the hand, M moving links of all finger postures, J joints.
 
@@ -55,6 +70,7 @@ class FullWidthArrays(NamedTuple):
             right-handed about the axis.
         link_pose: `T_palm_link` of every link at each finger posture's open posture, (E, L, 3, 4).
         checked: whether a moving link (row) must not overlap a resting one, (L, L).
+        first: see `FirstMeetings`. alone: the links that rest are where `first` assumes them.
     """
 
     joint_first: Ints
@@ -69,6 +85,14 @@ class FullWidthArrays(NamedTuple):
     anchor: Floats
     link_pose: Floats
     checked: Ints
+    first: FirstMeetings
+    alone: bool
+
+
+def no_first(finger_postures: int, joints: int) -> FirstMeetings:
+    """Return that no meeting on a first path segment is known."""
+    rates, known = np.zeros((finger_postures, joints)), np.full((finger_postures, 3), -1.0)
+    return FirstMeetings(rates, known, np.zeros((finger_postures, 6), np.int64))
 
 
 def planes_only(candidates: int, finger_postures: int) -> FullWidthArrays:
@@ -87,6 +111,8 @@ def planes_only(candidates: int, finger_postures: int) -> FullWidthArrays:
         anchor=np.zeros((0, 3)),
         link_pose=np.zeros((finger_postures, 0, 3, 4)),
         checked=np.zeros((0, 0), np.int64),
+        first=no_first(finger_postures, 0),
+        alone=False,
     )
 
 

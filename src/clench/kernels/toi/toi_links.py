@@ -227,6 +227,19 @@ def sweep_stage(stage: Stage, best: float, work: Work, sweep: SweepWork) -> tupl
     best, met = sweep_towards_object(stage, first, best, work, sweep)
     if best < 0.0:
         return best, met
+    if is_known(stage, best):
+        return take_first_meeting(stage, best, met, sweep)
+    return sweep_hand(stage, first, best, met, work, sweep)
+
+
+@kernel
+def sweep_hand(stage: Stage, first: int, best: float, met: int, work: Work, sweep: SweepWork) -> tuple[float, int]:
+    """Return what `sweep_stage` does for links of the hand alone, which rest or move.
+
+    Args:
+        first: the first active joint. best, met: the first contact so far, and what is met there.
+    """
+    full_width, finger_posture = stage.full_width, stage.finger_posture
     for n in range(full_width.mover_first[finger_posture], full_width.mover_first[finger_posture + 1]):
         m, joint = full_width.mover_link[n], full_width.mover_joint[n]
         if joint >= first and full_width.links.root[m] >= 0:
@@ -234,6 +247,56 @@ def sweep_stage(stage: Stage, best: float, work: Work, sweep: SweepWork) -> tupl
             if other >= 0:
                 met = other
     return best, met
+
+
+@kernel
+def is_known(stage: Stage, best: float) -> bool:
+    """Say whether `FirstMeetings` has what the segment's links meet of the hand before `best`."""
+    full_width, finger_posture = stage.full_width, stage.finger_posture
+    known, rates = full_width.first.known[finger_posture], full_width.first.rates[finger_posture]
+    if not full_width.alone or known[0] != stage.touch or best > known[1]:
+        return False
+    for j in range(full_width.joint_first[finger_posture], full_width.joint_first[finger_posture + 1]):
+        if stage.turns[j] != 0.0 or stage.rates[j] != rates[j]:
+            return False
+    return True
+
+
+@kernel
+def take_first_meeting(stage: Stage, best: float, met: int, sweep: SweepWork) -> tuple[float, int]:
+    """Return what `sweep_hand` does where `is_known`."""
+    first, finger_posture = stage.full_width.first, stage.finger_posture
+    found = first.met[finger_posture]
+    sweep.skipped[0] += found[5]
+    if not first.known[finger_posture, 2] < best:
+        return best, met
+    for k in range(4):
+        sweep.winner[k] = found[1 + k]
+    return float(first.known[finger_posture, 2]), int(found[0])
+
+
+@kernel
+def put_first_meeting(stage: Stage, reach: float, work: Work, sweep: SweepWork) -> None:
+    """Write what the links of a finger posture meet of the hand on their first path segment; see `FirstMeetings`.
+
+    Args:
+        stage: the segment. reach: how far it is swept, at least as far as it goes.
+    """
+    full_width, finger_posture, first = stage.full_width, stage.finger_posture, 0
+    known, met = full_width.first.known[finger_posture], full_width.first.met[finger_posture]
+    while stage.rates[first] == 0.0:
+        first += 1
+    several = place_active(stage, first, work, sweep)
+    pose_movers(full_width, stage.chain, finger_posture, stage.turns, sweep.poses)
+    put_lanes(stage, several, first, sweep)
+    sweep.skipped[0] = 0
+    known[0], known[1] = stage.touch, reach
+    known[2], met[0] = sweep_hand(stage, first, reach, -1, work, sweep)
+    for k in range(4):
+        met[1 + k] = sweep.winner[k]
+    met[5] = sweep.skipped[0]
+    for j in range(stage.rates.shape[0]):
+        full_width.first.rates[finger_posture, j] = stage.rates[j]
 
 
 @kernel
