@@ -225,6 +225,7 @@ def _sweep_at(s: SweepWork, n: int) -> SweepWork:
         s.balls[n],
         s.clear[n],
         s.order[n],
+        s.lead[n],
         s.pair[n],
         s.winner[n],
         s.skipped[n],

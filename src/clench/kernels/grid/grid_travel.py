@@ -33,12 +33,13 @@ def clear_by_grid(pair: BodyPair, best: float, work: SweepWork) -> float:
     """Return a travel up to which a moving body is farther than `touch` from an object; infinite if until `best`.
 
     The result is 0 for a body that no balls cover, and for an object without a grid. Surfaces count: whether one body
-    lies within the other is not seen.
+    lies within the other is not seen. The ball that may touch first is left in `work.near`.
 
     Args:
         pair, work: see `sweep_body`.
     """
-    first, last = pair.moving.hulls.cover[pair.m], pair.moving.hulls.cover[pair.m + 1]
+    hulls, m, work.near[5] = pair.moving.hulls, pair.m, -1
+    first, last = hulls.cover[hulls.body[m]], hulls.cover[hulls.body[m + 1]]
     if first == last or pair.resting.grid.square.shape[0] == 0:
         return 0.0
     near = NEAR * pair.resting.grid.place[3]
@@ -48,6 +49,7 @@ def clear_by_grid(pair: BodyPair, best: float, work: SweepWork) -> float:
     until = 0.0
     for _ in range(LOOKS):
         k = earliest(last - first, work)
+        work.near[5] = first + k
         until, speed = float(work.balls[k, UNTIL]), work.balls[k, SPEED]
         if until > best:
             return math.inf

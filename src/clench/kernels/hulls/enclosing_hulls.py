@@ -52,8 +52,8 @@ class HullArrays(NamedTuple):
         points: corners of all hulls, in the bodies' frames [m], (P, 3). first: first corner of each hull, (H + 1,).
         radius: by which each hull is grown to enclose its part [m], (H,). body: first hull of each body, (B + 1,).
         box: pose of a box around the corners of each hull, and half its sizes [m], (H, 3, 5).
-        ball: centre and radius of balls that cover a body together [m], (K, 4). cover: first ball of each body,
-            (B + 1,).
+        ball: centre and radius of balls that cover a body together [m], (K, 4). cover: first ball of each hull,
+            (H + 1,).
         convex: whether the part fills its hull, (H,).
         table: first cone of each hull, or -1 without a table, (H,).
         cone, entry: see `CornerTable`; those of all hulls. Entries are rows of `points`.
@@ -95,7 +95,7 @@ def pack_hulls(bodies: Sequence[Sequence[HullPart]]) -> HullArrays:
             cone_count, entry_count = cone_count + len(cone), entry_count + len(entry)
     boxes = np.array([_box(hull.points) for hull in hulls], dtype=np.float64).reshape(-1, 3, 5)
     radius, body = np.array([hull.radius for hull in hulls], dtype=np.float64), np.cumsum([0, *map(len, enclosed)])
-    covers = [_cover(boxes[i:j], radius[i:j]) for i, j in pairwise(body)]
+    covers = [cover for i, j in pairwise(body) for cover in _cover(boxes[i:j], radius[i:j])]
     return HullArrays(
         np.concatenate([np.empty((0, 3)), *points]),
         first.astype(np.int64),
@@ -153,16 +153,18 @@ def _box(points: Floats) -> Floats:
     return np.column_stack([axes.T, axes.T @ middle, half + ROUNDING * np.abs(points).max(initial=0.0)])
 
 
-def _cover(boxes: Floats, radius: Floats) -> Floats:
-    """Return balls that cover the hulls of one body together, (K, 4).
+def _cover(boxes: Floats, radius: Floats) -> list[Floats]:
+    """Return balls that cover each hull of one body, (K, 4); none for a body of too many hulls.
 
     A box is divided into cells, and each cell has a ball.
 
     Args:
         boxes, radius: of the hulls, see `HullArrays`.
     """
-    most, balls = min(HULL_BALLS, BODY_BALLS // max(len(boxes), 1)), [np.empty((0, 4))]
-    for box, grown in zip(boxes if most > 0 else boxes[:0], radius, strict=False):
+    most, balls = min(HULL_BALLS, BODY_BALLS // max(len(boxes), 1)), []
+    if most == 0:
+        return [np.empty((0, 4))] * len(boxes)
+    for box, grown in zip(boxes, radius, strict=True):
         half, cells = box[:, 4], np.ones(3, dtype=np.int64)
         while True:
             longest = int(np.argmax(half / cells))
@@ -174,7 +176,7 @@ def _cover(boxes: Floats, radius: Floats) -> Floats:
         middles = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3) @ box[:, :3].T + box[:, 3]
         reach = (np.linalg.norm(half / cells) + grown) * (1.0 + ROUNDING)
         balls.append(np.column_stack([middles, np.full(len(middles), reach)]))
-    return np.concatenate(balls)
+    return balls
 
 
 @kernel

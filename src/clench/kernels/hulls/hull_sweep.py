@@ -13,7 +13,7 @@ from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.vectors import Vector
 from clench.kernels.grid.grid_bound import closest_element
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.sections.plane_pose import copy_pose
+from clench.kernels.sections.plane_pose import copy_pose, put_point
 from clench.kernels.toi.toi_work import BodyPair, SweepWork
 from clench.kernels.trees.obb import slab_top
 
@@ -82,13 +82,27 @@ def clear_travel(pair: BodyPair, best: float, sweep: SweepWork) -> float:
         return math.inf
     if hulls[m] == hulls[m + 1]:
         return 0.0
-    for hull in range(hulls[m], hulls[m + 1]):
+    lead = hull_of(pair.moving.hulls, m, sweep.near[5])
+    for k in range(hulls[m] - 1, hulls[m + 1]):
+        # The hull that may touch first goes first.
+        hull = lead if k < hulls[m] else k
+        if hull < 0 or k == lead:
+            continue
         found = clear_hull(pair, hull, until, sweep)
         if found < math.inf:
             until, near = found, True
         if near and until <= 0.0:
             return 0.0
     return until if near else math.inf
+
+
+@kernel
+def hull_of(hulls: HullArrays, m: int, ball: int) -> int:
+    """Return the hull of a body that a ball covers, or -1."""
+    for hull in range(hulls.body[m], hulls.body[m + 1]):
+        if hulls.cover[hull] <= ball < hulls.cover[hull + 1]:
+            return hull
+    return -1
 
 
 @kernel
@@ -152,7 +166,7 @@ def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, swee
     hulls, resting = pair.moving.hulls, pair.resting
     first = known
     if known < 0 and s == 0.0 and resting.grid.square.shape[0] > 0:
-        first = closest_element(resting, (window[BOX, 3], window[BOX + 1, 3], window[BOX + 2, 3]), stack)[1]
+        first = closest_element(resting, probe_of(pair, motion.hull, sweep), stack)[1]
     if first >= 0:
         end = keep_off_element(pair, motion, first, s, end, sweep)
     stack[0, 0], waiting = resting.root[pair.r], 1
@@ -174,6 +188,16 @@ def clear_of_tree(pair: BodyPair, motion: HullMotion, s: float, end: float, swee
             if end >= s:
                 end = keep_off_element(pair, motion, e, s, end, sweep)
     return end
+
+
+@kernel
+def probe_of(pair: BodyPair, hull: int, sweep: SweepWork) -> Vector:
+    """Return where what rests is looked at first: the middle of the ball that may touch first, or of the hull's box."""
+    hulls, window, ball = pair.moving.hulls, sweep.hull, sweep.near[5]
+    if not hulls.cover[hull] <= ball < hulls.cover[hull + 1]:
+        return window[BOX, 3], window[BOX + 1, 3], window[BOX + 2, 3]
+    put_point(window[NOW:END], hulls.ball[ball], sweep.placed[0])
+    return sweep.placed[0, 0], sweep.placed[0, 1], sweep.placed[0, 2]
 
 
 @kernel

@@ -261,7 +261,7 @@ def sample_values() -> dict[str, Any]:
         "full_width": planes_only(0, 0),
         "chain": chain,
         "sweep": SweepWork(
-            *_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 f2 i1 f1 i1 f2 f1 i1 i1 i1 i1")
+            *_arrays("f2 f2 f2 f2 f2 f2 f2 f2 f3 f2 i1 i2 f1 f1 f2 f1 f2 f2 f2 f2 f2 i1 f1 i1 f2 f1 i1 i1 i1 i1 i1")
         ),
         "work": Work(*_arrays("f2 f2 f1 f2 f2 f2 f2 f2 f1 f1 f1 i1 f3 i1")),
     }

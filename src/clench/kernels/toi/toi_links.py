@@ -306,7 +306,7 @@ def sweep_towards_object(stage: Stage, first: int, best: float, work: Work, swee
     Links are swept in the order in which they may touch, as the object's grid tells. What the first of them leave
     of the way, the others often pass without a closer look.
     """
-    full_width, met, order, clear = stage.full_width, -1, sweep.order, sweep.clear
+    full_width, met, order, clear, lead = stage.full_width, -1, sweep.order, sweep.clear, sweep.lead
     if full_width.object.root[0] < 0:
         return best, met
     for k in range(order_movers(stage, first, best, work, sweep)):
@@ -315,6 +315,7 @@ def sweep_towards_object(stage: Stage, first: int, best: float, work: Work, swee
         if clear[k] >= best > 0.0:
             break
         pair = place_pair(stage, m, full_width.object, 0, stage.T_palm_object, (first, joint), work, sweep)
+        sweep.near[5] = lead[k]
         found = sweep_from(pair, clear[k], best, sweep)
         if found < best:
             best, met = found, full_width.checked.shape[0]
@@ -327,8 +328,8 @@ def sweep_towards_object(stage: Stage, first: int, best: float, work: Work, swee
 @kernel
 def order_movers(stage: Stage, first: int, best: float, work: Work, sweep: SweepWork) -> int:
     """Write which links may touch the object before `best`, and from when on, the earliest first; return how many."""
-    full_width, lane, order, clear, count = stage.full_width, sweep.lane, sweep.order, sweep.clear, 0
-    links = full_width.checked.shape[0]
+    full_width, lane, order, clear, lead = stage.full_width, sweep.lane, sweep.order, sweep.clear, sweep.lead
+    links, count = full_width.checked.shape[0], 0
     for n in range(full_width.mover_first[stage.finger_posture], full_width.mover_first[stage.finger_posture + 1]):
         m, joint = full_width.mover_link[n], full_width.mover_joint[n]
         if joint < first or full_width.links.root[m] < 0:
@@ -343,9 +344,9 @@ def order_movers(stage: Stage, first: int, best: float, work: Work, sweep: Sweep
             continue
         k = count
         while k > 0 and clear[k - 1] > begin:
-            clear[k], order[k] = clear[k - 1], order[k - 1]
+            clear[k], order[k], lead[k] = clear[k - 1], order[k - 1], lead[k - 1]
             k -= 1
-        clear[k], order[k] = begin, n
+        clear[k], order[k], lead[k] = begin, n, sweep.near[5]
         count += 1
     return count
 

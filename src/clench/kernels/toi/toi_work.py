@@ -46,11 +46,13 @@ class SweepWork(NamedTuple):
             (J, 7) and for parallel ones (J + 1, 3).
         hull: scratch space of `hull_window`, (70, 6). round: that of `round_motion`, (12, 3).
         near: the element that the hull came near to last, or -1; of the sweep the hull that touches, or -1, what it
-            touches, a resting hull or -1 and an element; of the window the resting hull that is touched, or -1, (5,).
+            touches, a resting hull or -1 and an element; of the window the resting hull that is touched, or -1; the
+            ball that may touch first, or -1, (6,).
         met: the travel after which a hull touches in a window, (1,).
         listed: resting elements that a short sweep can meet, (32,).
         balls: those of a moving body, see `grid_travel`, (BODY_BALLS, 6).
-        clear: a travel before which each link does not meet the object, (L,). order: links by this travel, (L,).
+        clear: a travel before which each link does not meet the object, (L,). order: links by this travel, (L,); lead:
+            the ball of each that may touch first, or -1, (L,).
         pair, winner: the pair found last, and that of the stage: element of the moving body, that of the resting one,
             moving body, resting body, (4,). skipped: how many pairs of links were left alone, (1,).
     """
@@ -82,6 +84,7 @@ class SweepWork(NamedTuple):
     balls: Floats
     clear: Floats
     order: Ints
+    lead: Ints
     pair: Ints
     winner: Ints
     skipped: Ints
@@ -129,11 +132,12 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((joints + 1, 3)),
         np.empty((70, 6)),
         np.empty((12, 3)),
-        np.zeros(5, dtype=np.int64),
+        np.full(6, -1, dtype=np.int64),
         np.empty(1),
         np.zeros(32, dtype=np.int64),
         np.empty((BODY_BALLS, 6)),
         np.empty(links),
+        np.empty(links, dtype=np.int64),
         np.empty(links, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
         np.zeros(4, dtype=np.int64),
