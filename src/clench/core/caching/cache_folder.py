@@ -9,18 +9,33 @@ import sys
 from pathlib import Path
 
 
-def cache_folder() -> Path:
-    """Return the user's cache folder for this program: `CLENCH_CACHE_DIR`, else the platform's."""
+def cache_folder() -> Path | None:
+    """Return the user's cache folder for this program: `CLENCH_CACHE_DIR`, else the platform's.
+
+    None means that nothing is kept: the user has no home folder, as in some containers.
+    """
     named = os.environ.get("CLENCH_CACHE_DIR")
     if named:
         return Path(named)
+    try:
+        return _platforms_folder() / "clench"
+    except RuntimeError:
+        return None
+
+
+def _platforms_folder() -> Path:
+    """Return the user's folder for the caches of all programs.
+
+    Raises:
+        RuntimeError: the user has no home folder.
+    """
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
     elif sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "clench"
+    return Path(base)
 
 
 def remove_oldest(folder: Path, ending: str, most_files: int, most_together: float = math.inf) -> None:

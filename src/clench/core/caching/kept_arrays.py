@@ -44,9 +44,10 @@ def arrays_of(key: str, make: Callable[[], Sequence[np.ndarray[Any, Any]]]) -> A
     Args:
         key: hash of everything that the arrays depend on, 64 hexadecimal digits. make: returns them.
     """
-    if os.environ.get(SWITCH, "1") == "0":
+    folder = cache_folder()
+    if folder is None or os.environ.get(SWITCH, "1") == "0":
         return list(make())
-    path = cache_folder() / "arrays" / f"{key}.arrays"
+    path = folder / "arrays" / f"{key}.arrays"
     found = _read(path, key)
     if found is None:
         found = list(make())

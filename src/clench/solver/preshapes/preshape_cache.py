@@ -66,9 +66,9 @@ def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
     Args:
         key: see `cache_key`. joints: names of the hand's joints.
     """
-    if not _is_on():
-        return None
     path = _path(key)
+    if path is None:
+        return None
     try:
         if path.stat().st_size > MOST_BYTES:
             return None
@@ -86,12 +86,12 @@ def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
 
     If the cache cannot be written, nothing is kept.
     """
-    if not _is_on():
+    path = _path(key)
+    if path is None:
         return
     content = msgspec.json.encode(_File(SCHEMA, key, _digest(preshapes), list(preshapes)))
     if len(content) > MOST_BYTES:
         return
-    path = _path(key)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
@@ -100,12 +100,12 @@ def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
         return
 
 
-def _is_on() -> bool:
-    return os.environ.get(SWITCH, "1") != "0"
-
-
-def _path(key: str) -> Path:
-    return cache_folder() / "preshapes" / f"{key}.json"
+def _path(key: str) -> Path | None:
+    """Return the file of a key, or None where nothing is kept."""
+    folder = cache_folder()
+    if folder is None or os.environ.get(SWITCH, "1") == "0":
+        return None
+    return folder / "preshapes" / f"{key}.json"
 
 
 def _digest(preshapes: Sequence[Entry]) -> str:
