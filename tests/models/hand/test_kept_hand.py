@@ -16,7 +16,7 @@ import pytest
 
 from clench.core.caching import kept_arrays
 from clench.core.caching.plain_values import as_arrays
-from clench.core.exceptions import ClenchError, HandError
+from clench.core.exceptions import ClenchError, HandError, UnknownNameError
 from clench.models.hand import hand_making, kept_hand
 from clench.models.hand.hand import Hand
 from models.hand.hand_models import urdf_hand, written
@@ -196,6 +196,12 @@ def test_a_warning_before_an_error_is_passed_on(folder, monkeypatch) -> None:
     monkeypatch.setattr(hand_making, "make_hand", failing)
     with pytest.warns(UserWarning, match="inertia"), pytest.raises(HandError, match="no hand"):
         Hand.load("patent15")
+
+
+def test_a_palm_of_the_name_none_is_not_the_palm_that_nobody_named(folder) -> None:
+    Hand.load("patent15")
+    with pytest.raises(UnknownNameError, match="None"):
+        Hand.load("patent15", palm="None")
 
 
 def test_an_error_is_the_same_every_time_and_leaves_nothing(folder) -> None:
