@@ -155,11 +155,12 @@ def test_a_damaged_file_is_made_anew(folder, makings) -> None:
 def test_a_sound_file_of_something_else_is_not_used(folder, makings, monkeypatch) -> None:
     sound = bits(Hand.load("patent15"))
     (file,) = folder.iterdir()
-    for other in ([], [np.zeros(3, np.uint8)], as_arrays((1, 2), {}), [np.arange(4.0)]):
+    deep = np.frombuffer(b"\x92\x01" * 100_000 + b"\x90", np.uint8)
+    for other in ([], [np.zeros(3, np.uint8)], as_arrays((1, 2), {}), [np.arange(4.0)], [deep]):
         file.unlink()
         kept_arrays.arrays_of(file.stem, lambda other=other: other)
         assert bits(Hand.load("patent15")) == sound
-    assert len(makings) == 5
+    assert len(makings) == 6
 
 
 def test_a_hand_that_cannot_be_written_is_made_every_time(folder, monkeypatch) -> None:
