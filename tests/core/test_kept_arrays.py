@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +89,19 @@ def test_a_head_that_does_not_fit_the_numbers_is_not_used(folder: Path) -> None:
         head = kept_arrays._head(KEY, kept_arrays._digest(rows, body), rows)
         (folder / f"{KEY}.arrays").write_bytes(head + bytes(body))
         assert same(arrays_of(KEY, lambda: [np.array([1.0])])[0], np.array([1.0]))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+@pytest.mark.parametrize("put", [os.mkfifo, lambda path: path.symlink_to("/dev/zero")])
+def test_a_pipe_or_a_device_in_the_place_of_a_file_is_replaced(folder: Path, put: Callable[[Path], None]) -> None:
+    folder.mkdir()
+    put(folder / f"{KEY}.arrays")
+    found: Arrays = []
+    reader = threading.Thread(target=lambda: found.extend(arrays_of(KEY, some_arrays)), daemon=True)
+    reader.start()
+    reader.join(timeout=20)
+    assert found, "it waits for somebody who writes into the pipe"
+    assert len(arrays_of(KEY, never)) == len(found)
 
 
 def test_files_have_bounds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

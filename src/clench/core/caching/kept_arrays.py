@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import re
+import stat
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -58,12 +59,12 @@ def arrays_of(key: str, make: Callable[[], Sequence[np.ndarray[Any, Any]]]) -> A
 def _read(path: Path, key: str) -> Arrays | None:
     """Return the arrays of a file, or None if it is missing or unusable."""
     try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            return None
-        content = bytearray(size)
-        with path.open("rb") as file:
-            if file.readinto(content) != size:
+        with open(path, "rb", opener=_without_waiting) as file:
+            state = os.fstat(file.fileno())
+            if not stat.S_ISREG(state.st_mode) or state.st_size > MOST_BYTES:
+                return None
+            content = bytearray(state.st_size)
+            if file.readinto(content) != len(content):
                 return None
         end = content.index(b"\n") + 1
         head = json.loads(content[:end])
@@ -73,6 +74,11 @@ def _read(path: Path, key: str) -> Arrays | None:
         return _arrays(head["arrays"], content, end)
     except (OSError, ValueError, TypeError, LookupError, RecursionError, OverflowError):
         return None
+
+
+def _without_waiting(name: str, flags: int) -> int:
+    """Open a file; a pipe opens at once, too, where it would wait for a writer."""
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _arrays(rows: list[Any], content: bytearray, at: int) -> Arrays | None:
