@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clench.core.caching import kept_arrays
-from clench.core.caching.cache_folder import cache_folder
+from clench.core.caching.cache_folder import RENEWED_AFTER, cache_folder, note_use
 from clench.execution.simulation import convex_pieces
 from clench.models.hand import kept_hand
 from clench.models.hand.hand import Hand
@@ -50,6 +52,17 @@ def test_the_environment_names_the_folder(
     else:
         monkeypatch.setattr(Path, "home", lambda: Path("home"))
     assert cache_folder() == Path(place)
+
+
+@pytest.mark.parametrize(("age", "renewed"), [(0.9 * RENEWED_AFTER, False), (1.1 * RENEWED_AFTER, True)])
+def test_use_renews_the_time_of_a_file_now_and_then(tmp_path: Path, age: float, renewed: bool) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    written = time.time() - age
+    os.utime(file, (written, written))
+    note_use(file, file.stat().st_mtime)
+    assert (file.stat().st_mtime > written + 1.0) == renewed
+    note_use(tmp_path / "gone", 0.0)
 
 
 def test_without_a_home_folder_hands_load_and_nothing_is_kept(homeless: None) -> None:

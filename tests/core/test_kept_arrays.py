@@ -123,6 +123,16 @@ def test_files_have_bounds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert len(arrays_of(OTHER, lambda: [np.array([1.0])])) == 1  # a larger file is not read
 
 
+def test_a_file_in_use_outlasts_files_that_were_written_later(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_arrays, "MOST_FILES", 2)
+    for n, name in enumerate((KEY, OTHER)):
+        arrays_of(name, some_arrays)
+        os.utime(folder / f"{name}.arrays", (n, n))
+    arrays_of(KEY, never)
+    arrays_of("c" * 64, some_arrays)
+    assert sorted(path.stem[0] for path in folder.iterdir()) == ["a", "c"]
+
+
 def test_without_a_folder_nothing_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kept_arrays.SWITCH, "0")
     arrays_of(KEY, some_arrays)

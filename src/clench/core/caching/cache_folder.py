@@ -6,7 +6,13 @@ import math
 import os
 import re
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
+from typing import Final
+
+#: A file in use gets a new time at most this often [s].
+RENEWED_AFTER: Final = 3600.0
 
 
 def cache_folder() -> Path | None:
@@ -38,8 +44,21 @@ def _platforms_folder() -> Path:
     return Path(base)
 
 
+def note_use(file: Path, written: float) -> None:
+    """Give a file that was read the present time, so that it stays longer than files that nobody reads.
+
+    Args:
+        written: its time so far [s]; a recent one stays. A file of another user keeps its time.
+    """
+    if time.time() - written > RENEWED_AFTER:
+        with suppress(OSError):
+            os.utime(file)
+
+
 def remove_oldest(folder: Path, ending: str, most_files: int, most_together: float = math.inf) -> None:
-    """Remove the oldest files of a kind beyond the bounds; another process may remove them at the same time.
+    """Remove the files of a kind beyond the bounds, those first that were not used for longest.
+
+    Another process may remove them at the same time.
 
     Args:
         folder: with the files, whose names are a hash of 64 digits and the ending. most_together: size of all [bytes];

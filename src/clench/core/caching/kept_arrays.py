@@ -21,7 +21,7 @@ import numpy as np
 from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import write_atomically
 
-from .cache_folder import cache_folder, remove_oldest
+from .cache_folder import cache_folder, note_use, remove_oldest
 
 Arrays = list[np.ndarray[Any, Any]]
 
@@ -71,6 +71,7 @@ def _read(path: Path, key: str) -> Arrays | None:
         digest = _digest(head["arrays"], memoryview(content)[end:])
         if (head["schema"], head["key"], head["digest"]) != (SCHEMA, key, digest):
             return None
+        note_use(path, state.st_mtime)
         return _arrays(head["arrays"], content, end)
     except (OSError, ValueError, TypeError, LookupError, RecursionError, OverflowError):
         return None

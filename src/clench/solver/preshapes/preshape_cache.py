@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.core.caching.cache_folder import cache_folder, remove_oldest
+from clench.core.caching.cache_folder import cache_folder, note_use, remove_oldest
 from clench.core.caching.fingerprint import fingerprint
 from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import read_json, write_atomically
@@ -70,7 +70,8 @@ def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
     if path is None:
         return None
     try:
-        if path.stat().st_size > MOST_BYTES:
+        state = path.stat()
+        if state.st_size > MOST_BYTES:
             return None
         found = msgspec.convert(read_json(path), _File)
     except (ClenchError, msgspec.ValidationError, OSError):
@@ -78,7 +79,10 @@ def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
     whole = (found.schema, found.key, found.digest) == (SCHEMA, key, _digest(found.preshapes))
     known = all(name in joints for entry in found.preshapes for name in entry.angles)
     fits = all(len(zone) == ZONE for entry in found.preshapes for zone in entry.zones)
-    return found.preshapes if whole and known and fits else None
+    if not (whole and known and fits):
+        return None
+    note_use(path, state.st_mtime)
+    return found.preshapes
 
 
 def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
