@@ -76,6 +76,8 @@ def test_no_damage_goes_unseen(folder: Path) -> None:
         assert len(found) == 1 or all(same(a, b) for a, b in zip(found, some_arrays(), strict=True)), content
         if len(found) == 1:
             assert len(arrays_of(KEY, never)) == 1
+    path.write_bytes(whole.replace(kept_arrays.SCHEMA.encode(), b"clench.arrays/0"))
+    assert len(arrays_of(KEY, lambda: [np.array([1.0])])) == 1
     path.write_bytes(whole)
     (folder / f"{OTHER}.arrays").write_bytes(whole)  # of something else
     assert len(arrays_of(OTHER, lambda: [np.array([1.0])])) == 1

@@ -10,8 +10,6 @@ from typing import Any, Final
 
 import numpy as np
 
-#: Environment variables that choose the code of NumPy and of its linear algebra, and so the bits of results.
-CHOOSING: Final = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
 #: Texts that read as another value does. A mark tells them from it; all others have none, as in files of earlier days.
 _SPELLED: Final = re.compile(r"None|True|False|-?[0-9]+")
 
