@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +76,8 @@ def test_no_damage_goes_unseen(folder: Path) -> None:
         assert len(found) == 1 or all(same(a, b) for a, b in zip(found, some_arrays(), strict=True)), content
         if len(found) == 1:
             assert len(arrays_of(KEY, never)) == 1
+    path.write_bytes(whole.replace(kept_arrays.SCHEMA.encode(), b"clench.arrays/0"))
+    assert len(arrays_of(KEY, lambda: [np.array([1.0])])) == 1
     path.write_bytes(whole)
     (folder / f"{OTHER}.arrays").write_bytes(whole)  # of something else
     assert len(arrays_of(OTHER, lambda: [np.array([1.0])])) == 1
@@ -87,6 +91,19 @@ def test_a_head_that_does_not_fit_the_numbers_is_not_used(folder: Path) -> None:
         head = kept_arrays._head(KEY, kept_arrays._digest(rows, body), rows)
         (folder / f"{KEY}.arrays").write_bytes(head + bytes(body))
         assert same(arrays_of(KEY, lambda: [np.array([1.0])])[0], np.array([1.0]))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+@pytest.mark.parametrize("put", [os.mkfifo, lambda path: path.symlink_to("/dev/zero")])
+def test_a_pipe_or_a_device_in_the_place_of_a_file_is_replaced(folder: Path, put: Callable[[Path], None]) -> None:
+    folder.mkdir()
+    put(folder / f"{KEY}.arrays")
+    found: Arrays = []
+    reader = threading.Thread(target=lambda: found.extend(arrays_of(KEY, some_arrays)), daemon=True)
+    reader.start()
+    reader.join(timeout=20)
+    assert found, "it waits for somebody who writes into the pipe"
+    assert len(arrays_of(KEY, never)) == len(found)
 
 
 def test_files_have_bounds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,6 +123,16 @@ def test_files_have_bounds(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     arrays_of(names[0], some_arrays)
     assert not (folder / f"{names[0]}.arrays").exists()
     assert len(arrays_of(OTHER, lambda: [np.array([1.0])])) == 1  # a larger file is not read
+
+
+def test_a_file_in_use_outlasts_files_that_were_written_later(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_arrays, "MOST_FILES", 2)
+    for n, name in enumerate((KEY, OTHER)):
+        arrays_of(name, some_arrays)
+        os.utime(folder / f"{name}.arrays", (n, n))
+    arrays_of(KEY, never)
+    arrays_of("c" * 64, some_arrays)
+    assert sorted(path.stem[0] for path in folder.iterdir()) == ["a", "c"]
 
 
 def test_without_a_folder_nothing_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,6 +123,14 @@ def test_rows_that_describe_nothing_known_are_refused(row: Any) -> None:
         from_arrays(arrays, CLASSES)
 
 
+@pytest.mark.parametrize(("row", "depth"), [(b"\x92\x01", 100_000), (b"\x93\x04\xa6Colour", 800)])
+def test_rows_that_are_nested_too_deep_are_refused(row: bytes, depth: int) -> None:
+    """The parser refuses the one, and what turns rows to values the other."""
+    described = np.frombuffer(row * depth + b"\xa3red", np.uint8)
+    with pytest.raises(ValueError, match="describes no value"):
+        from_arrays([described], CLASSES)
+
+
 def test_no_arrays_and_cut_bytes_are_refused() -> None:
     with pytest.raises(ValueError, match="describes no value"):
         from_arrays([], CLASSES)

@@ -16,7 +16,7 @@ import pytest
 
 from clench.core.caching import kept_arrays
 from clench.core.caching.plain_values import as_arrays
-from clench.core.exceptions import ClenchError, HandError
+from clench.core.exceptions import ClenchError, HandError, UnknownNameError
 from clench.models.hand import hand_making, kept_hand
 from clench.models.hand.hand import Hand
 from models.hand.hand_models import urdf_hand, written
@@ -117,9 +117,12 @@ def test_whatever_changes_a_hand_changes_its_key(folder, makings, tmp_path, monk
     assert Hand.load(path).links[0].friction == 0.5
     (tmp_path / "hand" / "two.hand.toml").write_text("[links.palm]\nfriction = 0.6\n")
     assert Hand.load(path).links[0].friction == 0.6
+    for name in ("one.toml", "two.toml"):  # of equal content, but messages name the file
+        (tmp_path / name).write_text("[links.palm]\nfriction = 0.7\n")
+        Hand.load(path, hand_file=tmp_path / name)
     monkeypatch.setattr(kept_hand, "_made_by", lambda: "other sources, versions or another processor")
     Hand.load(path)
-    assert len(makings) == len(changes) + 3
+    assert len(makings) == len(changes) + 5
 
 
 def test_sources_and_versions_are_part_of_the_key(monkeypatch) -> None:
@@ -131,14 +134,14 @@ def test_sources_and_versions_are_part_of_the_key(monkeypatch) -> None:
         with monkeypatch.context() as patched:
             patched.setattr(Path, "read_bytes", lambda p, n=name: read_bytes(p) + b"#" * (p.name == n))
             assert made_by() != before, name
-    with monkeypatch.context() as patched:
-        patched.setattr(np, "__version__", "0.0")
-        assert made_by() != before
-    with monkeypatch.context() as patched:
-        patched.setattr(kept_hand, "_files_of", lambda package: [])
-        assert made_by() != before
-    monkeypatch.setenv("OPENBLAS_CORETYPE", "Other")
-    assert made_by() != before
+    for owner, name, other in (
+        (sys, "version", "0.0"),
+        (kept_hand, "_files_of", lambda package: []),
+        (kept_hand, "number_code", lambda: "another processor"),
+    ):
+        with monkeypatch.context() as patched:
+            patched.setattr(owner, name, other)
+            assert made_by() != before, name
 
 
 def test_a_damaged_file_is_made_anew(folder, makings) -> None:
@@ -155,11 +158,12 @@ def test_a_damaged_file_is_made_anew(folder, makings) -> None:
 def test_a_sound_file_of_something_else_is_not_used(folder, makings, monkeypatch) -> None:
     sound = bits(Hand.load("patent15"))
     (file,) = folder.iterdir()
-    for other in ([], [np.zeros(3, np.uint8)], as_arrays((1, 2), {}), [np.arange(4.0)]):
+    deep = np.frombuffer(b"\x92\x01" * 100_000 + b"\x90", np.uint8)
+    for other in ([], [np.zeros(3, np.uint8)], as_arrays((1, 2), {}), [np.arange(4.0)], [deep]):
         file.unlink()
         kept_arrays.arrays_of(file.stem, lambda other=other: other)
         assert bits(Hand.load("patent15")) == sound
-    assert len(makings) == 5
+    assert len(makings) == 6
 
 
 def test_a_hand_that_cannot_be_written_is_made_every_time(folder, monkeypatch) -> None:
@@ -196,6 +200,12 @@ def test_a_warning_before_an_error_is_passed_on(folder, monkeypatch) -> None:
     monkeypatch.setattr(hand_making, "make_hand", failing)
     with pytest.warns(UserWarning, match="inertia"), pytest.raises(HandError, match="no hand"):
         Hand.load("patent15")
+
+
+def test_a_palm_of_the_name_none_is_not_the_palm_that_nobody_named(folder) -> None:
+    Hand.load("patent15")
+    with pytest.raises(UnknownNameError, match="None"):
+        Hand.load("patent15", palm="None")
 
 
 def test_an_error_is_the_same_every_time_and_leaves_nothing(folder) -> None:

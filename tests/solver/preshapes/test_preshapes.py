@@ -186,16 +186,18 @@ def test_a_folder_that_cannot_be_written_is_no_error(searched, tmp_path, monkeyp
     assert read_preshapes(key, ()) is None
 
 
-def test_the_oldest_files_go_and_others_stay(searched, tmp_path) -> None:
+def test_the_files_go_that_were_not_used_for_longest_and_others_stay(searched, tmp_path) -> None:
     folder = tmp_path / "cache" / "preshapes"
     folder.mkdir(parents=True)
     (folder / "notes.txt").write_text("mine")
     for number in range(MOST_FILES + 3):
         keep_preshapes(f"{number:064x}", [])
         os.utime(folder / f"{number:064x}.json", (number, number))
+    oldest = f"{3:064x}"
+    assert read_preshapes(oldest, ()) == []
     keep_preshapes("f" * 64, [])
     names = [file.name for file in files(tmp_path)]
     assert len(names) == MOST_FILES + 1
-    assert {"notes.txt", f"{'f' * 64}.json", f"{MOST_FILES + 2:064x}.json"} <= set(names)
-    assert f"{0:064x}.json" not in names
+    assert {"notes.txt", f"{'f' * 64}.json", f"{MOST_FILES + 2:064x}.json", f"{oldest}.json"} <= set(names)
+    assert not {f"{0:064x}.json", f"{4:064x}.json"} & set(names)
     assert msgspec.json.decode((folder / f"{'f' * 64}.json").read_bytes())["preshapes"] == []

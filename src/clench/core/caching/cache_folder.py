@@ -6,25 +6,59 @@ import math
 import os
 import re
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
+from typing import Final
+
+#: A file in use gets a new time at most this often [s].
+RENEWED_AFTER: Final = 3600.0
 
 
-def cache_folder() -> Path:
-    """Return the user's cache folder for this program: `CLENCH_CACHE_DIR`, else the platform's."""
+def cache_folder() -> Path | None:
+    """Return the user's cache folder for this program: `CLENCH_CACHE_DIR`, else the platform's.
+
+    None means that nothing is kept: the user has no home folder, as in some containers.
+    """
     named = os.environ.get("CLENCH_CACHE_DIR")
     if named:
         return Path(named)
+    try:
+        return _platforms_folder() / "clench"
+    except RuntimeError:
+        return None
+
+
+def _platforms_folder() -> Path:
+    """Return the user's folder for the caches of all programs.
+
+    Raises:
+        RuntimeError: the user has no home folder.
+    """
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
     elif sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "clench"
+    return Path(base)
+
+
+def note_use(file: Path, written: float) -> None:
+    """Give a file that was read the present time, so that it stays longer than files that nobody reads.
+
+    Args:
+        written: its time so far [s]; a recent one stays. A file of another user keeps its time.
+    """
+    if time.time() - written > RENEWED_AFTER:
+        with suppress(OSError):
+            os.utime(file)
 
 
 def remove_oldest(folder: Path, ending: str, most_files: int, most_together: float = math.inf) -> None:
-    """Remove the oldest files of a kind beyond the bounds; another process may remove them at the same time.
+    """Remove the files of a kind beyond the bounds, those first that were not used for longest.
+
+    Another process may remove them at the same time.
 
     Args:
         folder: with the files, whose names are a hash of 64 digits and the ending. most_together: size of all [bytes];

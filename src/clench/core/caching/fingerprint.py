@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, Final
 
 import numpy as np
 
-#: Environment variables that choose the code of NumPy and of its linear algebra, and so the bits of results.
-CHOOSING: Final = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
+#: Texts that read as another value does. A mark tells them from it; all others have none, as in files of earlier days.
+_SPELLED: Final = re.compile(r"None|True|False|-?[0-9]+")
 
 
 def fingerprint(*values: Any) -> str:
     """Return a SHA-256 over plain values, arrays, sequences, mappings and dataclasses of these, hexadecimal.
 
-    Numbers count to the bit. The order of a mapping's keys plays no part.
+    Numbers count to the bit, and a text is never a number. The order of a mapping's keys plays no part. NumPy's scalars
+    count as Python's, and a list counts as a tuple.
 
     Raises:
         TypeError: a value of another type.
@@ -28,9 +30,12 @@ def fingerprint(*values: Any) -> str:
 
 
 def _add(digest: hashlib._Hash, value: Any) -> None:
-    if value is None or isinstance(value, str | int | np.integer | np.bool_):
-        text = value if isinstance(value, str) else repr(value)
-        digest.update(f"|{len(text)}:{text}".encode("utf-8", "surrogatepass"))
+    if isinstance(value, str):
+        mark = "t" if _SPELLED.fullmatch(value) else ""
+        digest.update(f"|{mark}{len(value)}:{value}".encode("utf-8", "surrogatepass"))
+    elif value is None or isinstance(value, int | np.integer | np.bool_):
+        text = repr(value.item() if isinstance(value, np.generic) else value)
+        digest.update(f"|{len(text)}:{text}".encode())
     elif isinstance(value, float | np.floating):
         digest.update(b"|f" + np.float64(value).tobytes())
     elif isinstance(value, np.ndarray):
@@ -38,8 +43,8 @@ def _add(digest: hashlib._Hash, value: Any) -> None:
         digest.update(np.ascontiguousarray(value).tobytes())
     elif isinstance(value, Mapping):
         digest.update(f"|m{len(value)}".encode())
-        for key in sorted(value, key=str):
-            _add(digest, str(key))
+        for key in sorted(value, key=lambda key: (str(key), isinstance(key, str))):
+            _add(digest, key)
             _add(digest, value[key])
     elif isinstance(value, list | tuple):
         digest.update(f"|s{len(value)}".encode())

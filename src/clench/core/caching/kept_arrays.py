@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import re
+import stat
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -20,7 +21,7 @@ import numpy as np
 from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import write_atomically
 
-from .cache_folder import cache_folder, remove_oldest
+from .cache_folder import cache_folder, note_use, remove_oldest
 
 Arrays = list[np.ndarray[Any, Any]]
 
@@ -44,9 +45,10 @@ def arrays_of(key: str, make: Callable[[], Sequence[np.ndarray[Any, Any]]]) -> A
     Args:
         key: hash of everything that the arrays depend on, 64 hexadecimal digits. make: returns them.
     """
-    if os.environ.get(SWITCH, "1") == "0":
+    folder = cache_folder()
+    if folder is None or os.environ.get(SWITCH, "1") == "0":
         return list(make())
-    path = cache_folder() / "arrays" / f"{key}.arrays"
+    path = folder / "arrays" / f"{key}.arrays"
     found = _read(path, key)
     if found is None:
         found = list(make())
@@ -57,21 +59,27 @@ def arrays_of(key: str, make: Callable[[], Sequence[np.ndarray[Any, Any]]]) -> A
 def _read(path: Path, key: str) -> Arrays | None:
     """Return the arrays of a file, or None if it is missing or unusable."""
     try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            return None
-        content = bytearray(size)
-        with path.open("rb") as file:
-            if file.readinto(content) != size:
+        with open(path, "rb", opener=_without_waiting) as file:
+            state = os.fstat(file.fileno())
+            if not stat.S_ISREG(state.st_mode) or state.st_size > MOST_BYTES:
+                return None
+            content = bytearray(state.st_size)
+            if file.readinto(content) != len(content):
                 return None
         end = content.index(b"\n") + 1
         head = json.loads(content[:end])
         digest = _digest(head["arrays"], memoryview(content)[end:])
         if (head["schema"], head["key"], head["digest"]) != (SCHEMA, key, digest):
             return None
+        note_use(path, state.st_mtime)
         return _arrays(head["arrays"], content, end)
     except (OSError, ValueError, TypeError, LookupError, RecursionError, OverflowError):
         return None
+
+
+def _without_waiting(name: str, flags: int) -> int:
+    """Open a file; a pipe opens at once, too, where it would wait for a writer."""
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _arrays(rows: list[Any], content: bytearray, at: int) -> Arrays | None:

@@ -51,7 +51,7 @@ def from_arrays(arrays: Arrays, classes: Classes) -> Any:
     """
     try:
         return _Reader(classes, arrays[1:]).value(msgspec.msgpack.decode(arrays[0].tobytes()))
-    except (msgspec.DecodeError, LookupError, TypeError, ValueError) as error:
+    except (msgspec.DecodeError, LookupError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"describes no value of the known classes ({error}).") from None
 
 

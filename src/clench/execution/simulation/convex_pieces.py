@@ -51,10 +51,13 @@ def convex_pieces(mesh: TriangleMesh, name: str, *, show_progress: bool = False)
     hull, share = hull_of(mesh.vertices, name), _volume(mesh)
     if abs(share - hull[1]) <= CONVEX_FRACTION * hull[1]:
         return (hull[0],)
+    folder = cache_folder()
+    if folder is None:
+        return _decomposed(mesh, name, show_progress)
     key = hashlib.sha256(f"{METHOD} {SETTINGS}".encode())
     key.update(mesh.vertices.tobytes())
     key.update(mesh.triangles.tobytes())
-    file = cache_folder() / "pieces" / f"{key.hexdigest()[:32]}.npz"
+    file = folder / "pieces" / f"{key.hexdigest()[:32]}.npz"
     pieces = _cached(file)
     if pieces is None:
         pieces = _decomposed(mesh, name, show_progress)

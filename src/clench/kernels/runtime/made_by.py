@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
-import numpy as np
 from numba.core.registry import cpu_target
 
-from clench.core.caching.fingerprint import CHOOSING, fingerprint
+from clench.core.caching.fingerprint import fingerprint
+from clench.core.caching.number_code import number_code
 
 from .compiling import source_stamp
 
@@ -24,13 +23,11 @@ def made_by(kernels: str, *others: str) -> str:
         kernels: file of a module with kernels; the modules with kernels that it imports count, too. others: files of
             the modules without kernels that take part.
     """
-    import scipy  # without its parts, which take long to load
-
     config: Any = numba.config
     return fingerprint(
         source_stamp(Path(kernels)).hex(),
         [fingerprint(Path(file).read_text(encoding="utf-8")) for file in others],
-        [numba.__version__, np.__version__, scipy.__version__, bool(config.DISABLE_JIT)],
+        number_code(),
+        [numba.__version__, bool(config.DISABLE_JIT)],
         [str(part) for part in cpu_target.target_context.codegen().magic_tuple()],
-        [os.environ.get(name) for name in CHOOSING],
     )

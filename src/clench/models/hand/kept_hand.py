@@ -18,10 +18,9 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Final
 
-import numpy as np
-
-from clench.core.caching.fingerprint import CHOOSING, fingerprint
+from clench.core.caching.fingerprint import fingerprint
 from clench.core.caching.kept_arrays import Arrays, arrays_of
+from clench.core.caching.number_code import number_code
 from clench.core.caching.plain_values import as_arrays, from_arrays
 from clench.core.pose import Pose
 from clench.models.hand.reading.model_files import ModelText
@@ -112,21 +111,13 @@ def hand_key(text: ModelText, overrides: HandFile, palm: str | None, source: Col
 @cache
 def _made_by() -> str:
     """Return a hash of what makes hands: sources, versions and the processor."""
-    import scipy  # without its parts, which take long to load
-
     root = Path(__file__).parents[2]
     sources = sorted(file for layer in ("core", "models") for file in (root / layer).rglob("*.py"))
     digest = hashlib.sha256()
     for file in sources:
         content = file.read_bytes()
         digest.update(f"|{file.relative_to(root).as_posix()} {len(content)}|".encode() + content)
-    features = getattr(getattr(np, "_core", None), "_multiarray_umath", None)
-    return fingerprint(
-        digest.hexdigest(),
-        [sys.version, np.__version__, scipy.__version__, *_files_of("mujoco")],
-        {name: bool(there) for name, there in getattr(features, "__cpu_features__", {}).items()},
-        [os.environ.get(name) for name in CHOOSING],
-    )
+    return fingerprint(digest.hexdigest(), number_code(), sys.version, _files_of("mujoco"))
 
 
 def _files_of(package: str) -> list[str]:

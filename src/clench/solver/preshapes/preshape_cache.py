@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.core.caching.cache_folder import cache_folder, remove_oldest
+from clench.core.caching.cache_folder import cache_folder, note_use, remove_oldest
 from clench.core.caching.fingerprint import fingerprint
 from clench.core.exceptions import ClenchError
 from clench.core.files.json_files import read_json, write_atomically
@@ -66,11 +66,12 @@ def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
     Args:
         key: see `cache_key`. joints: names of the hand's joints.
     """
-    if not _is_on():
-        return None
     path = _path(key)
+    if path is None:
+        return None
     try:
-        if path.stat().st_size > MOST_BYTES:
+        state = path.stat()
+        if state.st_size > MOST_BYTES:
             return None
         found = msgspec.convert(read_json(path), _File)
     except (ClenchError, msgspec.ValidationError, OSError):
@@ -78,7 +79,10 @@ def read_preshapes(key: str, joints: Sequence[str]) -> list[Entry] | None:
     whole = (found.schema, found.key, found.digest) == (SCHEMA, key, _digest(found.preshapes))
     known = all(name in joints for entry in found.preshapes for name in entry.angles)
     fits = all(len(zone) == ZONE for entry in found.preshapes for zone in entry.zones)
-    return found.preshapes if whole and known and fits else None
+    if not (whole and known and fits):
+        return None
+    note_use(path, state.st_mtime)
+    return found.preshapes
 
 
 def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
@@ -86,12 +90,12 @@ def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
 
     If the cache cannot be written, nothing is kept.
     """
-    if not _is_on():
+    path = _path(key)
+    if path is None:
         return
     content = msgspec.json.encode(_File(SCHEMA, key, _digest(preshapes), list(preshapes)))
     if len(content) > MOST_BYTES:
         return
-    path = _path(key)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
@@ -100,12 +104,12 @@ def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
         return
 
 
-def _is_on() -> bool:
-    return os.environ.get(SWITCH, "1") != "0"
-
-
-def _path(key: str) -> Path:
-    return cache_folder() / "preshapes" / f"{key}.json"
+def _path(key: str) -> Path | None:
+    """Return the file of a key, or None where nothing is kept."""
+    folder = cache_folder()
+    if folder is None or os.environ.get(SWITCH, "1") == "0":
+        return None
+    return folder / "preshapes" / f"{key}.json"
 
 
 def _digest(preshapes: Sequence[Entry]) -> str:
