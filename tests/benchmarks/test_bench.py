@@ -51,7 +51,6 @@ def test_solve_prints_flat_lines(capsys: pytest.CaptureFixture[str]) -> None:
     for part in ("read", "plan", "close", "assemble"):
         assert float(lines[f"stage_{part}_median_ms"]) >= 0.0
     assert float(lines["then_read_contacts_median_ms"]) <= float(lines["then_read_everything_max_ms"])
-    assert 0.0 < float(lines["width_close_median_ms"]) < 2.0 * float(lines["solve_max_ms"])
     stages = [f"{kind}_{stage}_median_ms" for kind in ("width", "planes") for stage in ("close", "choose", "finish")]
     assert all(float(lines[stage]) > 0.0 for stage in stages)
     statuses = [int(lines[f"status_{s}"]) for s in ("grasp", "partial", "no_contact", "blocked")]
