@@ -98,13 +98,14 @@ def may_touch(meshes: LinkMeshArrays, k: int, T_object_link: Floats, obj: MeshTr
 
 
 class DepthWork(NamedTuple):
-    """The scratch space of `depth_of`: for `penetration`, two poses, two points, and pairs of nodes."""
+    """The scratch space of `depth_of`: for `penetration`, two poses, two points, and for `surfaces_apart`."""
 
     crossings: Floats
     stack: Ints
     poses: Floats
     points: Floats
     pairs: Ints
+    cores: Floats
 
 
 @kernel(allocates=True)
@@ -116,6 +117,7 @@ def make_depth_work() -> DepthWork:
         np.empty((2, 3, 4)),
         np.empty((2, 3)),
         np.empty((PAIRS, 2), dtype=np.int32),
+        np.empty((6, 3)),
     )
 
 
@@ -159,7 +161,7 @@ def depth_of(
     if boxes_apart(mesh, 0, solid.tree, 0, T):
         return 0.0, 0.0, 0.0, 0.0
     # A surface can get into an open mesh without crossing it.
-    apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, work.pairs)
+    apart = closed and solid.closed and surfaces_apart(mesh, solid.tree, T, work.pairs, work.cores)
     if apart and not has_contained(meshes, k, T, solid, work.points[0]):
         return 0.0, 0.0, 0.0, 0.0
     compose_inverse(T_palm_link, T_palm_object, T_link_object)

@@ -1,14 +1,20 @@
-"""Whether the surfaces of two meshes lie apart, as the boxes of their trees tell."""
+"""Whether the surfaces of two meshes lie apart, as the boxes of their trees tell, and near each other triangles."""
 
 from __future__ import annotations
 
 from clench.kernels.runtime.compiling import kernel
+from clench.kernels.sections.plane_pose import put_point
+from clench.kernels.toi.core_motion import plane_gap
 from clench.kernels.trees.bvh import STACK_SIZE, Floats, Ints, MeshTree
+
+from .core_distance import crosses, separation
 
 #: Pairs of nodes that wait at most: every level of either tree adds one.
 PAIRS = 2 * STACK_SIZE
 #: Of the numbers that two boxes are compared by, which rounding may have changed [-].
 ROUNDING = 1e-13
+#: Triangles that are nearer than this may touch [m].
+NEAR = 1e-12
 
 
 @kernel
@@ -46,11 +52,11 @@ def size(tree: MeshTree, n: int) -> float:
 
 
 @kernel
-def surfaces_apart(a: MeshTree, b: MeshTree, T: Floats, pairs: Ints) -> bool:
-    """Say whether boxes show that no triangle of one mesh touches one of another; if not, nothing is known.
+def surfaces_apart(a: MeshTree, b: MeshTree, T: Floats, pairs: Ints, cores: Floats) -> bool:
+    """Say whether no triangle of one mesh touches one of another.
 
     Args:
-        a, b: the meshes, with triangles. T: `T_b_a`, (3, 4). pairs: scratch space, (PAIRS, 2).
+        a, b: the meshes, with triangles. T: `T_b_a`, (3, 4). pairs, cores: scratch space, (PAIRS, 2) and (6, 3).
     """
     pairs[0, 0], pairs[0, 1], waiting = 0, 0, 1
     while waiting > 0:
@@ -60,10 +66,32 @@ def surfaces_apart(a: MeshTree, b: MeshTree, T: Floats, pairs: Ints) -> bool:
             continue
         one, other = size(a, n), size(b, m)
         if one < 0.0 and other < 0.0:
-            return False
+            if not triangles_apart(a, n, b, m, T, cores):
+                return False
+            continue
         if one >= other:
             pairs[waiting, 0], pairs[waiting + 1, 0], pairs[waiting + 1, 1] = a.right[n], n + 1, m
         else:
             pairs[waiting, 1], pairs[waiting + 1, 0], pairs[waiting + 1, 1] = b.right[m], n, m + 1
         waiting += 2
+    return True
+
+
+@kernel
+def triangles_apart(a: MeshTree, n: int, b: MeshTree, m: int, T: Floats, cores: Floats) -> bool:
+    """Say whether no triangle of one leaf touches one of another; the rest as in `surfaces_apart`."""
+    one, other, nx, ny, nz = cores[:3], cores[3:], 0.0, 0.0, 0.0
+    for i in range(a.first[n], a.first[n] + a.count[n]):
+        for c in range(3):
+            put_point(T, a.vertices[a.triangles[i, c]], one[c])
+        for k in range(b.first[m], b.first[m] + b.count[m]):
+            for c in range(3):
+                for r in range(3):
+                    other[c, r] = b.vertices[b.triangles[k, c], r]
+            # A plane that separated two triangles separates most of their neighbours.
+            if plane_gap(one, 3, other, 3, nx, ny, nz) > NEAR:
+                continue
+            d, nx, ny, nz, _, _, _, _, _ = separation(one, 3, other, 3)
+            if d <= NEAR or crosses(one, 3, other, 3):
+                return False
     return True

@@ -308,7 +308,7 @@ def _solve_values(values: dict[str, Any]) -> dict[str, Any]:
     parts += [command, fingers]
     arena, closed = Arena(*[values["sections"]] * 4), [answers, *_arrays("i2 i2 i1"), answers, *_arrays("i2 i2")]
     closed += [Meetings(*_arrays("i2 i3 f3")), *_arrays("i1")]
-    written: list[Any] = [values["work"], values["sweep"], DepthWork(*_arrays("f1 s1 f3 f2 s2")), values["answer"]]
+    written: list[Any] = [values["work"], values["sweep"], DepthWork(*_arrays("f1 s1 f3 f2 s2 f2")), values["answer"]]
     written += [values["candidates"], *_arrays("i1 f4 f1 f1 f1 f3"), values["palm_contacts"], *_arrays("i1")]
     written.append(meeting := MeetingWork(*_arrays("f2 f1 f1 f1 f1 f1 f2 f2 i2 f1 f2 f1 f3 f1")))
     return {
