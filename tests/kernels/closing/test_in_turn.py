@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import clench
+from chain_hands import HandBuilder, Y, along_x, mount
 from clench.closing import kernel_run
 from clench.kernels.closing import in_turn
 from clench.kernels.closing.layout import CONTACT_DOF, ClosingArrays
@@ -18,11 +19,18 @@ def answer_at(answers, n):
     return ClosingArrays(*(array[n] for array in answers))
 
 
-def finished(monkeypatch, obj, whole):
+def facing():
+    """Return a hand whose second finger closes onto the first one's tip with its first joint."""
+    links = [along_x(0.006, 0.05), along_x(0.006, 0.04)]
+    one = HandBuilder().finger("a", links, [0.05, 0.04], axes=[-Y, -Y], upper=0.8)
+    return one.finger("b", links, [0.05, 0.04], base=mount((0.0, 0.0, 0.09)), axes=[Y, Y], upper=1.2).hand()
+
+
+def finished(monkeypatch, obj, whole, hand=None):
     """Return the answers of a batch whose fingers interlock, and the hand's arrays.
 
     Args:
-        whole: fingers close anew as a whole.
+        whole: fingers close anew as a whole. hand: Robonaut 2 if None.
     """
     seen = []
 
@@ -35,7 +43,7 @@ def finished(monkeypatch, obj, whole):
 
     run = kernel_run.run_stages
     monkeypatch.setattr(kernel_run, "run_stages", in_two_parts)
-    hand, shape = clench.Hand.load("robonaut2"), clench.GraspObject.load(obj)
+    hand, shape = clench.Hand.load("robonaut2") if hand is None else hand, clench.GraspObject.load(obj)
     poses = clench.approach_poses(hand, shape, 40, 3)
     command = clench.GraspCommand(hand_pose=poses[0], preshape="open", measure=False)
     clench.solve_batch(hand, shape, poses, command, threads=1)
@@ -58,6 +66,18 @@ def test_closing_anew_from_a_joint_has_the_bits_of_closing_anew_as_a_whole(obj, 
         assert np.array_equal(one.travel[f], other.travel[f])
         assert np.array_equal(one.contact[f, :count], other.contact[f, :count])
         assert np.array_equal(one.point[f, :count], other.point[f, :count])
+
+
+def test_a_finger_closes_anew_from_its_first_joint_if_that_meets(monkeypatch):
+    part, hand = finished(monkeypatch, "sphere:r=0.004", False, facing())
+    whole, _ = finished(monkeypatch, "sphere:r=0.004", True, facing())
+    first = hand.first_dof[1]
+    met = [n for n in range(len(part.anew)) if part.anew[n, 1] and part.final.contact[n, 1, 0, CONTACT_DOF] == first]
+    assert len(met) >= 10
+    for n in met:
+        one, other = answer_at(part.final, n), answer_at(whole.final, n)
+        assert np.array_equal(one.turn[1], other.turn[1])
+        assert np.array_equal(one.contact[1], other.contact[1])
 
 
 def test_only_what_came_from_a_joint_on_is_taken_back(monkeypatch):

@@ -35,6 +35,21 @@ def test_a_body_is_clear_no_farther_than_its_elements(kinds):
     assert clear + part >= 5
 
 
+def test_a_ball_is_clear_almost_until_it_touches_and_not_longer():
+    """One ball covers a ball, so that nothing but the rounding down to 1/64 of the travel is lost."""
+    ball, tight = pack_bodies([Elements(np.zeros((1, 3)), np.zeros((1, 3), np.int32), np.array([0.01]))]), 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        _, resting, chain, best, work = drawn(3 * seed, ("sheet", "sheet"), False)
+        work.moving[:, 3] = np.array([0.12, 0.0, 0.0]) + 0.02 * rng.normal(size=3)
+        work.resting[:, 3] = 0.12 * np.array([np.cos(0.6), 0.0, np.sin(0.6)]) + 0.01 * rng.normal(size=3)
+        first = first_contact(ball, resting, chain, TOUCH, best, work).min()
+        found = clear_by_grid(ball, 0, with_a_grid(resting), 0, chain, len(chain), TOUCH, best, work)
+        assert found <= max(first, 0.0) or (found == math.inf and first == best)
+        tight += 0.0 < first - found < 1.5 / 64
+    assert tight >= 10
+
+
 @pytest.mark.parametrize("kinds", [(one, other) for one in KINDS for other in KINDS])
 def test_the_first_contact_is_that_without_a_grid(kinds):
     met = 0

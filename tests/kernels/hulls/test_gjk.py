@@ -21,7 +21,8 @@ def distance(a, b):
     heavy = 1e5
     rows = np.vstack([np.hstack([a.T, -b.T]), heavy * np.repeat(np.eye(2), [len(a), len(b)], axis=0).T])
     weights, _ = nnls(rows, np.array([0.0, 0.0, 0.0, heavy, heavy]))
-    return float(np.linalg.norm(weights[: len(a)] @ a - weights[len(a) :] @ b))
+    one, other = weights[: len(a)], weights[len(a) :]
+    return float(np.linalg.norm(one @ a / one.sum() - other @ b / other.sum()))
 
 
 @settings(deadline=None, max_examples=150)

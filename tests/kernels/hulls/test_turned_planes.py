@@ -83,3 +83,30 @@ def test_a_face_that_turns_onto_an_edge_is_clear_almost_until_they_touch():
     square = math.hypot(0.02, 0.01)
     expected = math.atan2(0.01, 0.02) - math.asin(0.004 / square)
     assert expected - 1e-4 <= found <= expected
+
+
+@pytest.mark.parametrize("rates", [(1.0, 0.0), (1.0, 1.0), (1.0, -0.7), (0.3, 1.5)])
+def test_no_point_gets_lower_over_a_turning_plane_than_told(rates):
+    """The first joint carries the body around, the rates of the body itself turn it: with 0 it only bends its way."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        moving, _, _, _, work = drawn(seed, ("soup", "soup"), True)
+        chain = np.array([[rates[0], 0.08 * rng.normal(), 0.08 * rng.normal()], [rates[1], 0.0, 0.0]])
+        motion, window, length = motion_of_hull(moving, 0, chain, 2, work), work.hull, float(rng.uniform(0.1, 1.0))
+        points = moving.hulls.points[moving.hulls.first[0] : moving.hulls.first[1]]
+        poses = [np.zeros((3, 6)) for _ in range(101)]
+        for pose, s in zip(poses, np.linspace(0.0, length, len(poses)), strict=True):
+            put_pose(chain, 2, float(s), work, pose)
+        window[NOW:END], n = poses[0], rng.normal(size=3)
+        n /= np.linalg.norm(n)
+        forget(window)
+        start = (poses[0][:, :3] @ points.T + poses[0][:, 3:4]).T @ n
+        remember(motion, tuple(n), float(start.min()), window[NOW:END], window)
+        put_turned(motion, window[NOW:END], poses[-1], length, window)
+        first, last = np.array(normal_of(0, False, window)), np.array(normal_of(0, True, window))
+        rests, heights = rng.normal(size=3) * 0.1, []
+        for share, pose in zip(np.linspace(0.0, 1.0, len(poses)), poses, strict=True):
+            placed = (pose[:, :3] @ points.T + pose[:, 3:4]).T
+            heights.append(((placed - rests) @ (first + share * (last - first))).min())
+        told = left_over(0, float(rests @ first), float(rests @ last), window)
+        assert told <= min(heights) + 1e-12
