@@ -18,8 +18,8 @@ from .grid_bound import square_bound
 
 #: A ball stops to get on when its gap is below this share of a cube's edge [-].
 NEAR = 0.3
-#: Bounds are rounded down to such a part of the way per unit of travel. So the rounding of the grid's distances, which
-#: depends on where the object is, seldom changes from where a sweep begins.
+#: Bounds are rounded down to a multiple of 1/64 of the travel: the rounding of the grid's distances depends on where
+#: the object is, and seldom changes such a multiple.
 PARTS = 64.0
 #: Balls are looked at so often at most.
 LOOKS = 4 * BODY_BALLS
@@ -53,6 +53,7 @@ def clear_by_grid(pair: BodyPair, best: float, work: SweepWork) -> float:
         until, speed = float(work.balls[k, UNTIL]), work.balls[k, SPEED]
         if until > best:
             return math.inf
+        # A look at the bodies where they are has nowhere to go on to.
         if until == 0.0 and best == 0.0:
             return 0.0
         look_at(pair, k, until, work)

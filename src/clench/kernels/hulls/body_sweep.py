@@ -39,12 +39,12 @@ def sweep_body(pair: BodyPair, best: float, work: SweepWork) -> float:
 
 @kernel
 def sweep_from(pair: BodyPair, begin: float, best: float, work: SweepWork) -> float:
-    """Return what `sweep_body` returns for bodies that are known to be apart.
+    """Return what `sweep_body` returns, from a travel on before which bodies do not meet.
 
     Hulls take the place of elements, which a body of one element would gain nothing from.
 
     Args:
-        pair, work: as in `sweep_body`. begin: a travel before which they do not meet, below `best`, or 0.
+        pair, work: as in `sweep_body`. begin: the travel, below `best`, or 0: then bodies may overlap at first.
     """
     if has_grid(pair):
         return sweep_round(pair, begin, best, work)

@@ -1,8 +1,8 @@
 """How far a moving body is certainly clear of a resting one, by the hulls of its parts (docs/method.md section 5).
 
 A window of travel is tried, see `hull_window`. Parts of the resting body that no plane keeps off the hull are split.
-Where that does not help, the window becomes shorter. The result is a lower bound only: what happens from there on, the
-sweep of all elements tells.
+Where that does not help, the window becomes shorter. A window ends where convex parts touch, see `hull_meeting`. Else
+the result is a lower bound only: what happens from there on, the sweep of all elements tells.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ WINDOWS = 40
 LONGER = 2.0
 #: A hull whose gap is below this fraction of the way of its points per unit of travel is near: the bound ends [-].
 NEAR = 2e-5
+#: Below this fraction, convex parts follow the gap itself, see `hull_meeting` [-].
 REACH = 1e-2
 #: The end of a shorter window is tried so often.
 TRIALS = 6
@@ -72,6 +73,8 @@ BESIDE = 0.125
 @kernel
 def clear_travel(pair: BodyPair, best: float, sweep: SweepWork) -> float:
     """Return a travel up to which body `m` is farther than `touch` from body `r`; infinite if it is until `best`.
+
+    If hulls of convex parts touch there, `sweep.near` names them.
 
     Args:
         pair, sweep: see `sweep_body`.
