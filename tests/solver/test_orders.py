@@ -512,3 +512,22 @@ def test_fingers_that_touch_at_the_start_do_not_go_through_each_other(order):
         assert again.certified, again.certificate["text"]
         closed += 1
     assert closed == 8
+
+
+@pytest.mark.parametrize("gap", [1e-12, 5e-12, 9e-12, 1e-9])
+@pytest.mark.parametrize("speed", [0.2, 0.5, 0.8])
+def test_fingers_that_touch_at_the_start_go_on_if_they_part(gap, speed):
+    """Two parallel capsules close side by side, the upper one faster, from a gap at which links count as meeting."""
+    half = np.sqrt(0.5)
+    capsule = Shape(ShapeKind.CAPSULE, (0.007, 0.025, 0.0), Pose([0.075, 0.0, 0.0], wxyz=[half, 0.0, half, 0.0]))
+    builder = HandBuilder().finger("lower", [capsule], [0.1], upper=speed)
+    hand = builder.finger("upper", [capsule], [0.1], base=mount((0.0, 0.0, 0.014 + gap)), upper=1.0).hand()
+    command = clench.GraspCommand(
+        hand_pose=Pose([0.0, 0.0, -1.0]),
+        preshape="open",
+        planes=1,
+        order=clench.ClosingOrder.TOGETHER,
+        speeds={"lower_0": speed},
+    )
+    solution = clench.solve(hand, clench.GraspObject.load("sphere:r=0.01"), command)
+    assert list(solution.joint_angles.values()) == pytest.approx([speed, 1.0], abs=1e-9)

@@ -60,8 +60,9 @@ class PackedProblem:
         from clench.kernels.runtime.by_reference import kept
 
         arrays = kept(self.arrays)
+        swept = self.arrays.full_width
         with _FINDING:
-            if not (self.arrays.full_width.first.known[:, 1] >= 0.0).any():
+            if swept.requested.any() and not (swept.first.known[:, 1] >= 0.0).any():
                 find_first_meetings(arrays)
         return arrays
 

@@ -9,6 +9,7 @@ from clench.closing import kernel_run
 from clench.core.pose import Pose
 from clench.kernels.closing.layout import CONTACT_WHICH
 from clench.models.shapes import Shape, ShapeKind
+from kernels.closing.test_in_turn import facing
 
 
 def fist():
@@ -74,3 +75,12 @@ def test_a_finger_meets_its_own_palm_where_geometry_says(monkeypatch):
     final, kept = closed(monkeypatch, hand, obj, [Pose([0.0, 0.0, -0.3])], True)
     assert kept[0, 2] == pytest.approx(np.arcsin(0.043 / 0.09), abs=1e-8)
     assert final.turn[0, 0, 0] == kept[0, 2]
+
+
+def test_what_is_known_does_not_hold_where_another_finger_is_in_the_way():
+    """The second finger's first joint meets the first finger, which the second one would meet nothing of if alone."""
+    obj = clench.GraspObject.load("sphere:r=0.004")
+    command = clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.3]), preshape="open")
+    solution = clench.solve(facing(), obj, command)
+    assert solution.certified
+    assert 0.0 < solution.joint_angles["b_0"] < 0.3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from clench.kernels.geometry.bodies import Elements, pack_bodies
+from clench.kernels.geometry.bodies import Elements, join_elements, pack_bodies
 from clench.kernels.hulls import gjk, hull_meeting
 from clench.kernels.hulls.enclosing_hulls import HullPart, pack_hulls
 from clench.kernels.toi import core_motion
@@ -144,3 +144,24 @@ def test_the_elements_at_a_point_are_listed():
         count = list_at(body, 0, tuple(corners[0]), 1e-12, listed, work)
         assert set(listed[:count]) == set(np.flatnonzero((body.elements == body.elements[e, 0]).any(axis=1)))
         assert list_at(body, 0, tuple(1.1 * corners.mean(axis=0)), 1e-6, listed, work) == 0
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("wall_first", [True, False])
+def test_a_part_slides_along_a_wall_that_it_touches_whatever_else_is_near(share, wall_first):
+    """The box turns in the plane of the wall's face; beside it a sheet, 2 µm away, makes windows short."""
+    moving = pack_bodies([outside_of(corners_of([0.04, 0.06], [share * TOUCH, 0.01], [-0.05, 0.0]))])
+    wall = outside_of(corners_of([-0.2, 0.2], [-0.01, 0.0], [-0.2, 0.2]))
+    x, top = 0.06 + 2e-6, -0.05 + 5e-7
+    sheet = np.array([[x, 0.002, -0.07], [x, 0.008, -0.07], [x, 0.008, top], [x, 0.002, top]])
+    parts = [wall, Elements(sheet, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2))]
+    resting = pack_bodies([join_elements(parts if wall_first else parts[::-1])])
+    assert sorted(resting.hulls.convex) == [0, 1]
+    work = make_sweep_work(8, 0)
+    work.moving[:] = work.resting[:] = np.eye(3, 4)
+    assert sweep_body(moving, 0, resting, 0, np.array([[1.0, 0.0, 0.0]]), 1, TOUCH, 1e-3, work) == 1e-3
+
+
+def corners_of(*sides):
+    """Return the corners of a box."""
+    return np.array(np.meshgrid(*sides)).reshape(3, -1).T

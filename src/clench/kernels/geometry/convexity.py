@@ -12,7 +12,7 @@ FLAT = 1e-9
 
 
 def is_convex(vertices: Floats, elements: NDArray[np.int32]) -> bool:
-    """Say whether elements are one convex one, or a closed surface that bends the same way at every edge.
+    """Say whether there is one element only, or a closed surface that bends the same way at every edge.
 
     The answer is a hint: a surface that winds around itself seems to be convex as well.
 

@@ -153,9 +153,9 @@ def widest_gap(
         others, other: the other one; if its number is -1, the hull of `corners`, (K, 3).
         good: the search ends if no direction has a gap that is larger by more than this fraction [-], where both hulls
             are grown by this together [m].
-        work: four corners of the difference of both hulls, each with the number of either corner and its weight in the
-            point nearest to the origin; scratch space, and how many corners there are, with which the search begins,
-            (5, 6).
+        work: (5, 6). Rows 0 to 3: corners of the difference of both hulls, each with the numbers of its two corners and
+            its weight in the point nearest to the origin. The search begins with the corners that are there, and leaves
+            the last ones. The last number of row 4 says how many there are; the rest of it is scratch space.
         n: written, a unit vector in the frame of the other one; where the search begins if there are no corners, (3,).
     """
     x, y, z = n[0], n[1], n[2]

@@ -29,10 +29,14 @@ HERE, THERE, REST = 62, 65, 68
 STEPS = 16
 #: How near to the best direction the normals are [-].
 FINELY = 1e-3
-#: Parts touch below this share of `touch`, or of the gap that they begin with; a step keeps that one [-].
-CLOSE, KEPT = 0.75, 0.25
-#: The first step leads so far of the way that no point passes the gap on; the next ones leave so much of the gap [-].
-FIRST, LEFT = 0.5, 2.0 * FINELY
+#: Parts touch at a gap below this share of `touch`, or of the gap that they begin with if that is smaller [-].
+CLOSE = 0.75
+#: On a step the gap stays above this share of the same [-].
+KEPT = 0.25
+#: No point passes more than this share of the gap on the first step [-].
+FIRST = 0.5
+#: A later step is meant to leave this share of the gap [-].
+LEFT = 2.0 * FINELY
 #: Elements that touch are nearer to the nearest points of two hulls than this share of `touch` [-].
 EXACT = 0.1
 #: A step that fails becomes shorter by this factor; one on which the gap does not close is followed by a longer one.
@@ -65,8 +69,10 @@ def meet(
     gap = hull_gap(pair, motion, here, others, other, corners, radius, sweep)
     if gap <= 0.0:
         return -1.0
-    near = min(gap, pair.touch)
+    near, began = min(gap, pair.touch), gap <= pair.touch
     if s > 0.0 and gap <= CLOSE * pair.touch:
+        if sweep.met[1] != 0.0:
+            return -1.0
         put_meeting(s, others, other, corners, sweep)
         return s
     step, rate = FIRST * gap / motion.speed if gap > pair.touch else end - s, 0.0
@@ -81,7 +87,8 @@ def meet(
             n[0], n[1], n[2], step = x, y, z, SHORTER * step
             continue
         if step >= end - at:
-            return end
+            # Whether parts touch that begin to touch, and slide, their elements tell.
+            return -1.0 if began and later <= pair.touch else end
         at, rate = at + step, (gap - later) / step
         gap = later
         if gap <= CLOSE * near:
@@ -90,7 +97,6 @@ def meet(
         # The rate may have grown since the middle of the step.
         left, rate = (1.0 - LEFT) * gap - 0.5 * near, rate + 0.5 * motion.bend * step
         step = min(safe_step(max(left, 0.0), -rate, motion.bend), LONGER * step) if motion.bend > 0.0 else LONGER * step
-    # Whether parts touch that begin to touch, and slide, their elements tell.
     return at if at > s and gap > pair.touch else -1.0
 
 

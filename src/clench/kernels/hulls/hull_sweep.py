@@ -72,9 +72,10 @@ BESIDE = 0.125
 
 @kernel
 def clear_travel(pair: BodyPair, best: float, sweep: SweepWork) -> float:
-    """Return a travel up to which body `m` is farther than `touch` from body `r`; infinite if it is until `best`.
+    """Return a travel up to which body `m` stays off body `r`; infinite if it does until `best`.
 
-    If hulls of convex parts touch there, `sweep.near` names them.
+    The gap stays above `touch`, or above an eighth of it where convex parts may touch. If they touch at the travel,
+    `sweep.near` names them.
 
     Args:
         pair, sweep: see `sweep_body`.
@@ -116,7 +117,7 @@ def clear_hull(pair: BodyPair, hull: int, best: float, sweep: SweepWork) -> floa
     put_pose(pair.chain, pair.rows, 0.0, sweep, window[NOW:END])
     for c in range(3):
         window[LAST, c] = window[NOW + c, 3] - pair.resting.box[pair.r, c]
-    sweep.near[0] = -1
+    sweep.near[0], sweep.met[1] = -1, 0.0
     s, end = 0.0, best
     for _ in range(WINDOWS):
         sweep.met[0] = math.inf
@@ -128,6 +129,8 @@ def clear_hull(pair: BodyPair, hull: int, best: float, sweep: SweepWork) -> floa
             return end
         if end >= best:
             return math.inf
+        if sweep.met[0] < math.inf:
+            sweep.met[1] = 1.0
         s, end = end, min(best, end + LONGER * (end - s))
         copy_pose(window[END:SIMPLEX], window[NOW:END])
     sweep.near[1] = -1

@@ -25,7 +25,7 @@ from .turned_planes import COUNT, forget_turned, is_over, is_there, left_over, n
 
 #: Poses of the moving body in the resting one's frame where the window begins, and where it ends.
 NOW, END = 0, 3
-#: Scratch space of `separating_direction`. Corners of the element that is looked at.
+#: The corners that `widest_gap` ended with, and its scratch space. Corners of the element that is looked at.
 SIMPLEX, CORNERS = 6, 11
 #: The planes found last, the latest first: normal, the hull's height over it where the window begins, a bound on its
 #: height in a window of some length, and that length. Heights are infinite until they are asked for.

@@ -57,7 +57,8 @@ class MeetingWork(NamedTuple):
         lane: extent of each link along a direction [m], (K, 2).
         pair: the two candidates among those chosen, their links, whether the pair counts, how often it was looked at,
             and its elements that were nearest, (P, 8). at: up to where it is free, infinite if to the end, (P,).
-        plane: normal of a plane that separated it, (P, 3). reach: up to which gap it is measured [m], (P,).
+        plane: normal of a plane that separated it, and the last gap of links that touch from the start and part,
+            else 0 [m], (P, 4). reach: up to which gap it is measured [m], (P,).
         ahead: poses of two links further on, (2, 3, 4).
         touch: how the pair that was looked at last touches, as `Meetings.value`, (8,).
     """
@@ -110,7 +111,7 @@ def make_meeting_work(fingers: FingerLinks, candidates: int, joints: int) -> Mee
         np.empty((rows, 2)),
         np.empty((pairs, 8), dtype=np.int64),
         np.empty(pairs),
-        np.empty((pairs, 3)),
+        np.empty((pairs, 4)),
         np.empty(pairs),
         np.empty((2, 3, 4)),
         np.empty(8),

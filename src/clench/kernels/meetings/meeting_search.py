@@ -35,8 +35,9 @@ from .near_links import LENGTHS, TOUCH, elements_gap, links_gap, lowest_on, shor
 NEAR, CLOSE = 1e-5, 1e-7
 #: Up to which gap elements are measured at first, and how that grows while they are farther apart [m, -].
 REACH, WIDER = 1e-4, 4.0
-#: Links that touch part if they go on by more than this multiple of their gap [-].
-PARTING = 2.0
+#: Links that touch go on if a plane parts them for more than this multiple of their gap, which has to grow so much each
+#: time [-].
+PARTING, GROWING = 1.5, 1.01
 #: A pair counts as meeting after this many looks, which is safe.
 LOOKS = 20_000
 #: Result of a look: the pair continues, it is free to the end, it meets.
@@ -65,7 +66,7 @@ def list_pairs(
                     pair[0], pair[1], pair[2], pair[3], pair[4], pair[5] = a, b, m, r, 1, 0
                     pair[6], pair[7] = -1, -1
                     x, y, z = aside(full_width, one, link, other, met)
-                    plane[0], plane[1], plane[2] = x, y, z
+                    plane[0], plane[1], plane[2], plane[3] = x, y, z, 0.0
                     workspace.reach[count] = REACH
                     count += 1
     return count
@@ -175,10 +176,12 @@ def look_at(
         gap = links_gap(full_width.links, m, r, reach, (nx, ny, nz), pair[6:], sweep)
         if gap < reach:
             _, n, point = elements_gap(full_width.links, pair[6], pair[7], sweep)
-            if gap > 0.0 and (gap > TOUCH or at == 0.0):
+            # Links that touch before anything moves go on while they part.
+            parting = gap > 0.0 and (at == 0.0 or (plane[3] > 0.0 and gap >= GROWING * plane[3]))
+            if gap > TOUCH or parting:
                 step = step_by_parts(both, gap, n, pair[6:], at, end)
-            # Links that touch before anything moves go on if they part.
-            if (gap <= TOUCH and step * speeds_of(both, at) <= PARTING * gap) or pair[5] == LOOKS:
+            plane[3] = gap if gap <= TOUCH else 0.0
+            if (gap <= TOUCH and (not parting or step * speeds_of(both, at) <= PARTING * gap)) or pair[5] == LOOKS:
                 put_touch(gap, n, point, at, workspace.touch)
                 return MEETS
         else:

@@ -45,10 +45,11 @@ class SweepWork(NamedTuple):
         begun, turned, level: pose of a body that continues from its place, (3, 4), and its chain there, for any axes
             (J, 7) and for parallel ones (J + 1, 3).
         hull: scratch space of `hull_window`, (70, 6). round: that of `round_motion`, (12, 3).
-        near: the element that the hull came near to last, or -1; of the sweep the hull that touches, or -1, what it
-            touches, a resting hull or -1 and an element; of the window the resting hull that is touched, or -1; the
-            ball that may touch first, or -1, (6,).
-        met: the travel after which a hull touches in a window, (1,).
+        near: numbers or -1, (6,). 0: the element that the hull came near to last. 1: the hull that touches. 2 and 3:
+            the resting hull that it touches; without one, the element. 4: number 2 in the last window. 5: the ball
+            that may touch first.
+        met: the travel after which a hull touches in a window; whether the ends of earlier windows lay before such a
+            touch: then parts may be as near as that, (2,).
         listed: resting elements that a short sweep can meet, (32,).
         balls: those of a moving body, see `grid_travel`, (BODY_BALLS, 6).
         clear: a travel before which each link does not meet the object, (L,). order: links by this travel, (L,); lead:
@@ -133,7 +134,7 @@ def make_sweep_work(joints: int, links: int) -> SweepWork:
         np.empty((70, 6)),
         np.empty((12, 3)),
         np.full(6, -1, dtype=np.int64),
-        np.empty(1),
+        np.zeros(2),
         np.zeros(32, dtype=np.int64),
         np.empty((BODY_BALLS, 6)),
         np.empty(links),
