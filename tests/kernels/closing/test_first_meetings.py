@@ -8,8 +8,14 @@ from chain_hands import HandBuilder, Y, along_x
 from clench.closing import kernel_run
 from clench.core.pose import Pose
 from clench.kernels.closing.layout import CONTACT_WHICH
+from clench.kernels.runtime.by_reference import kept
+from clench.kernels.toi import toi_links
+from clench.kernels.toi.toi_links import Stage
 from clench.models.shapes import Shape, ShapeKind
 from kernels.closing.test_in_turn import facing
+from kernels.kernel_entries import entry
+
+is_known = entry(toi_links.is_known)
 
 
 def fist():
@@ -84,3 +90,27 @@ def test_what_is_known_does_not_hold_where_another_finger_is_in_the_way():
     solution = clench.solve(facing(), obj, command)
     assert solution.certified
     assert 0.0 < solution.joint_angles["b_0"] < 0.3
+
+
+def test_what_is_known_holds_for_its_own_segment_alone(monkeypatch):
+    """Another posture, rate, gap or a longer way, or links that rest elsewhere, are swept."""
+    seen = []
+    run = kernel_run.run_stages
+    monkeypatch.setattr(kernel_run, "run_stages", lambda problem, *rest: (seen.append(problem), run(problem, *rest)))
+    command = clench.GraspCommand(hand_pose=Pose([0.0, 0.0, -0.3]), preshape="open")
+    clench.solve_batch(fist(), clench.GraspObject.load("sphere:r=0.012"), [command.hand_pose], command)
+    full_width, chain = seen[0].arrays.full_width, seen[0].arrays.hand.chain
+    rates, touch, reach = full_width.first.rates[0].copy(), *full_width.first.known[0, :2]
+    T, still = np.eye(3, 4), np.zeros_like(rates)
+
+    def known(turns=still, rates=rates, touch=touch, best=reach, alone=True):
+        links = kept(full_width._replace(alone=alone))
+        return is_known(Stage(links, kept(chain), 0, T[None], T, turns, rates, float(touch)), float(best))
+
+    assert known()
+    assert known(best=0.1)
+    assert not known(turns=np.array([0.0, 1e-9]))
+    assert not known(rates=rates[::-1].copy())
+    assert not known(touch=2.0 * touch)
+    assert not known(best=1.01 * reach)
+    assert not known(alone=False)

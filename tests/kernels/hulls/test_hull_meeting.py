@@ -11,10 +11,11 @@ from clench.kernels.hulls import gjk, hull_meeting
 from clench.kernels.hulls.enclosing_hulls import HullPart, pack_hulls
 from clench.kernels.toi import core_motion
 from clench.kernels.toi import toi_work as sweeping
+from kernels.hulls.test_hull_sweep import drawn as drawn_parts
 from kernels.hulls.test_hull_sweep import first_contact
 from kernels.kernel_entries import entry
 from kernels.plain_sweeps import clear_travel, sweep_body, touching_elements
-from kernels.toi.test_toi_bodies import TOUCH, drawn_chain, pose
+from kernels.toi.test_toi_bodies import KINDS, TOUCH, drawn_chain, pose
 
 make_sweep_work, move_core = entry(sweeping.make_sweep_work), entry(core_motion.move_core)
 widest_gap, list_at = entry(gjk.widest_gap), entry(hull_meeting.list_at)
@@ -165,3 +166,39 @@ def test_a_part_slides_along_a_wall_that_it_touches_whatever_else_is_near(share,
 def corners_of(*sides):
     """Return the corners of a box."""
     return np.array(np.meshgrid(*sides)).reshape(3, -1).T
+
+
+@pytest.mark.parametrize("kinds", [(one, other) for one in KINDS for other in KINDS])
+def test_a_part_that_is_wrongly_told_to_fill_its_hull_meets_the_same(kinds):
+    """The elements that are named have to touch: else their own sweep decides."""
+    met = 0
+    for seed in range(16):
+        moving, resting, chain, best, work = drawn_parts(seed, kinds, bool(seed % 2))
+        right = sweep_body(moving, 0, resting, 0, chain, len(chain), TOUCH, best, work)
+        bodies = [b._replace(hulls=b.hulls._replace(convex=np.ones_like(b.hulls.convex))) for b in (moving, resting)]
+        found = sweep_body(bodies[0], 0, bodies[1], 0, chain, len(chain), TOUCH, best, work)
+        assert found == pytest.approx(right, abs=1e-6)
+        met += 0.0 < found < best
+    assert met >= 1
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_bodies_that_touch_at_the_start_go_on_as_their_elements_do(back):
+    """They begin where a sweep ended, and go on, or back until they meet on the other side."""
+    begun, met = 0, 0
+    for seed in range(150):
+        kinds = [SOLIDS[k] for k in np.random.default_rng(seed).integers(0, len(SOLIDS), 2)]
+        moving, resting, _, _, work = drawn(3 * seed, kinds)
+        chain = np.array([[1.0, 0.0, 0.0]])
+        at = sweep_body(moving, 0, resting, 0, chain, 1, TOUCH, 3.0, work)
+        if not 0.0 < at < 3.0:
+            continue
+        c, s = np.cos(at), np.sin(at)
+        work.moving[:] = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]) @ work.moving
+        chain[0, 0], begun = -1.0 if back else 1.0, begun + 1
+        first = first_contact(moving, resting, chain, TOUCH, 6.0, work).min()
+        found = sweep_body(moving, 0, resting, 0, chain, 1, TOUCH, 6.0, work)
+        assert found == pytest.approx(first, abs=1e-6)
+        met += found < 6.0
+    assert begun >= 40
+    assert met >= 10
