@@ -514,20 +514,36 @@ def test_fingers_that_touch_at_the_start_do_not_go_through_each_other(order):
     assert closed == 8
 
 
-@pytest.mark.parametrize("gap", [1e-12, 5e-12, 9e-12, 1e-9])
-@pytest.mark.parametrize("speed", [0.2, 0.5, 0.8])
-def test_fingers_that_touch_at_the_start_go_on_if_they_part(gap, speed):
-    """Two parallel capsules close side by side, the upper one faster, from a gap at which links count as meeting."""
+def two_parallel(gap, lower):
+    """Return a solve of two parallel capsules that close side by side, the upper one at 1 rad per unit.
+
+    Args:
+        gap: between them at the start [m]. lower: how fast and how far the lower one closes [rad].
+    """
     half = np.sqrt(0.5)
     capsule = Shape(ShapeKind.CAPSULE, (0.007, 0.025, 0.0), Pose([0.075, 0.0, 0.0], wxyz=[half, 0.0, half, 0.0]))
-    builder = HandBuilder().finger("lower", [capsule], [0.1], upper=speed)
+    builder = HandBuilder().finger("lower", [capsule], [0.1], upper=lower)
     hand = builder.finger("upper", [capsule], [0.1], base=mount((0.0, 0.0, 0.014 + gap)), upper=1.0).hand()
     command = clench.GraspCommand(
         hand_pose=Pose([0.0, 0.0, -1.0]),
         preshape="open",
         planes=1,
         order=clench.ClosingOrder.TOGETHER,
-        speeds={"lower_0": speed},
+        speeds={"lower_0": lower},
     )
-    solution = clench.solve(hand, clench.GraspObject.load("sphere:r=0.01"), command)
-    assert list(solution.joint_angles.values()) == pytest.approx([speed, 1.0], abs=1e-9)
+    return clench.solve(hand, clench.GraspObject.load("sphere:r=0.01"), command)
+
+
+@pytest.mark.parametrize("gap", [1e-12, 5e-12, 9e-12, 1e-9])
+@pytest.mark.parametrize("speed", [0.2, 0.5, 0.8])
+def test_fingers_that_touch_at_the_start_go_on_if_they_part(gap, speed):
+    """The upper one is faster. At the least gaps links count as meeting."""
+    assert list(two_parallel(gap, speed).joint_angles.values()) == pytest.approx([speed, 1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("gap", [1e-12, 5e-12, 9e-12])
+def test_fingers_that_touch_at_the_start_hold_each_other_if_they_do_not_part(gap):
+    """The lower one is faster."""
+    solution = two_parallel(gap, 1.5)
+    assert list(solution.joint_angles.values()) == pytest.approx([0.0, 0.0], abs=1e-8)
+    assert solution.certified
