@@ -206,13 +206,19 @@ def begin_candidate(closing: Closing, i: int) -> None:
     full_width, work, sweep = closing.full_width, closing.work, closing.sweep
     finger_posture = closing.candidates.finger_posture[i]
     if full_width.requested[i]:
-        for link in range(sweep.poses.shape[0]):
-            copy_pose(full_width.link_pose[finger_posture, link], sweep.poses[link])
+        put_resting(full_width, finger_posture, sweep)
     sweep.skipped[0] = 0
     # Travels of other finger postures' joints are never written: they would continue with the values of the candidate
     # before.
     for j in range(work.rates.shape[0]):
         work.rates[j] = 0.0
+
+
+@kernel
+def put_resting(full_width: FullWidthArrays, finger_posture: int, sweep: SweepWork) -> None:
+    """Write where all links are before any joint of a finger posture moves."""
+    for link in range(sweep.poses.shape[0]):
+        copy_pose(full_width.link_pose[finger_posture, link], sweep.poses[link])
 
 
 @kernel

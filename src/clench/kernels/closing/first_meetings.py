@@ -7,11 +7,11 @@ import math
 from clench.core.tolerances import SWEEP_FRACTION
 from clench.kernels.runtime.compiling import entry_kernel, kernel
 from clench.kernels.sections.advance import make_work
-from clench.kernels.sections.plane_pose import copy_pose, pose_axis_group
+from clench.kernels.sections.plane_pose import pose_axis_group
 from clench.kernels.toi.toi_links import Stage, put_first_meeting
 from clench.kernels.toi.toi_work import SweepWork, make_sweep_work
 
-from .close_candidate import beyond, dof_axis_group, finger_posture_joints
+from .close_candidate import beyond, dof_axis_group, finger_posture_joints, put_resting
 from .layout import ClosingArrays, Work
 from .segments import ALL, next_segment
 from .solve_layout import ProblemArrays
@@ -52,8 +52,7 @@ def find_first_meeting(
     start, axis_group = hand.first_axis_group[finger_posture], dof_axis_group(hand, dof)
     for k in range(start, hand.first_axis_group[finger_posture + 1]):
         pose_axis_group(hand, k, k == start, turns, work, axis_groups)
-    for link in range(sweep.poses.shape[0]):
-        copy_pose(full_width.link_pose[finger_posture, link], sweep.poses[link])
+    put_resting(full_width, finger_posture, sweep)
     touch, T = SWEEP_FRACTION * hand.axis_group_length[axis_group], full_width.link_pose[finger_posture, 0]
     stage = Stage(full_width, hand.chain, finger_posture, axis_groups, T, turns, work.rates, touch)
     put_first_meeting(stage, beyond(end, joints, work.rates), work, sweep)

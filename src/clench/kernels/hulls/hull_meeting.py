@@ -75,7 +75,7 @@ def meet(
             return -1.0
         put_meeting(s, others, other, corners, sweep)
         return s
-    step, rate = FIRST * gap / motion.speed if gap > pair.touch else end - s, 0.0
+    step = end - s if began else FIRST * gap / motion.speed
     for _ in range(STEPS):
         step = min(step, end - at)
         x, y, z = n[0], n[1], n[2]

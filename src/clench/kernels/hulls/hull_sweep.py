@@ -225,6 +225,7 @@ def keep_off_node(
     remember_plane(v, start, low, end - s, window)
     if low <= top:
         end = shorten(pair, motion, v, start, top, s, end, sweep)
+        put_turned(motion, window[NOW:END], window[END:SIMPLEX], end - s, window)
     return False, end
 
 
@@ -312,9 +313,7 @@ def touch_at(
     hulls, window, points, (s, last) = pair.moving.hulls, sweep.hull, sweep.hull[CORNERS : CORNERS + corners], span
     end = meet(pair, motion, others, other, points, radius, span, sweep)
     if s <= end < last:
-        put_pose(pair.chain, pair.rows, end, sweep, window[END:SIMPLEX])
-        put_turned(motion, window[NOW:END], window[END:SIMPLEX], end - s, window)
-        forget_shorter(0.0, window)
+        move_end(pair, motion, s, end, sweep)
         sweep.near[4] = other
         n = (window[LAST, 0], window[LAST, 1], window[LAST, 2])
         start = height(hulls, motion, window[NOW:END], n)
@@ -341,22 +340,28 @@ def lengthen(
             ends. ends: of the window the start, the end, and the latest end.
     """
     window, (s, known, last), (gap, left) = sweep.hull, ends, gaps
-    now, then, end = window[NOW:END], window[END:SIMPLEX], last
+    end = last
     top = top_along(others, other, points, w, normal_of(0, False, window))
     for _ in range(TURNS):
         if left < gap:
             end = min(end, s + (1.0 - LEFT) * (known - s) * gap / (gap - left))
         if end <= known:
             break
-        put_pose(pair.chain, pair.rows, end, sweep, then)
-        put_turned(motion, now, then, end - s, window)
+        move_end(pair, motion, s, end, sweep)
         if left_over(0, top, top_along(others, other, points, w, normal_of(0, True, window)), window) > 0.0:
             forget_shorter(end - s, window)
             return end
         end = known + BACK * (end - known)
-    put_pose(pair.chain, pair.rows, known, sweep, then)
-    put_turned(motion, now, then, known - s, window)
+    move_end(pair, motion, s, known, sweep)
     return known
+
+
+@kernel
+def move_end(pair: BodyPair, motion: HullMotion, s: float, end: float, sweep: SweepWork) -> None:
+    """End a window from `s` elsewhere: write the hull's pose there, and where the planes that turn are."""
+    window = sweep.hull
+    put_pose(pair.chain, pair.rows, end, sweep, window[END:SIMPLEX])
+    put_turned(motion, window[NOW:END], window[END:SIMPLEX], end - s, window)
 
 
 @kernel
@@ -372,7 +377,7 @@ def shorten(
 ) -> float:
     """Return an earlier end of a window: until then a hull is above `top` along a direction.
 
-    `END` gets the pose there, and the plane that was remembered last the bound on its height.
+    `END` gets the pose there, and the plane that was remembered last the bound on its height. Planes that turn stay.
 
     Args:
         n: the direction, from what rests to the hull. start: height of the hull along it at `s`.
@@ -389,5 +394,4 @@ def shorten(
         if left > 0.0 or length <= least:
             break
     window[PLANES, 4], window[PLANES, 5] = left + top, s + length - s
-    put_turned(motion, window[NOW:END], window[END:SIMPLEX], length, window)
     return s + length

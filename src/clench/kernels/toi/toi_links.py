@@ -215,21 +215,31 @@ def sweep_stage(stage: Stage, best: float, work: Work, sweep: SweepWork) -> tupl
         which has every link where it is at the start of the segment, describe it. A link that overlaps the object
         already gives `OVERLAP`; links that overlap each other already are left alone, and counted.
     """
-    full_width, chain, finger_posture, rates = stage.full_width, stage.chain, stage.finger_posture, stage.rates
-    first = 0
-    while first < rates.shape[0] and rates[first] == 0.0:
-        first += 1
-    if first == rates.shape[0]:
+    first = place_stage(stage, work, sweep)
+    if first == stage.rates.shape[0]:
         return best, -1
-    several = place_active(stage, first, work, sweep)
-    pose_movers(full_width, chain, finger_posture, stage.turns, sweep.poses)
-    put_lanes(stage, several, first, sweep)
     best, met = sweep_towards_object(stage, first, best, work, sweep)
     if best < 0.0:
         return best, met
     if is_known(stage, best):
         return take_first_meeting(stage, best, met, sweep)
     return sweep_hand(stage, first, best, met, work, sweep)
+
+
+@kernel
+def place_stage(stage: Stage, work: Work, sweep: SweepWork) -> int:
+    """Place joints, axes and links where a segment begins, and return the first active joint.
+
+    Without one the result is how many joints there are, and nothing is placed.
+    """
+    first, rates = 0, stage.rates
+    while first < rates.shape[0] and rates[first] == 0.0:
+        first += 1
+    if first < rates.shape[0]:
+        several = place_active(stage, first, work, sweep)
+        pose_movers(stage.full_width, stage.chain, stage.finger_posture, stage.turns, sweep.poses)
+        put_lanes(stage, several, first, sweep)
+    return first
 
 
 @kernel
@@ -280,15 +290,10 @@ def put_first_meeting(stage: Stage, reach: float, work: Work, sweep: SweepWork) 
     """Write what the links of a finger posture meet of the hand on their first path segment; see `FirstMeetings`.
 
     Args:
-        stage: the segment. reach: how far it is swept, at least as far as it goes.
+        stage: the segment, on which a joint moves. reach: how far it is swept, at least as far as it goes.
     """
-    full_width, finger_posture, first = stage.full_width, stage.finger_posture, 0
+    full_width, finger_posture, first = stage.full_width, stage.finger_posture, place_stage(stage, work, sweep)
     known, met = full_width.first.known[finger_posture], full_width.first.met[finger_posture]
-    while stage.rates[first] == 0.0:
-        first += 1
-    several = place_active(stage, first, work, sweep)
-    pose_movers(full_width, stage.chain, finger_posture, stage.turns, sweep.poses)
-    put_lanes(stage, several, first, sweep)
     sweep.skipped[0] = 0
     known[0], known[1] = stage.touch, reach
     known[2], met[0] = sweep_hand(stage, first, reach, -1, work, sweep)
