@@ -11,6 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from clench.core.exceptions import ClenchError
+from clench.core.files.json_files import write_atomically
+
 #: A file in use gets a new time at most this often [s].
 RENEWED_AFTER: Final = 3600.0
 
@@ -42,6 +45,20 @@ def _platforms_folder() -> Path:
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base)
+
+
+def keep_file(path: Path, content: bytes, most_files: int, most_together: float = math.inf) -> None:
+    """Write a file, and remove the oldest of its kind beyond the bounds; if that cannot be done, nothing is kept.
+
+    Args:
+        path, most_files, most_together: see `remove_oldest`; the ending of the name tells the kind.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, content)
+        remove_oldest(path.parent, path.suffix.removeprefix("."), most_files, most_together)
+    except (ClenchError, OSError):
+        return
 
 
 def note_use(file: Path, written: float) -> None:

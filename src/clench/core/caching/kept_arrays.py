@@ -18,10 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from clench.core.exceptions import ClenchError
-from clench.core.files.json_files import write_atomically
-
-from .cache_folder import cache_folder, note_use, remove_oldest
+from .cache_folder import cache_folder, keep_file, note_use
 
 Arrays = list[np.ndarray[Any, Any]]
 
@@ -108,12 +105,7 @@ def _keep(path: Path, key: str, arrays: Arrays) -> None:
         body += bytes(-(start + len(body)) % _ALIGNED) + a.tobytes("A")
     if start + len(body) > MOST_BYTES:
         return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, _head(key, _digest(rows, body), rows) + bytes(body))
-        remove_oldest(path.parent, "arrays", MOST_FILES, MOST_TOGETHER)
-    except (ClenchError, OSError):
-        return
+    keep_file(path, _head(key, _digest(rows, body), rows) + bytes(body), MOST_FILES, MOST_TOGETHER)
 
 
 def _head(key: str, digest: str, rows: list[Any]) -> bytes:

@@ -15,10 +15,10 @@ from typing import Any, Final
 
 import msgspec
 
-from clench.core.caching.cache_folder import cache_folder, note_use, remove_oldest
+from clench.core.caching.cache_folder import cache_folder, keep_file, note_use
 from clench.core.caching.fingerprint import fingerprint
 from clench.core.exceptions import ClenchError
-from clench.core.files.json_files import read_json, write_atomically
+from clench.core.files.json_files import read_json
 from clench.models.hand.hand import Hand
 
 #: The value of this environment variable that switches the files off is "0".
@@ -94,14 +94,8 @@ def keep_preshapes(key: str, preshapes: Sequence[Entry]) -> None:
     if path is None:
         return
     content = msgspec.json.encode(_File(SCHEMA, key, _digest(preshapes), list(preshapes)))
-    if len(content) > MOST_BYTES:
-        return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, content)
-        remove_oldest(path.parent, "json", MOST_FILES)
-    except (ClenchError, OSError):
-        return
+    if len(content) <= MOST_BYTES:
+        keep_file(path, content, MOST_FILES)
 
 
 def _path(key: str) -> Path | None:
