@@ -1,15 +1,16 @@
 """Hands that are brought up stop where they touch, judged by sampled places along the way."""
 
+import fcl
 import numpy as np
 import pytest
 
 import clench
-from clench.closing.collision.depths import hand_depths
 from clench.closing.collision.packed_object import pack_object
-from clench.core.pose import invert
 from clench.models.objects.obstacles import table
-from clench.planner.approach_check import OFF, SHORT, Approach
+from clench.planner.approach_check import OFF, SHORT, Approach, Approached
 from clench.planner.proposals import DEEP, Arm, Proposals, frames, turns_about, vary
+from engine.collisions import Collisions
+from engine.statistics import HANDS
 
 
 def draws(count: int) -> Proposals:
@@ -23,37 +24,58 @@ def draws(count: int) -> Proposals:
     return Proposals(np.arange(count) % 2, T, np.zeros((count, 3)))
 
 
-@pytest.mark.parametrize("with_table", [False, True])
-def test_no_hand_overlaps_on_its_way_and_each_goes_as_far_as_it_may(with_table):
-    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("cylinder:r=0.03,h=0.12")
-    if with_table:
-        obj = obj.with_body(table(-0.06))
-    packed, q = pack_object(obj), hand.open_angles()
-    arms = (Arm(0, ("thumb",), False), Arm(0, ("thumb",), True))
-    asked = draws(80 if not with_table else 200)
-    came = Approach(hand, q[None], packed).bring_up(asked, arms, 2)
+def check(hand, obj, arms, asked) -> Approached:
+    """Bring up a hand, and let fcl judge where it stops, by triangles that are off by a micrometre at most."""
+    q = hand.open_angles()
+    came = Approach(hand, q[None], pack_object(obj)).bring_up(asked, arms, 2)
     assert len(came.proposals) + len(came.stopped) + len(came.obstacle) == len(asked)
-    assert len(came.proposals) > 5
-    assert len(came.stopped) > 5
-    assert (len(came.obstacle) > 0) == with_table
+    judge, poses = Collisions(hand, obj), hand.link_poses(q)
 
     def overlaps(T) -> bool:
-        return any(depth.place is not None for depth in hand_depths(hand, q, packed, invert(T)))
+        placed = [fcl.Transform((T @ pose)[:3, :3], (T @ pose)[:3, 3]) for pose in poses]
+        links = [fcl.CollisionObject(t, at) for at, trees in zip(placed, judge.links, strict=True) for t in trees]
+        return any(fcl.collide(link, body) for link in links for body in judge.objects)
 
     for arm, T in zip(came.proposals.arm, came.proposals.T_object_palm, strict=True):
         into = T[:3, :3] @ hand.palm_normal
         start = next(p for p in asked.T_object_palm if np.allclose(p[:3, :3], T[:3, :3]))
         gone = float((T[:3, 3] - start[:3, 3]) @ into)
-        most = DEEP if arm else 0.0
+        most = DEEP if arms[arm].deep else 0.0
         assert -SHORT - 1e-9 <= gone <= most + 1e-9
-        for back in (0.0, 0.01, 0.05, 0.15):
-            before = T.copy()
-            before[:3, 3] -= back * into
-            assert not overlaps(before)
+
+        def after(way, T=T, into=into):
+            moved = T.copy()
+            moved[:3, 3] += way * into
+            return moved
+
+        assert not any(overlaps(after(-back)) for back in (0.0, 0.01, 0.05, 0.15))
         if gone < most - 1e-9:
-            after = T.copy()
-            after[:3, 3] += (OFF + 1e-6) * into
-            assert overlaps(after)
+            assert not overlaps(after(OFF - 1e-9))
+            assert overlaps(after(OFF + 1e-4))
+    return came
+
+
+@pytest.mark.parametrize("with_table", [False, True])
+def test_no_hand_overlaps_on_its_way_and_each_goes_as_far_as_it_may(with_table):
+    hand, obj = clench.Hand.load("robonaut2"), clench.GraspObject.load("cylinder:r=0.03,h=0.12")
+    if with_table:
+        obj = obj.with_body(table(-0.06))
+    arms = (Arm(0, ("thumb",), False), Arm(0, ("thumb",), True))
+    came = check(hand, obj, arms, draws(80 if not with_table else 200))
+    assert len(came.proposals) > 5
+    assert len(came.stopped) > 5
+    assert (len(came.obstacle) > 0) == with_table
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", ["Allegro", "LEAP"])
+@pytest.mark.parametrize("made_of", ["mug", "scan"])
+def test_hands_of_meshes_stop_where_their_links_touch(shared_data, name, made_of):
+    """LEAP's palm is concave: its triangles tell where it stops."""
+    hand = clench.Hand.load(shared_data / HANDS[name])
+    obj = clench.GraspObject.load("mug" if made_of == "mug" else shared_data / "objects/ycb_mug/textured.obj")
+    came = check(hand, obj, (Arm(0, ("thumb",), False), Arm(0, ("thumb",), True)), draws(60))
+    assert len(came.proposals) > 5
 
 
 def test_frames_and_turns_are_rotations_with_the_given_axes():

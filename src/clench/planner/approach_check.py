@@ -9,6 +9,7 @@ import numpy as np
 
 from clench.closing.collision.depths import link_mesh_arrays, object_mesh
 from clench.closing.collision.packed_object import PackedObject
+from clench.closing.link_bodies import link_bodies
 from clench.core.pose import FloatArray
 from clench.core.threads import share_out
 from clench.models.hand.forward import poses_at
@@ -55,22 +56,23 @@ class Approach:
 
     def bring_up(self, proposals: Proposals, arms: tuple[Arm, ...], threads: int) -> Approached:
         """Return the proposals that arrive, each at its place or where the object stops the hand shortly before."""
-        from clench.kernels.mechanics.placing import Placed, bring_up
+        from clench.kernels.mechanics.placing import Placed, Target, bring_up
 
         count, packed = len(proposals), self.packed
         shape = np.array([arm.shape for arm in arms], dtype=np.int64)[proposals.arm]
-        out = Placed(np.empty(count), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64))
+        out = Placed(np.empty(count), np.empty(count, dtype=np.int64))
         T = np.ascontiguousarray(proposals.T_object_palm[:, :3])
         ball = np.array([*packed.center, packed.radius])
-        meshes, solid = link_mesh_arrays(self.hand), object_mesh(packed)
+        meshes, hulls = link_mesh_arrays(self.hand), link_bodies(self.hand, self.hand.default_source).hulls
+        target = Target(object_mesh(packed), packed.bodies, packed.element_body, ball)
         normal = np.ascontiguousarray(self.hand.palm_normal)
 
         most = np.where(np.array([arm.deep for arm in arms])[proposals.arm], DEEP, 0.0)
         ahead = most + OFF
 
         def run(some: slice) -> None:
-            part = Placed(out.travel[some], out.body[some], out.link[some])
-            bring_up(meshes, self._poses, shape[some], T[some], normal, solid, ball, ahead[some], SHORT - OFF, part)
+            part = Placed(out.travel[some], out.body[some])
+            bring_up(meshes, hulls, self._poses, shape[some], T[some], normal, target, ahead[some], SHORT - OFF, part)
 
         ends = np.linspace(0, count, min(count, 4 * threads) + 1).astype(int).tolist()
         share_out(run, [slice(a, b) for a, b in pairwise(ends)], threads)
