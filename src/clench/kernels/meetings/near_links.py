@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
@@ -37,25 +38,59 @@ FLAT = 1e-2
 CLOSING = 0.999
 
 
-@kernel
-def put_sides(n: Vector, sweep: SweepWork) -> None:
-    """Write a unit vector in the frames of both bodies of `sweep`, and where these are along it, to `sweep.plane`."""
-    plane = sweep.plane
-    for c in range(3):
-        plane[c] = n[0] * sweep.moving[0, c] + n[1] * sweep.moving[1, c] + n[2] * sweep.moving[2, c]
-        plane[4 + c] = n[0] * sweep.resting[0, c] + n[1] * sweep.resting[1, c] + n[2] * sweep.resting[2, c]
-    plane[3] = n[0] * sweep.moving[0, 3] + n[1] * sweep.moving[1, 3] + n[2] * sweep.moving[2, 3]
-    plane[7] = n[0] * sweep.resting[0, 3] + n[1] * sweep.resting[1, 3] + n[2] * sweep.resting[2, 3]
+class Sides(NamedTuple):
+    """A unit vector as two links see it.
+
+    Args:
+        one, other: in the frame of either link. height: how far the first frame is beyond the other one [m].
+    """
+
+    one: Vector
+    other: Vector
+    height: float
+
+
+class StepPlane(NamedTuple):
+    """A plane between two links on a step.
+
+    Args:
+        now, ahead: its normal where the step begins, and where it ends. bend: see `lowest_on`.
+    """
+
+    now: Sides
+    ahead: Sides
+    bend: float
 
 
 @kernel
-def are_apart(links: BodyArrays, a: int, b: int, gap: float, along: float, sweep: SweepWork) -> bool:
-    """Say whether two items are that far apart, as balls tell, or so far along the vector of `put_sides`."""
-    if ball_gap(links, a, links, b, sweep) >= gap:
-        return True
-    plane = sweep.plane
-    low = span(links, a, plane[0], plane[1], plane[2])[0] + plane[3]
-    return bool(low - span(links, b, plane[4], plane[5], plane[6])[1] - plane[7] >= along)
+def sides_of(n: Vector, one: Floats, other: Floats) -> Sides:
+    """Return a unit vector in the frames of two poses, and how far the first pose is beyond the other along it."""
+    return Sides(
+        (
+            n[0] * one[0, 0] + n[1] * one[1, 0] + n[2] * one[2, 0],
+            n[0] * one[0, 1] + n[1] * one[1, 1] + n[2] * one[2, 1],
+            n[0] * one[0, 2] + n[1] * one[1, 2] + n[2] * one[2, 2],
+        ),
+        (
+            n[0] * other[0, 0] + n[1] * other[1, 0] + n[2] * other[2, 0],
+            n[0] * other[0, 1] + n[1] * other[1, 1] + n[2] * other[2, 1],
+            n[0] * other[0, 2] + n[1] * other[1, 2] + n[2] * other[2, 2],
+        ),
+        n[0] * (one[0, 3] - other[0, 3]) + n[1] * (one[1, 3] - other[1, 3]) + n[2] * (one[2, 3] - other[2, 3]),
+    )
+
+
+@kernel
+def gap_over(links: BodyArrays, a: int, b: int, sides: Sides) -> float:
+    """Return how far an item of one link is beyond an item of another one."""
+    u, v, height = sides
+    return float(span(links, a, u[0], u[1], u[2])[0] - span(links, b, v[0], v[1], v[2])[1] + height)
+
+
+@kernel
+def are_apart(links: BodyArrays, a: int, b: int, gap: float, along: float, sides: Sides, sweep: SweepWork) -> bool:
+    """Say whether two items are that far apart, as balls tell, or so far along a vector."""
+    return bool(ball_gap(links, a, links, b, sweep) >= gap or gap_over(links, a, b, sides) >= along)
 
 
 @kernel
@@ -81,18 +116,19 @@ def links_gap(links: BodyArrays, m: int, r: int, bound: float, n: Vector, near: 
         gap, there, _ = elements_gap(links, near[0], near[1], sweep)
         if gap < best:
             best, n = gap, there
-    put_sides(n, sweep)
+    sides = sides_of(n, sweep.moving, sweep.resting)
+    last = sides
     waiting = push_roots(links, m, links, r, stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        if are_apart(links, a, b, best, best, sweep):
+        if are_apart(links, a, b, best, best, sides, sweep) or gap_over(links, a, b, last) >= best:
             continue
         if a < 0 and b < 0:
             gap, n, _ = elements_gap(links, -1 - a, -1 - b, sweep)
+            last = sides_of(n, sweep.moving, sweep.resting)
             if gap < best:
-                best, near[0], near[1] = gap, -1 - a, -1 - b
-                put_sides(n, sweep)
+                best, sides, near[0], near[1] = gap, last, -1 - a, -1 - b
             continue
         height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
         put_nearest_last(links, links, stack, waiting, height, sweep)
@@ -142,39 +178,64 @@ def step_by_parts(pair: LinkPair, gap: float, n: Vector, near: Ints, at: float, 
     if step <= least:
         return least
     put_ahead(pair, at + step)
-    put_sides(n, pair.sweep)
     found = step_by_hulls(pair, n, at, until, step, across)
     if found < 0.0:
         put_ahead(pair, at + step)
-        found = step_by_elements(pair, near, at, until, step, across / speed)
+        sides = sides_of(n, pair.sweep.moving, pair.sweep.resting)
+        found = step_by_elements(pair, near, at, until, step, across / speed, sides)
     return max(found, least)
 
 
 @kernel
-def step_by_elements(pair: LinkPair, near: Ints, at: float, until: float, step: float, share: float) -> float:
+def step_by_elements(
+    pair: LinkPair, near: Ints, at: float, until: float, step: float, share: float, sides: Sides
+) -> float:
     """Return how far of a step planes between the elements of two links keep these apart; see `step_by_parts`.
 
+    The plane between two elements keeps most of their neighbours apart as well.
+
     Args:
-        share: of their speed, by which they approach each other along the vector of `put_sides`.
+        share: of their speed, by which they approach each other along a vector. sides: the vector.
     """
     links, sweep, stack = pair.full_width.links, pair.sweep, pair.sweep.stack
     speed = speeds_of(pair, at)
     # The nearest elements tell most.
-    step = step_of_elements(pair, near[0], near[1], at, until, step)
+    step, n = step_of_elements(pair, near[0], near[1], at, until, step)
+    plane = plane_across(pair, n, at, until)
     m, r = pair.rows
     waiting = push_roots(links, pair.fingers.link[m], links, pair.fingers.link[r], stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        if are_apart(links, a, b, speed * step, share * speed * step, sweep):
+        if are_apart(links, a, b, speed * step, share * speed * step, sides, sweep):
+            continue
+        if stay_apart(links, a, b, plane, step):
             continue
         if a < 0 and b < 0:
-            step = step_of_elements(pair, -1 - a, -1 - b, at, until, step)
+            step, n = step_of_elements(pair, -1 - a, -1 - b, at, until, step)
+            plane = plane_across(pair, n, at, until)
             continue
         height = split_pair(links, a, links, b, is_wider(links, a, links, b), stack, waiting)
         put_nearest_last(links, links, stack, waiting, height, sweep)
         waiting = height
     return step
+
+
+@kernel
+def plane_across(pair: LinkPair, n: Vector, at: float, until: float) -> StepPlane:
+    """Return the plane across a unit vector on a step, to which `workspace.ahead` belongs."""
+    sweep, ahead = pair.sweep, pair.workspace.ahead
+    bend = approach_along(pair, n, at, until)[2]
+    return StepPlane(sides_of(n, sweep.moving, sweep.resting), sides_of(n, ahead[0], ahead[1]), bend)
+
+
+@kernel
+def stay_apart(links: BodyArrays, a: int, b: int, plane: StepPlane, step: float) -> bool:
+    """Say whether a plane keeps two items apart on a step; see `are_apart`."""
+    margin = gap_over(links, a, b, plane.now)
+    if margin <= TOUCH:
+        return False
+    return bool(lowest_on(step, margin, gap_over(links, a, b, plane.ahead), plane.bend) > 0.5 * TOUCH)
 
 
 @kernel
@@ -208,14 +269,16 @@ def put_ahead(pair: LinkPair, at: float) -> None:
 
 
 @kernel
-def step_of_elements(pair: LinkPair, i: int, k: int, at: float, until: float, step: float) -> float:
+def step_of_elements(pair: LinkPair, i: int, k: int, at: float, until: float, step: float) -> tuple[float, Vector]:
     """Return how far of a step, to which `workspace.ahead` belongs, a plane is seen to keep two elements apart.
+
+    Return also the unit vector between them where the step begins.
 
     Args:
         i, k: the elements. until: up to where every joint turns evenly.
     """
     gap, n, _ = elements_gap(pair.full_width.links, i, k, pair.sweep)
-    return step_along(pair, i, k, gap, n, at, until, step)
+    return step_along(pair, i, k, gap, n, at, until, step), n
 
 
 @kernel
