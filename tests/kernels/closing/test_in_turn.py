@@ -6,6 +6,7 @@ import pytest
 import clench
 from chain_hands import HandBuilder, Y, along_x, mount
 from clench.closing import kernel_run
+from clench.core.pose import Pose
 from clench.kernels.closing import in_turn
 from clench.kernels.closing.layout import CONTACT_DOF, ClosingArrays
 from clench.kernels.closing.solve_layout import FINISH
@@ -78,6 +79,26 @@ def test_a_finger_closes_anew_from_its_first_joint_if_that_meets(monkeypatch):
         one, other = answer_at(part.final, n), answer_at(whole.final, n)
         assert np.array_equal(one.turn[1], other.turn[1])
         assert np.array_equal(one.contact[1], other.contact[1])
+
+
+@pytest.mark.parametrize("early", [1e-10, 1e-5])
+def test_a_touch_of_the_object_is_kept_where_another_finger_is_met_just_after_it(early):
+    """The second finger touches the object; by so many radians later it would meet the first one."""
+    r, reach, high = 0.006, 0.09, 0.09
+    builder = HandBuilder().finger("a", [along_x(r, 0.08)], [0.08], axes=[-Y], upper=0.3)
+    hand = builder.finger("b", [along_x(r, reach)], [reach], base=mount((0.0, 0.0, high)), axes=[Y], upper=1.2).hand()
+    far = clench.GraspObject.load("sphere:r=0.004", pose=Pose([1.0, 0.0, 0.0]))
+    command = clench.GraspCommand(hand_pose=Pose.identity(), preshape="open", measure=False)
+    met = clench.solve(hand, far, command).joint_angles["b_0"]
+    assert 0.1 < met < 1.0
+    turn, size = met - early, 0.004
+    link, under = np.array([np.cos(turn), 0.0, -np.sin(turn)]), np.array([-np.sin(turn), 0.0, -np.cos(turn)])
+    place = [0.0, 0.0, high] + 0.03 * link + (r + size) * under
+    ball = clench.GraspObject.load(f"sphere:r={size}", pose=Pose(place))
+    solution = clench.solve(hand, ball, command)
+    assert solution.joint_angles["b_0"] == pytest.approx(turn, abs=1e-9)
+    assert solution.fingers["b"].status == "touch"
+    assert {contact.body for contact in solution.contacts if contact.finger == "b"} == {ball.bodies[0].name}
 
 
 def test_only_what_came_from_a_joint_on_is_taken_back(monkeypatch):

@@ -57,7 +57,7 @@ def find_blocked(
     blocked: Ints,
 ) -> None:
     """Write which finger postures overlap the object at first, see `Closed`; their candidates then move nothing."""
-    candidates, command = problem.candidates, problem.command
+    candidates = problem.candidates
     for finger_posture in range(blocked.shape[0]):
         link = -1
         for i in range(candidates.finger_posture.shape[0]):
@@ -68,17 +68,7 @@ def find_blocked(
         if link >= 0:
             blocked[finger_posture] = CROSSED + link
         else:
-            blocked[finger_posture] = start_overlap(
-                problem.full_width.link_pose[finger_posture],
-                problem.meshes,
-                command.own[finger_posture],
-                command.resting[finger_posture],
-                problem.mesh,
-                problem.target.bodies,
-                T_palm_object,
-                command.full_width,
-                space.depth,
-            )
+            blocked[finger_posture] = start_overlap(problem, finger_posture, T_palm_object, space)
     for i in range(candidates.finger_posture.shape[0]):
         if blocked[candidates.finger_posture[i]]:
             # The link stays: this may run again for the same answers.

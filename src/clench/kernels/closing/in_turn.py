@@ -24,9 +24,9 @@ def close_in_turn(
 ) -> int:
     """Close fingers anew that meet another one, each with the earlier ones where they are by then.
 
-    A finger's set stands once the sets before it do. A finger closes anew from the joint on whose motion meets another
-    finger: the joints before it end where they did. Sets of a single plane, and those of fingers that overlap the
-    object before they move, stay as they are.
+    A finger's set stands once the sets before it do. A finger that meets another one stops there, and closes anew from
+    the next joint on: the joints before end where they did. Sets of a single plane, and those of fingers that overlap
+    the object before they move, stay as they are.
 
     Args:
         final: answers of the picked candidates, which are overwritten. blocked: see `Closed`. anew: written where a
@@ -40,13 +40,16 @@ def close_in_turn(
     while True:
         place_fingers(problem, space, final)
         others = among(problem.full_width, space.swept, nothing.bodies, space.placed, problem.apart)
-        f, dof = first_meeting(
+        f, dof, stops = first_meeting(
             problem, with_lengths(hand, space.length), others, T_palm_object, space, final, blocked, first
         )
         if f < 0:
             return 0
         everything = among(problem.full_width, space.swept, target.bodies, space.placed, problem.across)
         dof = undo_from(hand, space.picked.finger_posture[f], dof, final, f)
+        if stops:
+            stop_there(hand, dof, space.spare, final, f)
+            dof += 1
         times = problem.command.times
         close_on_object(problem, everything, space.picked, T_palm_object, space, final, f, dof, times, False)
         if final.overflow[f] > 0:
@@ -86,11 +89,12 @@ def first_meeting(
     final: ClosingArrays,
     blocked: Ints,
     first: int,
-) -> tuple[int, int]:
+) -> tuple[int, int, bool]:
     """Return the first finger from `first` on that meets another finger's links on the path to its set, or -1.
 
-    The second result is the degree of freedom on whose motion it does. Fingers that close in several rounds, or whose
-    joints break away, do not follow one path: they always close again.
+    The second result is the degree of freedom on whose motion it does. The third one says whether that stops there, as
+    `space.spare` has it: before the end of its motion nothing else is in the way. Fingers that close in several rounds,
+    or whose joints break away, do not follow one path: they always close again.
     """
     nothing, spare, picked = problem.nothing, space.spare, space.picked
     for f in range(first, picked.finger_posture.shape[0]):
@@ -99,7 +103,7 @@ def first_meeting(
             continue
         begin, end = hand.first_dof[finger_posture], hand.first_dof[finger_posture + 1]
         if problem.command.times > 1 or breaks_away(hand, finger_posture):
-            return f, begin
+            return f, begin, False
         clear_answer(spare, f)
         closing = Closing(
             hand,
@@ -118,10 +122,10 @@ def first_meeting(
             close_dofs(closing, f, False, (dof, dof + 1))
             # Links that overlap at the start are left alone, and counted, wherever the finger begins anew.
             if space.sweep.skipped[0] > 0:
-                return f, begin
+                return f, begin, False
             if spare.contacts[f] > 0:
-                return f, dof
-    return -1, -1
+                return f, dof, final.skipped[f] == 0 and spare.travel[f, dof] < hand.chain.dof_length[dof]
+    return -1, -1, False
 
 
 @kernel
@@ -143,6 +147,26 @@ def undo_from(hand: HandArrays, finger_posture: int, dof: int, answer: ClosingAr
             if hand.chain.joint_dof[j] == g:
                 answer.turn[i, j] = 0.0
     return dof
+
+
+@kernel
+def stop_there(hand: HandArrays, dof: int, met: ClosingArrays, answer: ClosingArrays, i: int) -> None:
+    """Let a degree of freedom of a candidate, and it alone, end where it meets another finger.
+
+    Args:
+        met: has how it ends, and the one contact. answer: of the candidate, in which it has not moved; written.
+    """
+    n = answer.contacts[i]
+    answer.travel[i, dof] = met.travel[i, dof]
+    for j in range(hand.chain.joint_dof.shape[0]):
+        if hand.chain.joint_dof[j] == dof:
+            answer.turn[i, j] = met.turn[i, j]
+    if n < answer.contact.shape[1]:
+        for k in range(answer.contact.shape[2]):
+            answer.contact[i, n, k] = met.contact[i, 0, k]
+        for k in range(answer.point.shape[2]):
+            answer.point[i, n, k] = met.point[i, 0, k]
+        answer.contacts[i] = n + 1
 
 
 @kernel

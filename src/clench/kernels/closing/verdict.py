@@ -52,8 +52,7 @@ def judge_pose(
         touching += 1 if solved.fingers[n, f] == TOUCH else 0
         stuck += 1 if blocked[space.picked.finger_posture[f]] else 0
         apart = apart and found.overlapping[n, f] == 0
-    bodies, depth = problem.target.bodies, space.depth
-    free = not any_deep(problem.meshes, command.fixed, command.start_pose, problem.mesh, bodies, T_palm_object, depth)
+    free = not any_deep(problem, command.fixed, command.start_pose, T_palm_object, space)
     certified = free and stuck == 0 and apart and found.nested[n] == 0
     certified = certified and is_certified(problem, T_palm_object, space, final, solved.angles[n])
     solved.certified[n] = 1 if certified else 0

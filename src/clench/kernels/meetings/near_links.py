@@ -12,7 +12,7 @@ from clench.kernels.geometry.vectors import Vector
 from clench.kernels.hulls.near_hulls import have_hulls, hulls_gap, parting, put_between
 from clench.kernels.runtime.compiling import kernel
 from clench.kernels.toi.core_motion import plane_gap
-from clench.kernels.toi.separating_planes import span
+from clench.kernels.toi.sides import Sides, gap_over, sides_of
 from clench.kernels.toi.toi_work import (
     SweepWork,
     ball_gap,
@@ -38,18 +38,6 @@ FLAT = 1e-2
 CLOSING = 0.999
 
 
-class Sides(NamedTuple):
-    """A unit vector as two links see it.
-
-    Args:
-        one, other: in the frame of either link. height: how far the first frame is beyond the other one [m].
-    """
-
-    one: Vector
-    other: Vector
-    height: float
-
-
 class StepPlane(NamedTuple):
     """A plane between two links on a step.
 
@@ -63,34 +51,9 @@ class StepPlane(NamedTuple):
 
 
 @kernel
-def sides_of(n: Vector, one: Floats, other: Floats) -> Sides:
-    """Return a unit vector in the frames of two poses, and how far the first pose is beyond the other along it."""
-    return Sides(
-        (
-            n[0] * one[0, 0] + n[1] * one[1, 0] + n[2] * one[2, 0],
-            n[0] * one[0, 1] + n[1] * one[1, 1] + n[2] * one[2, 1],
-            n[0] * one[0, 2] + n[1] * one[1, 2] + n[2] * one[2, 2],
-        ),
-        (
-            n[0] * other[0, 0] + n[1] * other[1, 0] + n[2] * other[2, 0],
-            n[0] * other[0, 1] + n[1] * other[1, 1] + n[2] * other[2, 1],
-            n[0] * other[0, 2] + n[1] * other[1, 2] + n[2] * other[2, 2],
-        ),
-        n[0] * (one[0, 3] - other[0, 3]) + n[1] * (one[1, 3] - other[1, 3]) + n[2] * (one[2, 3] - other[2, 3]),
-    )
-
-
-@kernel
-def gap_over(links: BodyArrays, a: int, b: int, sides: Sides) -> float:
-    """Return how far an item of one link is beyond an item of another one."""
-    u, v, height = sides
-    return float(span(links, a, u[0], u[1], u[2])[0] - span(links, b, v[0], v[1], v[2])[1] + height)
-
-
-@kernel
 def are_apart(links: BodyArrays, a: int, b: int, gap: float, along: float, sides: Sides, sweep: SweepWork) -> bool:
     """Say whether two items are that far apart, as balls tell, or so far along a vector."""
-    return bool(ball_gap(links, a, links, b, sweep) >= gap or gap_over(links, a, b, sides) >= along)
+    return bool(ball_gap(links, a, links, b, sweep) >= gap or gap_over(links, a, links, b, sides) >= along)
 
 
 @kernel
@@ -122,7 +85,7 @@ def links_gap(links: BodyArrays, m: int, r: int, bound: float, n: Vector, near: 
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        if are_apart(links, a, b, best, best, sides, sweep) or gap_over(links, a, b, last) >= best:
+        if are_apart(links, a, b, best, best, sides, sweep) or gap_over(links, a, links, b, last) >= best:
             continue
         if a < 0 and b < 0:
             gap, n, _ = elements_gap(links, -1 - a, -1 - b, sweep)
@@ -232,10 +195,10 @@ def plane_across(pair: LinkPair, n: Vector, at: float, until: float) -> StepPlan
 @kernel
 def stay_apart(links: BodyArrays, a: int, b: int, plane: StepPlane, step: float) -> bool:
     """Say whether a plane keeps two items apart on a step; see `are_apart`."""
-    margin = gap_over(links, a, b, plane.now)
+    margin = gap_over(links, a, links, b, plane.now)
     if margin <= TOUCH:
         return False
-    return bool(lowest_on(step, margin, gap_over(links, a, b, plane.ahead), plane.bend) > 0.5 * TOUCH)
+    return bool(lowest_on(step, margin, gap_over(links, a, links, b, plane.ahead), plane.bend) > 0.5 * TOUCH)
 
 
 @kernel

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.core_distance import separation
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.trees.obb import slab_top
 
 from .core_motion import MovingCore, plane_offset
+from .sides import span
 from .toi_bounds import stays_above
 from .toi_work import SweepWork
 
@@ -51,22 +49,6 @@ def stays_beyond(ka: int, wa: float, chain: Floats, count: int, begin: float, be
     """Say whether the moving item in `work` is seen to stay beyond its plane from `begin` until `best`."""
     nx, ny, nz, offset = work.plane[0], work.plane[1], work.plane[2], work.plane[3]
     return bool(stays_above(MovingCore(work.core, ka, chain, count, work.placed), nx, ny, nz, offset + wa, begin, best))
-
-
-@kernel
-def span(bodies: BodyArrays, n: int, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return the smallest and largest coordinate of an item, a node's box or an element, along a unit vector."""
-    if n >= 0:
-        slab = bodies.slab[n]
-        middle = x * slab[0] + y * slab[1] + z * slab[2]
-        top = slab_top(slab, x, y, z)
-        return middle - (top - middle), top
-    low, high = math.inf, -math.inf
-    for k in range(bodies.corners[-1 - n]):
-        p = bodies.vertices[bodies.elements[-1 - n, k]]
-        at = x * p[0] + y * p[1] + z * p[2]
-        low, high = min(low, at), max(high, at)
-    return low - bodies.radius[-1 - n], high + bodies.radius[-1 - n]
 
 
 @kernel

@@ -16,7 +16,7 @@ from clench.kernels.runtime.compiling import kernel
 from clench.kernels.sections.plane_pose import put_point
 from clench.kernels.trees.obb import put_slab_core, slab_misses, slab_slack
 
-from .core_motion import plane_gap
+from .sides import gap_over, sides_of
 from .spatial_motion import SPATIAL
 
 #: Pairs of nodes that wait at most: every level of either tree adds one, and no tree is deeper than 96.
@@ -323,21 +323,19 @@ def bodies_overlap(
         flush: sharp faces that only touch do not count. Faces alone do not tell bodies whose edges coincide from such
             that lie in each other: only where depth is measured as well. listed: see `push_first`.
     """
-    stack, nx, ny, nz = work.stack, 0.0, 0.0, 0.0
+    stack, sides = work.stack, sides_of((0.0, 0.0, 0.0), work.moving, work.resting)
     waiting = push_first(moving, m, resting, r, listed, work.listed, stack)
     while waiting > 0:
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        if ball_gap(moving, a, resting, b, work) > 0.0:
+        # A plane that separated two elements separates most of their neighbours.
+        if ball_gap(moving, a, resting, b, work) > 0.0 or gap_over(moving, a, resting, b, sides) > 0.0:
             continue
         if a < 0 or b < 0:
             ka, wa = put_item(moving, a, work.moving, work.core)
             kb, wb = put_item(resting, b, work.resting, work.fixed)
-            # A plane that separated two elements separates most of their neighbours.
-            if plane_gap(work.core, ka, work.fixed, kb, nx, ny, nz) > wa + wb:
-                continue
             if a < 0 and b < 0:
-                d, mx, my, mz, _, _, _, _, _ = separation(work.core, ka, work.fixed, kb)
+                d, nx, ny, nz, _, _, _, _, _ = separation(work.core, ka, work.fixed, kb)
                 work.pair[0], work.pair[1] = -1 - a, -1 - b
                 if d - wa - wb < -allowed:
                     return True
@@ -345,7 +343,7 @@ def bodies_overlap(
                     if not (flush and wa + wb == 0.0 and only_touch(work.core, ka, work.fixed, kb)):
                         return True
                 else:
-                    nx, ny, nz = mx, my, mz
+                    sides = sides_of((nx, ny, nz), work.moving, work.resting)
                 continue
             if a >= 0 and slab_misses(moving.slab[a], work.moving, work.fixed, kb, wb):
                 continue
