@@ -26,11 +26,17 @@ TOLERANCE = 1e-5
 angles = st.lists(st.floats(-1.6, 1.6), min_size=4, max_size=4)
 
 
-def two_chains(box: bool = False, apart: float = 0.05) -> Hand:
-    """Return two fingers of two links each, whose axes are not parallel, so that they can meet anywhere."""
-    shape = along_x(RADIUS, LENGTH)
-    if box:
-        shape = Shape(ShapeKind.BOX, (LENGTH / 2, RADIUS, RADIUS / 2), Pose([LENGTH / 2, 0.0, 0.0]))
+def two_chains(boxes: int = 0, apart: float = 0.05) -> Hand:
+    """Return two fingers of two links each, whose axes are not parallel, so that they can meet anywhere.
+
+    Args:
+        boxes: end to end of each link; 0: it is a capsule. apart: of the fingers [m].
+    """
+    shape: Shape | tuple[Shape, ...] = along_x(RADIUS, LENGTH)
+    if boxes:
+        half = LENGTH / (2 * boxes)
+        places = [Pose([(2 * k + 1) * half, 0.0, 0.0]) for k in range(boxes)]
+        shape = tuple(Shape(ShapeKind.BOX, (half, RADIUS, RADIUS / 2), place) for place in places)
     builder = HandBuilder().finger("a", [shape, shape], [LENGTH, LENGTH], axes=[Y, Z], lower=-2.0)
     tilted = mount((0.0, apart, 0.01))
     return builder.finger("b", [shape, shape], [LENGTH, LENGTH], base=tilted, axes=[Z, Y], lower=-2.0).hand()
@@ -72,13 +78,13 @@ def along(path: FloatArray, place: float) -> FloatArray:
     return path[k] + (place - k) * (path[k + 1] - path[k])
 
 
-@pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
+@pytest.mark.parametrize("boxes", [0, 1, 2], ids=["capsules", "boxes", "pairs of boxes"])
 @settings(max_examples=40, deadline=None)
 @given(points=st.lists(angles, min_size=2, max_size=4))
 @example(points=[[0.0, 0.0, -1.0, 0.0], [-1.0, 0.0, 0.0, 0.0]])  # edges cross, and are farther apart than they are deep
-def test_a_free_path_has_no_overlap_and_the_first_one_is_found(box: bool, points: list[list[float]]) -> None:
-    hand, path = two_chains(box), np.array(points)
-    depth = box_depth if box else capsule_depth
+def test_a_free_path_has_no_overlap_and_the_first_one_is_found(boxes: int, points: list[list[float]]) -> None:
+    hand, path = two_chains(boxes), np.array(points)
+    depth = box_depth if boxes else capsule_depth
     if depth(hand, path[0]) > 0.0:
         return
     found = find_path_overlap(hand, path, SOURCE)
@@ -181,10 +187,10 @@ def crowded() -> clench.GraspObject:
     return replace(box, bodies=(*box.bodies, Body("needle", (needle,), BodyRole.OBSTACLE)))
 
 
-@pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
+@pytest.mark.parametrize("boxes", [0, 1, 2], ids=["capsules", "boxes", "pairs of boxes"])
 @pytest.mark.parametrize("with_object", [False, True], ids=["alone", "object"])
-def test_a_path_is_free_where_no_overlap_is_found_whatever_is_suspected(box: bool, with_object: bool) -> None:
-    hand, rng = two_chains(box), np.random.default_rng(7)
+def test_a_path_is_free_where_no_overlap_is_found_whatever_is_suspected(boxes: int, with_object: bool) -> None:
+    hand, rng = two_chains(boxes), np.random.default_rng(7)
     around = place_object(crowded(), np.eye(4)) if with_object else None
     paths = [rng.uniform(-0.6, 0.6, (3, len(hand.joints))) for _ in range(40)]
     found = [find_path_overlap(hand, path, SOURCE, around) for path in paths]
@@ -201,9 +207,9 @@ def test_a_path_is_free_where_no_overlap_is_found_whatever_is_suspected(box: boo
         assert check_path(hand, path, SOURCE, around)[0] == overlap
 
 
-@pytest.mark.parametrize("box", [False, True], ids=["capsules", "boxes"])
-def test_a_free_path_that_begins_without_an_overlap_is_free_backwards(box: bool) -> None:
-    hand, rng, free = two_chains(box), np.random.default_rng(11), 0
+@pytest.mark.parametrize("boxes", [0, 1, 2], ids=["capsules", "boxes", "pairs of boxes"])
+def test_a_free_path_that_begins_without_an_overlap_is_free_backwards(boxes: int) -> None:
+    hand, rng, free = two_chains(boxes), np.random.default_rng(11), 0
     around = place_object(crowded(), np.eye(4))
     for path in rng.uniform(-0.6, 0.6, (60, 2, len(hand.joints))):
         overlap, begun = check_path(hand, path, SOURCE, around)

@@ -44,14 +44,19 @@ def drawn(seed, kinds):
 def test_links_are_apart_by_their_hulls_almost_as_far_as_least_squares_tell(seed, kinds):
     two, links, work, rng = drawn(seed, kinds)
     n = rng.normal(size=3)
-    found, side = links_parting(links, 0, 1, tuple(n / np.linalg.norm(n)), work)
-    gaps = [
-        distance(a, b) - wide - wider
+    found, side, others = links_parting(links, 0, 1, tuple(n / np.linalg.norm(n)), work)
+    placed = [
+        (a, wide, b, wider)
         for a, wide in placed_parts(two[0], work.moving)
         for b, wider in placed_parts(two[1], work.resting)
     ]
+    gaps = [distance(a, b) - wide - wider for a, wide, b, wider in placed]
     assert np.linalg.norm(side) == pytest.approx(1.0)
     assert found <= max(min(gaps), 0.0) + 1e-6
+    assert found <= others <= max(sorted(gaps)[1], 0.0) + 1e-6
+    # Two parts are apart along the vector by so much, or overlap by so much.
+    along = [(a @ side).min() - (b @ side).max() - wide - wider for a, wide, b, wider in placed]
+    assert min(abs(gap - found) for gap in along) <= 1e-9
     if min(gaps) > 1e-3:
         # Radii are taken off after the search, which ends at a tenth of the distance between the corners.
         widest = two[0].radius.max() + two[1].radius.max()

@@ -33,26 +33,26 @@ def put_between(one: Floats, other: Floats, sweep: SweepWork) -> None:
 
 
 @kernel
-def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork) -> tuple[float, Vector]:
+def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork) -> tuple[float, Vector, float]:
     """Return how far the hulls of two links are apart, a little less at most, and along which unit vector [m].
 
-    If hulls overlap, the result is not positive.
+    If hulls overlap, that is not positive: two of them overlap by so much along the vector. The last result is how far
+    any other two are apart.
 
     Args:
-        m, r: the links; without hulls, the result is -∞. n: where the search begins. sweep: has their poses.
+        m, r: the links; without hulls, the results are -∞. n: where the search begins. sweep: has their poses.
     """
-    hulls, least, side = links.hulls, math.inf, n
+    hulls, least, side, others = links.hulls, math.inf, n, math.inf
     if not have_hulls(links, m, r):
-        return -math.inf, n
+        return -math.inf, n, -math.inf
     put_between(sweep.moving, sweep.resting, sweep)
     for i in range(hulls.body[m], hulls.body[m + 1]):
         for k in range(hulls.body[r], hulls.body[r + 1]):
             gap, found = parting(hulls, (i, k), n, sweep.moving, sweep.resting, sweep)
+            others = min(others, max(gap, least))
             if gap < least:
                 least, side = gap, found
-            if least <= 0.0:
-                return least, side
-    return least, side
+    return least, side, others
 
 
 @kernel

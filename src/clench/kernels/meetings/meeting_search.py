@@ -170,7 +170,7 @@ def look_at(
         return MEETS
     gap, n = margin, (nx, ny, nz)
     if margin <= NEAR:
-        gap, n = links_parting(full_width.links, m, r, n, sweep)
+        gap, n, _ = links_parting(full_width.links, m, r, n, sweep)
     if gap <= CLOSE or pair[5] == LOOKS:
         reach = workspace.reach[p] if pair[5] < LOOKS else math.inf
         gap = links_gap(full_width.links, m, r, reach, (nx, ny, nz), pair[6:], sweep)

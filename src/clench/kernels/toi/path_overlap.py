@@ -12,6 +12,7 @@ from typing import Final
 
 from clench.kernels.closing.layout import Floats
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, depth_of, has_contained, mesh_of
+from clench.kernels.geometry.vectors import dot
 from clench.kernels.hulls.near_elements import list_touching
 from clench.kernels.hulls.near_hulls import links_parting
 from clench.kernels.runtime.compiling import entry_kernel, kernel
@@ -26,6 +27,7 @@ from .pair_motion import (
     put_left,
     put_turning,
     target_of,
+    turned,
 )
 from .pair_planes import keep_direction, keep_normal, parted_share
 from .path_lines import PAIR, keep_lines, place_on_path
@@ -51,8 +53,9 @@ BALLS: Final = 0.25
 def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -> float:
     """Return the gap of a pair in its present place, minus its depth where the pair overlaps; `APART` if larger [m].
 
-    If the hulls of two links are apart, that gap is returned, which is no larger. The direction between the hulls, or
-    between the closest elements, is kept as the normal of a plane that may part the pair.
+    If the hulls of two links are apart, or overlap by less than counts, that is returned, which is no larger. The
+    direction between the hulls, or between the closest elements, is kept as the normal of a plane that may part the
+    pair.
 
     Args:
         was_apart: the pair did not overlap at all where it was looked at last. It has not moved by more than `OVERLAP`
@@ -63,9 +66,8 @@ def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -
     if balls_gap(problem, m, r, work) >= APART:
         return APART
     if r >= 0:
-        gap, side = links_parting(problem.links, m, r, (0.0, 0.0, 1.0), work.sweep)
-        if gap > FOUND:
-            keep_direction(side, work)
+        gap = gap_of_hulls(problem, m, r, work)
+        if gap >= -FOUND - problem.allowed[p]:
             return min(gap, APART)
     target, b = target_of(problem, r)
     work.sweep.pair[0] = -1
@@ -80,6 +82,22 @@ def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -
         return gap
     depth = depth_between(problem, m, r, work)
     return -depth if depth > max(0.0, -gap) else gap
+
+
+@kernel
+def gap_of_hulls(problem: PathProblem, m: int, r: int, work: PathWork) -> float:
+    """Return how far the hulls of two links are apart in their present place; minus how far they overlap at most [m].
+
+    The direction between the hulls is kept. A point in two hulls that moves along it leaves one of them after their
+    overlap, and no other hull is as near as that. Otherwise the result is -∞.
+    """
+    sweep, kept = work.sweep, (work.normal[0], work.normal[1], work.normal[2])
+    n = turned(sweep.resting, kept) if dot(kept, kept) > 0.0 else (0.0, 0.0, 1.0)
+    gap, side, others = links_parting(problem.links, m, r, n, sweep)
+    if gap <= 0.0 and others <= -gap:
+        return -math.inf
+    keep_direction(side, work)
+    return gap
 
 
 @kernel
