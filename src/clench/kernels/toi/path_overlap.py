@@ -40,7 +40,7 @@ FOUND: Final = 5e-6
 #: The sweep takes a pair up to this gap [m].
 TOUCH: Final = 1e-6
 #: The sweep continues with a pair whose gap has grown to this [m].
-APART: Final = 2e-5
+APART: Final = 3e-6
 #: Bodies that overlapped where the path began are looked at in steps of this motion until they are apart [m].
 EXEMPT_STEP: Final = 2e-4
 #: No pair is looked at more often on one path: bodies that rub against each other all the way are given up.
