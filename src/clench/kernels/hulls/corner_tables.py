@@ -24,8 +24,8 @@ Small = NDArray[np.int32]
 #: Squares along an edge of the cube before any is divided.
 WIDE: Final = 8
 #: A cone with more corners is divided, this often at most.
-ENOUGH: Final = 12
-DEEPEST: Final = 4
+ENOUGH: Final = 16
+DEEPEST: Final = 3
 #: By which a cone is widened [-].
 SLACK: Final = 1e-6
 #: Cones and entries for each corner that are expected at first.
