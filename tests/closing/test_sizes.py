@@ -25,10 +25,18 @@ def test_the_size_of_a_hand(hand):
 @pytest.mark.parametrize(
     ("model", "scale", "advised"),
     [
-        ("sphere:r=3", 1.0, "if its lengths are in millimetres, load it with a scale of 0.001"),
-        ("sphere:r=30", 1.0, "if its lengths are in millimetres, load it with a scale of 0.001"),
-        ("mug", 1000.0, "if the scale of 1000 makes it a thousand times too large, load it with a scale of 1"),
-        ("mug", 40.0, "if the scale of 40 makes it a thousand times too large, load it with a scale of 0.04"),
+        ("sphere:r=3", 1.0, "if its lengths are in millimetres, load it with a scale of 0.001 (--scale 0.001)"),
+        ("sphere:r=30", 1.0, "if its lengths are in millimetres, load it with a scale of 0.001 (--scale 0.001)"),
+        (
+            "mug",
+            1000.0,
+            "if the scale of 1000 makes it a thousand times too large, load it with a scale of 1 (--scale 1)",
+        ),
+        (
+            "mug",
+            40.0,
+            "if the scale of 40 makes it a thousand times too large, load it with a scale of 0.04 (--scale 0.04)",
+        ),
     ],
 )
 def test_millimetres_taken_for_metres(model, scale, advised, hand):
@@ -74,8 +82,12 @@ def test_the_command_line_says_it_once(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("model", "scale", "advised"),
     [
-        ("mug", 0.001, "if the scale of 0.001 makes it a thousand times too small, load it with a scale of 1"),
-        ("sphere:r=0.0004", 1.0, "if its units are not metres, load it with another scale"),
+        (
+            "mug",
+            0.001,
+            "if the scale of 0.001 makes it a thousand times too small, load it with a scale of 1 (--scale 1)",
+        ),
+        ("sphere:r=0.0004", 1.0, "if its units are not metres, load it with another scale (--scale)"),
     ],
 )
 def test_a_speck(model, scale, advised, hand):

@@ -60,6 +60,19 @@ def test_choices_are_the_values_of_the_enumerations() -> None:
     assert set(Format.__args__) == set(GraspFormat)
 
 
+def test_a_film_without_a_picture_is_told(
+    solution: GraspSolution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from clench.execution.simulation.filming import Film
+
+    assert solution.hand == "robonaut2"
+    for name in ("__post_init__", "begin", "look", "still"):
+        monkeypatch.setattr(Film, name, lambda *_: None)
+    main(["execute", str(tmp_path / "s.json"), "--video", str(tmp_path / "a.gif"), "--json"])
+    assert "Nothing moved: no picture was written." in json.loads(capsys.readouterr().out)["notes"]
+    assert not (tmp_path / "a.gif").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -82,7 +82,7 @@ def unit_warnings(vertices: FloatArray, name: str, scale: float = 1.0) -> tuple[
 
 def smaller(scale: float) -> str:
     """Return the advice for an object that is too large, by the scale that it was loaded with [-]."""
-    advised = f"load it with a scale of {MILLIMETRE * scale:g}"
+    advised = f"load it with a scale of {MILLIMETRE * scale:g} (--scale {MILLIMETRE * scale:g})"
     if scale == 1.0:
         return f"if its lengths are in millimetres, {advised}"
     return f"if the scale of {scale:g} makes it a thousand times too large, {advised}"
@@ -91,8 +91,8 @@ def smaller(scale: float) -> str:
 def larger(scale: float) -> str:
     """Return the advice for an object that is too small, by the scale that it was loaded with [-]."""
     if scale == 1.0:
-        return "if its units are not metres, load it with another scale"
-    advised = f"load it with a scale of {scale / MILLIMETRE:g}"
+        return "if its units are not metres, load it with another scale (--scale)"
+    advised = f"load it with a scale of {scale / MILLIMETRE:g} (--scale {scale / MILLIMETRE:g})"
     return f"if the scale of {scale:g} makes it a thousand times too small, {advised}"
 
 

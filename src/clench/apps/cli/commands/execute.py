@@ -126,8 +126,8 @@ def execute(
             report = clench.execute(the_solution, moved, speed=speed, force=force, next_steps=not skip_next_steps)
     except KeyboardInterrupt:
         report, interrupted = report_of(moved), True
-    if film is not None:
-        film.finish()
+    if film is not None and not film.finish():
+        report = replace(report, notes=(*report.notes, "Nothing moved: no picture was written."))
     if log is not None and report.history is None:
         report = replace(report, notes=(*report.notes, "Nothing was measured on the way: no log was written."))
     elif log is not None:
