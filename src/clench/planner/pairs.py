@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clench.closing.collision.approach import GraspableSurface
 from clench.closing.collision.packed_object import PackedObject
@@ -69,10 +70,12 @@ def opposing_pairs(
     points, normals = points[usable], normals[usable]
     if len(points) < 2:
         raise ObjectError(f"object '{obj.name}': expected surface to touch in the regions, found next to none.")
-    between = points[None] - points[:, None]
-    width = np.linalg.norm(between, axis=2)
-    way = between / np.maximum(width, 1e-9)[..., None]
-    opposed = np.minimum(-np.einsum("abk,ak->ab", way, normals), np.einsum("abk,bk->ab", way, normals))
+    squares = _squares(points)
+    width = np.sqrt(squares)
+    # How far each place lies beyond each other one along the normal of this one. Few columns: threads would only wait.
+    beyond = np.einsum("ak,bk->ab", normals, points)
+    beyond -= beyond.diagonal()[:, None].copy()
+    opposed = -np.maximum(beyond, beyond.T) / np.maximum(width, 1e-9)
     fits = (width > _NEAREST) & (width < widest)
     for lean in _LEAN:
         first, second = np.nonzero(fits & (opposed > np.cos(min(lean * np.arctan(friction), 1.3))))
@@ -83,17 +86,35 @@ def opposing_pairs(
         first, second = first[some], second[some]
     order = np.argsort(width[first, second], kind="stable")
     first, second = first[order], second[order]
-    spread = _spread(points)
-    way = way[first, second]
+    spread = _spread(points, squares < _AROUND**2)
+    way = (points[second] - points[first]) / width[first, second, None]
     along, longer = _extent(spread[first] + spread[second], way)
     return Pairs(0.5 * (points[first] + points[second]), way, width[first, second], along, longer)
 
 
-def _spread(points: FloatArray) -> FloatArray:
-    """Return the second moments of the points around each point, no farther than `_AROUND`, shape (N, 3, 3)."""
-    between = points[None] - points[:, None]
-    near = np.einsum("abk,abk->ab", between, between) < _AROUND**2
-    moments: FloatArray = np.einsum("ab,abi,abj->aij", near.astype(np.float64), between, between, optimize=True)
+def _squares(points: FloatArray) -> FloatArray:
+    """Return the squared distances of points from each other [m²], shape (N, N)."""
+    total = np.zeros((len(points), len(points)))
+    for column in points.T:
+        between = column[None] - column[:, None]
+        between *= between
+        total += between
+    return total
+
+
+def _spread(points: FloatArray, near: NDArray[np.bool_]) -> FloatArray:
+    """Return the second moments of the points near each point about it, shape (N, 3, 3).
+
+    Args:
+        points: shape (N, 3). near: which of them (column) are near which (row), shape (N, N).
+    """
+    # About their middle, sums of points near each other lose nothing to rounding that counts.
+    about = points - points.mean(axis=0)
+    outer = about[:, :, None] * about[:, None, :]
+    sums = np.einsum("kb,ab->ak", np.vstack([about.T, outer.reshape(-1, 9).T]), near.astype(np.float64))
+    mixed = about[:, :, None] * sums[:, None, :3]
+    moments: FloatArray = sums[:, 3:].reshape(-1, 3, 3) + near.sum(axis=1)[:, None, None] * outer
+    moments -= mixed + mixed.transpose(0, 2, 1)
     return moments
 
 
