@@ -7,7 +7,7 @@ from clench.kernels.geometry.link_frames import put_links, tie
 from clench.kernels.geometry.link_meshes import find_contained
 from clench.kernels.meetings.meeting_layout import Meetings
 from clench.kernels.runtime.compiling import kernel
-from clench.kernels.toi.full_width import find_link_overlap
+from clench.kernels.toi.full_width import link_overlap
 
 from .bundles import among
 from .choosing import holds, read_candidate
@@ -169,7 +169,7 @@ def is_certified(
         return False
     put_links(frames, angles, space.poses, poses)
     everything = among(problem.full_width, space.swept, problem.target.bodies, space.placed, problem.across)
-    return bool(find_link_overlap(everything, poses, T_palm_object, ALLOWED_PENETRATION)[0] < 0)
+    return bool(link_overlap(everything, poses, T_palm_object, ALLOWED_PENETRATION, space.sweep)[0] < 0)
 
 
 @kernel

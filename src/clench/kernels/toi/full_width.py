@@ -254,8 +254,15 @@ def find_link_overlap(
         full_width: the hand and the object. poses: `T_palm_link` of every link, (L, 3, 4). T_palm_object: (3, 4).
         allowed: how far round bodies may overlap [m].
     """
+    return link_overlap(full_width, poses, T_palm_object, allowed, make_sweep_work(0, full_width.checked.shape[0]))
+
+
+@kernel
+def link_overlap(
+    full_width: FullWidthArrays, poses: Floats, T_palm_object: Floats, allowed: float, sweep: SweepWork
+) -> tuple[int, int]:
+    """Return what `find_link_overlap` does, with scratch space."""
     links = full_width.checked.shape[0]
-    sweep = make_sweep_work(0, links)
     for m in range(links):
         copy_pose(poses[m], sweep.moving)
         copy_pose(T_palm_object, sweep.resting)
