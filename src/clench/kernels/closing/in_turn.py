@@ -48,6 +48,7 @@ def close_in_turn(
         everything = among(problem.full_width, space.swept, target.bodies, space.placed, problem.across)
         dof = undo_from(hand, space.picked.finger_posture[f], dof, final, f)
         if stops:
+            # No link was left alone, so `undo_from` has not gone back further.
             stop_there(hand, dof, space.spare, final, f)
             dof += 1
         times = problem.command.times
@@ -92,9 +93,9 @@ def first_meeting(
 ) -> tuple[int, int, bool]:
     """Return the first finger from `first` on that meets another finger's links on the path to its set, or -1.
 
-    The second result is the degree of freedom on whose motion it does. The third one says whether that stops there, as
-    `space.spare` has it: before the end of its motion nothing else is in the way. Fingers that close in several rounds,
-    or whose joints break away, do not follow one path: they always close again.
+    The second result is the degree of freedom on whose motion it does. The third one says that this degree of freedom
+    ends at the meeting, which `space.spare` holds. If it is False, the whole motion has to be closed again. Fingers
+    that close in several rounds, or whose joints break away, do not follow one path: they always close again.
     """
     nothing, spare, picked = problem.nothing, space.spare, space.picked
     for f in range(first, picked.finger_posture.shape[0]):

@@ -69,6 +69,7 @@ def are_hulls_off(problem: ProblemArrays, k: int, T_palm_link: Floats, T_palm_ob
         return False
     copy_pose(T_palm_link, sweep.moving)
     copy_pose(T_palm_object, sweep.resting)
+    # An object without a grid has few elements, which are its shapes or lie in them.
     near = DIFFER * problem.meshes.radius[k]
     if bodies.grid.square.shape[0] > 0:
         near += AWAY * bodies.grid.place[3]

@@ -37,7 +37,7 @@ class HullPart(NamedTuple):
 
     Args:
         points: [m], (P, 3). radius: by which their hull is grown to enclose the part [m].
-        convex: whether the part seems to fill its hull. No answer depends on it.
+        convex: whether the part fills its hull, see `is_convex`.
     """
 
     points: Floats
@@ -54,7 +54,7 @@ class HullArrays(NamedTuple):
         box: pose of a box around the corners of each hull, and half its sizes [m], (H, 3, 5).
         ball: centre and radius of balls that cover a body together [m], (K, 4). cover: first ball of each hull,
             (H + 1,).
-        convex: whether each part seems to fill its hull, (H,).
+        convex: whether each part fills its hull, (H,).
         table: first cone of each hull, or -1 without a table, (H,).
         cone, entry: see `CornerTable`; those of all hulls. Entries are rows of `points`.
     """

@@ -140,7 +140,10 @@ def passes(cast: Cast, plane: Floats, top: float, best: float) -> bool:
 
 @kernel
 def cast_to_element(cast: Cast, body: BodyArrays, e: int, best: float, work: CastWork) -> float:
-    """Return how far the hull moves until it touches an element; infinite if not before `best`."""
+    """Return how far the hull moves until it touches an element; infinite if not before `best`.
+
+    It is less where `STEPS` planes do not lead to the touch.
+    """
     count, radius = body.corners[e], body.radius[e]
     for k in range(count):
         for c in range(3):

@@ -36,8 +36,8 @@ def put_between(one: Floats, other: Floats, sweep: SweepWork) -> None:
 def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork) -> tuple[float, Vector, float]:
     """Return how far the hulls of two links are apart, a little less at most, and along which unit vector [m].
 
-    If hulls overlap, that is not positive: two of them overlap by so much along the vector. The last result is how far
-    any other two are apart.
+    If two hulls overlap, the distance is below 0: they overlap by so much along the vector. The last result is how far
+    any other two hulls are apart, or a bound on it that is no larger than the overlap.
 
     Args:
         m, r: the links; without hulls, the results are -∞. n: where the search begins. sweep: has their poses.
@@ -52,6 +52,8 @@ def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork
             others = min(others, max(gap, least))
             if gap < least:
                 least, side = gap, found
+            if least <= 0.0 and others <= -least:
+                return least, side, others
     return least, side, others
 
 

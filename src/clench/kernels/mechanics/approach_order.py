@@ -16,7 +16,7 @@ from clench.kernels.sections.plane_pose import put_point
 from clench.kernels.trees.bvh import Ints as Stack
 
 #: A ball that is nearer than this share of a cube's edge is not followed any more [-].
-NEAR = 0.3
+CLOSE = 0.3
 #: Columns of a ball: its middle, its radius, and a travel up to which it does not touch.
 RADIUS, UNTIL, COLUMNS = 3, 4, 5
 
@@ -63,13 +63,12 @@ def next_link(body: BodyArrays, along: Floats, best: float, balls: Floats, stack
         stack: scratch space, (PAIRS, 3).
     """
     while True:
-        k = 0
-        for i in range(1, balls.shape[0]):
-            if balls[i, UNTIL] < balls[k, UNTIL]:
-                k = i
-        start = float(balls[k, UNTIL])
-        if start >= best:
-            return -1, start
+        k, start = -1, best
+        for i in range(balls.shape[0]):
+            if balls[i, UNTIL] < start:
+                k, start = i, float(balls[i, UNTIL])
+        if k < 0:
+            return -1, best
         if not moves_on(body, along, balls[k], stack):
             balls[k, UNTIL] = math.inf
             return k, start
@@ -85,7 +84,7 @@ def moves_on(body: BodyArrays, along: Floats, ball: Floats, stack: Stack) -> boo
     square = square_bound(body, p, stack)
     # Polyhedra of the same round shape differ.
     gap = (math.sqrt(square) if square > 0.0 else 0.0) - ball[RADIUS] - AWAY * edge
-    if gap <= NEAR * edge:
+    if gap <= CLOSE * edge:
         return False
     ball[UNTIL] = s + gap
     return True

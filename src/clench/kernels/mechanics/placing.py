@@ -28,8 +28,8 @@ class Placed(NamedTuple):
 
     Args:
         travel: distance that each hand may go past its place before it touches anything [m], shape (N,). It is below 0
-            if the hand is stopped before its place, and any such number if it is stopped by more than `short`; it is
-            `ahead` if nothing stops the hand.
+            if the hand is stopped before its place. If it is below `-short`, the hand may be stopped even earlier. It
+            is `ahead` if nothing stops the hand.
         body: the body that it touches first there, as numbered by the object's tree, -1 for none, shape (N,).
     """
 
@@ -71,8 +71,8 @@ class Target(NamedTuple):
     """Describe what hands approach: the object with its obstacles.
 
     Args:
-        mesh: its surface. body: the same as one body, which may have a grid. owner: number of the part that each
-            element of the body comes from, see `BodyArrays.source`, (T,).
+        mesh: its surface. body: the same as one body, which may have a grid. owner: which body of the object each
+            element of `body` is of, (T,).
         ball: centre and radius of a ball around all of it [m], (4,).
     """
 
@@ -166,7 +166,7 @@ def meet(
         if touched >= 0:
             best, element = distance, touched
     if last > first and (full or element < 0):
-        return best, target.owner[target.body.source[element]] if element >= 0 else -1
+        return best, target.owner[element] if element >= 0 else -1
     owners = meshes.owners[meshes.triangle_first[k] : meshes.triangle_first[k + 1]]
     mesh = target.mesh
     distance, _, triangle = first_contact(

@@ -158,7 +158,8 @@ def step_by_elements(
     The plane between two elements keeps most of their neighbours apart as well.
 
     Args:
-        share: of their speed, by which they approach each other along a vector. sides: the vector.
+        sides: the direction between the links. share: how fast they approach each other along it, as a share of their
+            speed [-].
     """
     links, sweep, stack = pair.full_width.links, pair.sweep, pair.sweep.stack
     speed = speeds_of(pair, at)
@@ -194,7 +195,7 @@ def plane_across(pair: LinkPair, n: Vector, at: float, until: float) -> StepPlan
 
 @kernel
 def stay_apart(links: BodyArrays, a: int, b: int, plane: StepPlane, step: float) -> bool:
-    """Say whether a plane keeps two items apart on a step; see `are_apart`."""
+    """Say whether a plane keeps two items apart on a step, to which its `ahead` belongs; see `lowest_on`."""
     margin = gap_over(links, a, links, b, plane.now)
     if margin <= TOUCH:
         return False

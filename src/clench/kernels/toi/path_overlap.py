@@ -53,9 +53,9 @@ BALLS: Final = 0.25
 def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -> float:
     """Return the gap of a pair in its present place, minus its depth where the pair overlaps; `APART` if larger [m].
 
-    If the hulls of two links are apart, or overlap by less than counts, that is returned, which is no larger. The
-    direction between the hulls, or between the closest elements, is kept as the normal of a plane that may part the
-    pair.
+    For two links, the distance of their hulls takes the place of the gap if they are apart, and minus their overlap if
+    that is too small to count: neither is larger than the gap. The direction between the hulls, or between the closest
+    elements, is kept as the normal of a plane that may part the pair.
 
     Args:
         was_apart: the pair did not overlap at all where it was looked at last. It has not moved by more than `OVERLAP`
@@ -67,7 +67,7 @@ def gap_between(problem: PathProblem, p: int, was_apart: bool, work: PathWork) -
         return APART
     if r >= 0:
         gap = gap_of_hulls(problem, m, r, work)
-        if gap >= -FOUND - problem.allowed[p]:
+        if gap >= -FOUND:
             return min(gap, APART)
     target, b = target_of(problem, r)
     work.sweep.pair[0] = -1

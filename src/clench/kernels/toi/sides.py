@@ -13,7 +13,7 @@ from clench.kernels.trees.obb import slab_top
 
 
 class Sides(NamedTuple):
-    """A unit vector as two bodies see it.
+    """A unit vector as two bodies see it, or a vector of length 0, along which nothing lies apart.
 
     Args:
         one, other: in the frame of either body. height: how far the first frame is beyond the other one [m].
@@ -26,7 +26,7 @@ class Sides(NamedTuple):
 
 @kernel
 def sides_of(n: Vector, one: Floats, other: Floats) -> Sides:
-    """Return a unit vector in the frames of two poses, and how far the first pose is beyond the other along it."""
+    """Return a vector in the frames of two poses, and how far the first pose is beyond the other along it."""
     return Sides(
         (
             n[0] * one[0, 0] + n[1] * one[1, 0] + n[2] * one[2, 0],
