@@ -113,3 +113,27 @@ def test_the_nearer_of_two_parts_is_named():
     distance, element = cast(body_of(box(0.1, 0.02, 0.02)), rest, pose(x=0.03, z=0.2), DOWN)
     assert distance == pytest.approx(0.16, abs=2e-6)
     assert rest.source[element] >= len(low.triangles)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_several_grown_elements_stop_a_hull_as_early_as_the_first_of_them(seed):
+    rng = np.random.default_rng(seed)
+    points, radius = 0.1 * rng.normal(size=(24, 3)), rng.uniform(0.0, 0.03, 8)
+    elements = np.arange(24).reshape(8, 3)
+    elements[::3, 2] = elements[::3, 1]
+    elements[1::3, 1:] = elements[1::3, :1]
+    rest = pack_bodies([Elements(points, elements.astype(np.int32), radius)])
+    alone = [pack_bodies([Elements(points, elements[k : k + 1].astype(np.int32), radius[k : k + 1])]) for k in range(8)]
+    moving = rounded(0.03 * rng.normal(size=(3, 3)), 0.02) if seed % 2 else body_of(hull(seed, 0.03))
+    frame = Rotation.random(random_state=seed).as_matrix()
+    met = 0
+    for _ in range(6):
+        aside = 0.1 * rng.normal(size=2) @ frame[1:]
+        start = pose(*(aside - 1.0 * frame[0]), rotation=Rotation.random(random_state=int(rng.integers(1000))))
+        found, element = cast(moving, rest, start, frame[0])
+        ways = [cast(moving, one, start, frame[0])[0] for one in alone]
+        assert found == pytest.approx(min(ways), abs=2.0 * NEAR)
+        if element >= 0:
+            assert ways[rest.source[element]] <= min(ways) + 2.0 * NEAR
+            met += 1
+    assert met > 0
