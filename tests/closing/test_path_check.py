@@ -130,11 +130,17 @@ def test_a_link_that_touches_an_open_shell_from_within_is_in_it() -> None:
     assert found.place < np.arcsin((low - RADIUS) / LENGTH) / 2.0
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-7, 5e-5])
-def test_fingers_that_slide_along_each_other_are_free(gap: float) -> None:
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-7, 1e-6, 2e-6, 4e-6, 1e-5, 2e-5, 5e-5])
+@pytest.mark.parametrize("shape", ["capsule", "box", "two boxes"])
+def test_fingers_that_slide_along_each_other_are_free(shape: str, gap: float) -> None:
     """Side by side at a gap that never changes, for the whole motion, even where they touch."""
-    builder = HandBuilder().finger("a", [along_x(RADIUS, LENGTH)], [LENGTH])
-    hand = builder.finger("b", [along_x(RADIUS, LENGTH)], [LENGTH], base=mount((0.0, 2 * RADIUS + gap, 0.0))).hand()
+    shapes: dict[str, Shape | tuple[Shape, ...]] = {"capsule": along_x(RADIUS, LENGTH)}
+    for name, count in (("box", 1), ("two boxes", 2)):
+        half = LENGTH / (2 * count)
+        places = [Pose([(2 * k + 1) * half, 0.0, 0.0]) for k in range(count)]
+        shapes[name] = tuple(Shape(ShapeKind.BOX, (half, RADIUS, RADIUS), place) for place in places)
+    builder = HandBuilder().finger("a", [shapes[shape]], [LENGTH])
+    hand = builder.finger("b", [shapes[shape]], [LENGTH], base=mount((0.0, 2 * RADIUS + gap, 0.0))).hand()
     assert find_path_overlap(hand, np.array([[0.0, 0.0], [1.0, 0.4], [0.2, 1.2]]), SOURCE) is None
 
 

@@ -1,4 +1,4 @@
-"""Fingers that meet another finger close anew from the joint that meets it, to the bits of closing anew as a whole."""
+"""Fingers that meet another finger stop there, and end as if they closed anew as a whole."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from clench.core.pose import Pose
 from clench.kernels.closing import in_turn
 from clench.kernels.closing.layout import CONTACT_DOF, ClosingArrays
 from clench.kernels.closing.solve_layout import FINISH
+from clench.models.shapes import Shape, ShapeKind
 from kernels.kernel_entries import entry
 
 undo_from = entry(in_turn.undo_from)
@@ -27,11 +28,19 @@ def facing():
     return one.finger("b", links, [0.05, 0.04], base=mount((0.0, 0.0, 0.09)), axes=[Y, Y], upper=1.2).hand()
 
 
-def finished(monkeypatch, obj, whole, hand=None):
+def crossing(palm=None, upper=0.35):
+    """Return a hand whose second finger meets the first one's tip with its second joint."""
+    links = [along_x(0.006, 0.05), along_x(0.006, 0.04)]
+    one = HandBuilder(palm).finger("a", links, [0.05, 0.04], axes=[-Y, -Y], upper=0.6)
+    return one.finger("b", links, [0.05, 0.04], base=mount((0.0, 0.0, 0.1)), axes=[Y, Y], upper=upper).hand()
+
+
+def finished(monkeypatch, obj, whole, hand=None, poses=None):
     """Return the answers of a batch whose fingers interlock, and the hand's arrays.
 
     Args:
-        whole: fingers close anew as a whole. hand: Robonaut 2 if None.
+        obj: model of the object, or the object. whole: fingers close anew as a whole. hand: Robonaut 2 if None.
+        poses: of the hand, 40 approach poses if None.
     """
     seen = []
 
@@ -44,8 +53,10 @@ def finished(monkeypatch, obj, whole, hand=None):
 
     run = kernel_run.run_stages
     monkeypatch.setattr(kernel_run, "run_stages", in_two_parts)
-    hand, shape = clench.Hand.load("robonaut2") if hand is None else hand, clench.GraspObject.load(obj)
-    poses = clench.approach_poses(hand, shape, 40, 3)
+    hand, shape = clench.Hand.load("robonaut2") if hand is None else hand, obj
+    if isinstance(obj, str):
+        shape = clench.GraspObject.load(obj)
+    poses = clench.approach_poses(hand, shape, 40, 3) if poses is None else poses
     command = clench.GraspCommand(hand_pose=poses[0], preshape="open", measure=False)
     clench.solve_batch(hand, shape, poses, command, threads=1)
     monkeypatch.setattr(kernel_run, "run_stages", run)
@@ -54,7 +65,7 @@ def finished(monkeypatch, obj, whole, hand=None):
 
 
 @pytest.mark.parametrize("obj", ["box:x=0.01,y=0.01,z=0.01", "sphere:r=0.012"])
-def test_closing_anew_from_a_joint_has_the_bits_of_closing_anew_as_a_whole(obj, monkeypatch):
+def test_stopping_at_a_finger_ends_as_closing_anew_as_a_whole_does(obj, monkeypatch):
     part, _ = finished(monkeypatch, obj, False)
     whole, _ = finished(monkeypatch, obj, True)
     assert np.array_equal(part.anew, whole.anew)
@@ -79,6 +90,33 @@ def test_a_finger_closes_anew_from_its_first_joint_if_that_meets(monkeypatch):
         one, other = answer_at(part.final, n), answer_at(whole.final, n)
         assert np.array_equal(one.turn[1], other.turn[1])
         assert np.array_equal(one.contact[1], other.contact[1])
+
+
+def test_links_that_were_left_alone_are_counted_as_in_closing_as_a_whole(monkeypatch):
+    """A palm in which the last link of the second finger begins: closing starts at its first joint again."""
+    palm = Shape(ShapeKind.SPHERE, (0.005, 0.0, 0.0), Pose([0.08, 0.0, 0.103]))
+    far, poses = clench.GraspObject.load("sphere:r=0.004", pose=Pose([1.0, 0.0, 0.0])), [Pose.identity()]
+    for hand, skipped in ((crossing(), False), (crossing(palm), True)):
+        part, arrays = finished(monkeypatch, far, False, hand, poses)
+        whole, _ = finished(monkeypatch, far, True, hand, poses)
+        assert part.anew[0].tolist() == whole.anew[0].tolist() == [0, 1]
+        assert part.final.contact[0, 1, 0, CONTACT_DOF] == arrays.first_dof[1] + 1
+        assert (part.final.skipped[0, 1] > 0) == skipped
+        assert part.final.skipped[0, 1] == whole.final.skipped[0, 1]
+        assert part.final.travel[0, 1] == pytest.approx(whole.final.travel[0, 1], abs=1e-12)
+
+
+def test_a_touch_of_an_earlier_joint_stays_where_a_later_one_meets_a_finger(monkeypatch):
+    """The first joint of the second finger stops on a ball, its second joint at the first finger."""
+    turn, r, size = 0.2, 0.006, 0.004
+    link, under = np.array([np.cos(turn), 0.0, -np.sin(turn)]), np.array([-np.sin(turn), 0.0, -np.cos(turn)])
+    ball = clench.GraspObject.load(f"sphere:r={size}", pose=Pose([0.0, 0.0, 0.1] + 0.02 * link + (r + size) * under))
+    found, arrays = finished(monkeypatch, ball, False, crossing(upper=1.0), [Pose.identity()])
+    first = arrays.first_dof[1]
+    assert found.anew[0].tolist() == [0, 1]
+    assert found.final.contact[0, 1, : found.final.contacts[0, 1], CONTACT_DOF].tolist() == [first, first + 1]
+    assert found.final.travel[0, 1, first] == pytest.approx(turn, abs=1e-8)
+    assert 0.4 < found.final.travel[0, 1, first + 1] < 0.9
 
 
 @pytest.mark.parametrize("early", [1e-10, 1e-5])
