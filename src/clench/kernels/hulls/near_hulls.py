@@ -37,7 +37,7 @@ def links_parting(links: BodyArrays, m: int, r: int, n: Vector, sweep: SweepWork
     """Return how far the hulls of two links are apart, a little less at most, and along which unit vector [m].
 
     If two hulls overlap, the distance is below 0: they overlap by so much along the vector. The last result is how far
-    any other two hulls are apart, or a bound on it that is no larger than the overlap.
+    the other hulls are apart. Where that is less than the overlap, the search ends, and some may be nearer.
 
     Args:
         m, r: the links; without hulls, the results are -∞. n: where the search begins. sweep: has their poses.
