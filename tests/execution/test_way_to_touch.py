@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from clench.execution.executing import execute
 from clench.execution.execution_report import ExecutionReport
 from clench.execution.trajectory import Trajectory, plan_trajectory
 from clench.models.hand.hand import Hand
-from clench.models.shapes import CollisionSource
+from clench.models.objects.grasp_object import BodyRole
+from clench.models.shapes import CollisionSource, Shape, ShapeKind
 from clench.solver.solution import GraspSolution
 
 X, Y, Z = np.eye(3)
@@ -134,3 +136,22 @@ class HullJudge:
                     ):
                         worst = max(worst, -self.mujoco.mj_geomDistance(self.model, self.data, g, h, 0.001, None))
         return worst
+
+
+def test_a_hand_that_begins_in_the_object_has_no_free_path() -> None:
+    """Neither for a blocked hand, nor in an obstacle that was not there when the grasp was computed."""
+    hand, mug = clench.Hand.load("robonaut2"), clench.GraspObject.load("mug")
+    command = clench.GraspCommand(hand_pose=clench.Pose([0.0, 0.0, 0.0], wxyz=[0.5, 0.5, 0.5, 0.5]), preshape="open")
+    blocked = clench.solve(hand, mug, command)
+    assert blocked.status == "blocked"
+    with pytest.raises(MotionError, match=r"'\w+' overlaps 'mug' by \d.* mm before anything moves\.$"):
+        clench.plan_trajectory(blocked, hand, obj=mug)
+    # Asked to, it plans a path all the same.
+    assert len(clench.plan_trajectory(blocked, hand, obj=mug, force=True).times) > 0
+    free = clench.solve(hand, mug, replace(command, hand_pose=clench.approach_poses(hand, mug, 1, 0)[0]))
+    clench.plan_trajectory(free, hand, obj=mug)
+    palm = (np.linalg.inv(mug.pose.matrix) @ free.hand_pose.matrix)[:3, 3]
+    box = clench.GraspObject.from_shape(Shape(ShapeKind.BOX, (0.01, 0.01, 0.01), clench.Pose(palm)), name="box")
+    beside = mug.with_body(replace(box.bodies[0], role=BodyRole.OBSTACLE))
+    with pytest.raises(MotionError, match=r"overlaps 'box' by .* before anything moves"):
+        clench.plan_trajectory(free, hand, obj=beside)

@@ -21,7 +21,7 @@ from clench.solver.solution import GraspSolution
 
 from .landing import CLEARANCE
 from .next_steps import AFTER_TOUCH, Phase, phases_after, plan_after_touch, points_after
-from .step_check import refuse_after
+from .step_check import refuse_after, refuse_start
 from .timing import ACCELERATION
 from .trajectory_checks import check_joints, check_points, check_rates, check_velocities
 from .way_to_touch import WayFinder, in_turn, refuse_way
@@ -208,6 +208,8 @@ def plan_trajectory(
     after = plan_after_touch(solution, hand, pace)
     way = WayFinder(solution, hand, obj, pace).find(clearance)
     if not force:
+        if obj is not None:
+            refuse_start(solution, hand, obj)
         refuse_way(way, hand)
         refuse_after(solution, hand, after)
     return Trajectory(
