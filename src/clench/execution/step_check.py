@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
 import numpy as np
 
@@ -18,9 +17,6 @@ from clench.solver.preshapes.named_angles import posture
 from clench.solver.solution import GraspSolution
 
 from .next_steps import NEXT_STEP, Phase, squeeze_offsets
-
-#: A link that is deeper than this in the object where a path begins is not free: what a path may overlap by [m].
-DEEP: Final = 1e-5
 
 
 def refuse_after(solution: GraspSolution, hand: Hand, phases: Sequence[Phase]) -> None:
@@ -114,18 +110,22 @@ def placed_object(solution: GraspSolution, obj: GraspObject) -> PlacedObject:
     return place_object(obj, invert(solution.hand_pose.matrix) @ solution.object_pose.matrix)
 
 
-def refuse_start(solution: GraspSolution, hand: Hand, obj: GraspObject) -> None:
+def refuse_start(hand: Hand, q: FloatArray, source: CollisionSource, around: PlacedObject) -> None:
     """Raise an error if the hand overlaps the object or an obstacle where every path begins.
+
+    Args:
+        hand: the hand. q: angles of all joints there [rad], shape (J,). source: geometry of the links.
+        around: the object with its obstacles.
 
     Raises:
         MotionError: names the link, the body and the depth.
     """
-    around, q = placed_object(solution, obj), posture(solution.open_angles, hand, "open_angles")
-    source = CollisionSource(solution.collision_source)
+    from clench.kernels.toi.path_overlap import OVERLAP
+
     for packed in around.bodies:
         found = hand_depths(hand, q, packed, around.T_palm_object, source)
         deepest = max(found, key=lambda depth: depth.depth, default=None)
-        if deepest is not None and deepest.depth > DEEP:
+        if deepest is not None and deepest.depth > OVERLAP:
             raise MotionError(
                 f"No path to the touch is free for hand '{hand.name}': '{hand.links[deepest.link].name}' overlaps "
                 f"'{packed.body_names[0]}' {deepest.text} before anything moves."

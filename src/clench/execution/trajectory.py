@@ -206,10 +206,11 @@ def plan_trajectory(
     limits = np.array([j.velocity or DEFAULT_SPEED for j in hand.joints])
     pace = _pace(limits, speed, acceleration)
     after = plan_after_touch(solution, hand, pace)
-    way = WayFinder(solution, hand, obj, pace).find(clearance)
+    finder = WayFinder(solution, hand, obj, pace)
+    if not force and finder.around is not None:
+        refuse_start(hand, finder.start, finder.source, finder.around)
+    way = finder.find(clearance)
     if not force:
-        if obj is not None:
-            refuse_start(solution, hand, obj)
         refuse_way(way, hand)
         refuse_after(solution, hand, after)
     return Trajectory(
