@@ -19,8 +19,10 @@ from clench.kernels.toi.toi_work import PAIRS
 from clench.kernels.trees.bvh import Ints as Stack
 from clench.kernels.trees.obb import slab_top
 
-from .enclosing_hulls import HullArrays, lowest_corner
+from .enclosing_hulls import HullArrays
 from .gjk import widest_gap
+from .hull_motion import HullMotion, height
+from .hull_window import top_along
 
 #: A hull touches what is nearer than this [m].
 NEAR = 1e-6
@@ -153,7 +155,8 @@ def cast_to_element(cast: Cast, body: BodyArrays, e: int, best: float, work: Cas
         plane = work.planes[k]
         if math.isnan(plane[DOWN]):
             break
-        if passes(cast, plane, top_of(corners, plane) + radius, best):
+        top = top_along(hulls, -1, corners, radius, (plane[0], plane[1], plane[2]))
+        if passes(cast, plane, top, best):
             return math.inf
     grown, s, along = hulls.radius[cast.hull] + radius, cast.start, cast.along
     copy_pose(cast.T, work.T)
@@ -176,25 +179,12 @@ def cast_to_element(cast: Cast, body: BodyArrays, e: int, best: float, work: Cas
 
 
 @kernel
-def top_of(corners: Floats, plane: Floats) -> float:
-    """Return the largest coordinate of points along a plane's normal [m]."""
-    top = -math.inf
-    for k in range(corners.shape[0]):
-        top = max(top, plane[0] * corners[k, 0] + plane[1] * corners[k, 1] + plane[2] * corners[k, 2])
-    return top
-
-
-@kernel
 def keep_plane(cast: Cast, down: float, work: CastWork) -> None:
     """Put the latest plane before the others, and forget the last one."""
-    planes, n, T = work.planes, work.direction, cast.T
+    planes, n, hull = work.planes, work.direction, cast.hull
     for k in range(PLANES - 1, 0, -1):
         for c in range(5):
             planes[k, c] = planes[k - 1, c]
-    x = T[0, 0] * n[0] + T[1, 0] * n[1] + T[2, 0] * n[2]
-    y = T[0, 1] * n[0] + T[1, 1] * n[1] + T[2, 1] * n[2]
-    z = T[0, 2] * n[0] + T[1, 2] * n[1] + T[2, 2] * n[2]
-    low, _ = lowest_corner(cast.hulls, cast.hull, x, y, z)
-    low += n[0] * T[0, 3] + n[1] * T[1, 3] + n[2] * T[2, 3] - cast.hulls.radius[cast.hull]
+    motion, across = HullMotion(hull, cast.hulls.radius[hull], 1.0, 0.0, 0.0, 0.0, 0.0), (n[0], n[1], n[2])
     planes[0, 0], planes[0, 1], planes[0, 2] = n[0], n[1], n[2]
-    planes[0, HEIGHT], planes[0, DOWN] = low, down
+    planes[0, HEIGHT], planes[0, DOWN] = height(cast.hulls, motion, cast.T, across), down

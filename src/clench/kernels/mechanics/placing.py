@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from clench.kernels.closing.layout import Floats, Ints
 from clench.kernels.geometry.bodies import BodyArrays
 from clench.kernels.geometry.link_meshes import LinkMeshArrays, ObjectMesh, mesh_of
-from clench.kernels.geometry.vectors import dot
 from clench.kernels.hulls.enclosing_hulls import HullArrays
 from clench.kernels.hulls.hull_cast import Cast, CastWork, cast_hull, make_cast_work
 from clench.kernels.runtime.compiling import entry_kernel, kernel
-from clench.kernels.sections.plane_pose import compose
+from clench.kernels.sections.plane_pose import compose, put_point
 from clench.kernels.toi.passing_planes import COLUMNS as PLANE
 from clench.kernels.toi.passing_planes import PLANES
 from clench.kernels.toi.toi_translation import PAIRS, first_contact
@@ -114,10 +113,10 @@ def bring_up(
         foremost = -np.inf
         for k in range(count):
             compose(T_object_palm[n], poses[shape[n], meshes.link[k]], T[k])
-            foremost = max(foremost, _reach(T[k], meshes.center[k], along) + meshes.radius[k])
-        middle = dot((target.ball[0], target.ball[1], target.ball[2]), (along[0], along[1], along[2]))
+            put_point(T[k], meshes.center[k], balls[k])
+            foremost = max(foremost, reach(balls[k], along) + meshes.radius[k])
         # Nothing is nearer than the ball: all links start behind it.
-        back = max(foremost - (middle - target.ball[3]), 0.0)
+        back = max(foremost - (reach(target.ball, along) - target.ball[3]), 0.0)
         for k in range(count):
             for r in range(3):
                 T[k, r, 3] -= back * along[r]
@@ -176,9 +175,6 @@ def meet(
 
 
 @kernel
-def _reach(T: Floats, point: Floats, along: Floats) -> float:
-    """Return how far along a direction a point of a placed link lies [m]."""
-    reach = 0.0
-    for r in range(3):
-        reach += along[r] * (T[r, 0] * point[0] + T[r, 1] * point[1] + T[r, 2] * point[2] + T[r, 3])
-    return reach
+def reach(ball: Floats, along: Floats) -> float:
+    """Return how far along a direction the middle of a ball lies [m]."""
+    return float(along[0] * ball[0] + along[1] * ball[1] + along[2] * ball[2])
